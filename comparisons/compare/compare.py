@@ -3,11 +3,12 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from comparisons import rungs as ladder
 from comparisons import statistics
-from comparisons.compare import looks, pictures
+from comparisons.compare import looks, pictures, ray_starts
 from comparisons.compare.budget import Budget
 from comparisons.compare.control import control
 from comparisons.compare.judge import Evidence, Rendered, judge, picture_rungs
@@ -174,6 +175,9 @@ def _gather(
         else lambda: single_lights(judged_by, LIGHT_SPP),
         lengths=path_lengths(judged_by, threads),
         looks=looked,
+        ray_starts=None
+        if budget.seconds is None or not ray_starts.may_matter(scene, shown)
+        else partial(ray_starts.explained, scene, shown, budget.limit, budget.seconds, say),
     )
 
 

@@ -20,6 +20,11 @@ Lights = Callable[[], Mapping[str, FloatArray]]
 """Returns the reference's pictures of single lights (height, width, 3) by name; renders them."""
 
 
+RayStarts = Callable[[RungResult, tuple[FloatArray, FloatArray]], RungResult]
+"""Returns the result of the statistics of both sides' replicates, in which they differ, or one that
+explains it; renders pictures."""
+
+
 @dataclass(frozen=True)
 class Rendered:
     """images: the two pictures;  seconds: wall clock by side and step;  replicates: for noisy
@@ -48,7 +53,8 @@ def of_replicates(
 class Evidence:
     """The input of a verdict.  name: the case's;  rungs: the deterministic ones;  rendered: the
     pictures of both sides, if any;  lights, lengths: for the diagnosis;  looks: those at a growing
-    number of replicates, the last of which gives the statistics;  the rest as in `Case`."""
+    number of replicates, the last of which gives the statistics;  ray_starts: see
+    `comparisons.compare.ray_starts`, None where they cannot matter;  the rest as in `Case`."""
 
     name: str
     rungs: tuple[RungResult, ...]
@@ -60,6 +66,7 @@ class Evidence:
     lights: Lights | None = None
     lengths: Lengths | None = None
     looks: Looks | None = None
+    ray_starts: RayStarts | None = None
 
 
 def judge(evidence: Evidence, limit: float) -> Case:
@@ -70,7 +77,12 @@ def judge(evidence: Evidence, limit: float) -> Case:
     rungs, rendered = list(evidence.rungs), evidence.rendered
     metrics, images = None, None
     if rendered is not None:
-        rungs += picture_rungs(rendered, limit, looks=evidence.looks)
+        found = picture_rungs(rendered, limit, looks=evidence.looks)
+        decided = any(rung.status in ("differ", "invalid") for rung in [*rungs, *found[:-1]])
+        if evidence.ray_starts and found[-1].status == "differ" and not decided:
+            assert rendered.replicates is not None
+            found[-1] = evidence.ray_starts(found[-1], rendered.replicates)
+        rungs += found
         images = rendered.images
         if not any(rung.status == "invalid" for rung in rungs):
             metrics = image_metrics(images)

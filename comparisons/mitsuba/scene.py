@@ -179,19 +179,19 @@ _APART = 1 << 20
 """Difference of the seeds of a picture's parts: larger than that of any two pictures."""
 
 
-def picture(mi_scene: Any, spp: int, seed: int) -> FloatArray:
-    """One picture (height, width, 3); in parts of fewer samples where the integrator has a limit of
-    rays, `most_rays`."""
+def picture(mi_scene: Any, spp: int, seed: int, integrator: Any = None) -> FloatArray:
+    """One picture (height, width, 3), by the scene's integrator or another; in parts of fewer
+    samples where the integrator has a limit of rays, `most_rays`."""
+    integrator = mi_scene.integrator() if integrator is None else integrator
     width, height = mi_scene.sensors()[0].film().crop_size()
-    limit = getattr(mi_scene.integrator(), "most_rays", None)
+    limit = getattr(integrator, "most_rays", None)
     most = spp if limit is None else max(1, limit // (int(width) * int(height)))
     total: Any = 0.0
     for k, begun in enumerate(range(0, spp, most)):
         count = min(most, spp - begun)
         # The conversion to an array forces the lazy evaluation.
-        found = np.array(
-            mitsuba().render(mi_scene, spp=count, seed=(seed + k * _APART) % (1 << 32))
-        )
+        part = (seed + k * _APART) % (1 << 32)
+        found = np.array(mitsuba().render(mi_scene, spp=count, seed=part, integrator=integrator))
         total = total + count / spp * found.astype(np.float64)[..., :3]
     return np.asarray(total)
 

@@ -16,7 +16,8 @@ def limited(rungs: Sequence[RungResult]) -> list[RungResult]:
 
     Mitsuba does not resolve a scene if geometry agrees but, by prediction and by measurement, too
     many secondary rays hit the wrong surface (see `rays.resolution`).  Nor does it above a rung in
-    which the arbiter finds too many rays that float32 cannot resolve.
+    which the arbiter finds too many rays that float32 cannot resolve, or above statistics that its
+    ray epsilon explains.
     """
     found: list[RungResult] = []
     limit = ""
@@ -30,6 +31,8 @@ def limited(rungs: Sequence[RungResult]) -> list[RungResult]:
 
 def _limit(result: RungResult) -> str:
     """Why Mitsuba's precision is too low, by the result of one rung; empty where it is not."""
+    if "ray_epsilon" in result.numbers:  # see `comparisons.compare.ray_starts`
+        return result.reason
     if result.status not in ("agree", "reference-limited"):
         return ""
     if result.name == "geometry" and "resolution" in result.numbers:

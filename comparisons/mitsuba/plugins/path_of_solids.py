@@ -14,6 +14,7 @@ from functools import partial
 from typing import Any
 
 from comparisons.mitsuba.plugins.plain_scene import PlainScene
+from comparisons.mitsuba.plugins.whitted import clearance, leave
 
 _MOST_RAYS = 1 << 20
 """Rays that are traced together: each takes a kilobyte in wide variants."""
@@ -34,8 +35,9 @@ def register(mi: Any) -> None:
         """Parameters: max_depth, most edges of a path, -1 for no limit;  rr_depth, edges after
         which Russian roulette may end it;  samples_lights, samples_bsdfs: whether direct light is
         sampled in this way;  hide_emitters: whether camera rays pass through area lights, before
-        a black background.  `lit`, set before rendering, makes the `LitScene` of Mitsuba's scene;
-        without it there are no solids."""
+        a black background;  starts_close: whether rays start at float32's error off surfaces, in
+        place of Mitsuba's ray epsilon.  `lit`, set before rendering, makes the `LitScene` of
+        Mitsuba's scene; without it there are no solids."""
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
@@ -44,8 +46,10 @@ def register(mi: Any) -> None:
             self.samples_lights = properties.get("samples_lights", True)
             self.samples_bsdfs = properties.get("samples_bsdfs", True)
             self.hides = properties.get("hide_emitters", False)
+            self.close = properties.get("starts_close", False)
             self.lit: Callable[[Any], PlainScene] = partial(PlainScene, mi)
             self.most_rays = _MOST_RAYS
+            self.height: Callable[[Any], Any] = lambda si: 0.0
 
         def sample(
             self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True
@@ -55,6 +59,8 @@ def register(mi: Any) -> None:
             All paths take their next edge together.
             """
             lit = self.lit(scene)
+            if self.close:
+                self.height = partial(clearance, mi, reach=lit.reach(), cylinders=lit.cylinders())
             ray, active = mi.Ray3f(ray), mi.Mask(active)
             total, throughput, eta = mi.Color3f(0.0), mi.Color3f(1.0), mi.Float(1.0)
             before, bsdf_pdf, valid = dr.zeros(mi.Interaction3f), mi.Float(0.0), None
@@ -90,7 +96,7 @@ def register(mi: Any) -> None:
                 eta *= drawn.eta
                 is_delta = mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta)
                 bsdf_pdf = dr.select(is_delta, 0.0, drawn.pdf)
-                ray = si.spawn_ray(si.to_world(drawn.wo))
+                ray = self.onward(si, si.to_world(drawn.wo))
                 before = dr.zeros(mi.Interaction3f)
                 before.t, before.p, before.n = si.t, si.p, si.n
                 active &= dr.max(throughput) > 0.0
@@ -101,6 +107,20 @@ def register(mi: Any) -> None:
                 sampler.schedule_state()
                 dr.eval(ray, active, total, throughput, eta, bsdf_pdf, before)
             return total, valid if valid is not None else active, []
+
+        def onward(self, si: Any, d: Any) -> Any:
+            """A ray from a surface along the unit direction d."""
+            if not self.close:
+                return si.spawn_ray(d)
+            return leave(mi, si, dr.normalize(d), self.height(si))
+
+        def onward_to(self, si: Any, drawn: Any) -> Any:
+            """A ray from a surface to a point on a light."""
+            if not self.close:
+                return si.spawn_ray_to(drawn.p)
+            ray = self.onward(si, drawn.d)
+            ray.maxt = dr.dot(drawn.p - ray.o, ray.d) * (1.0 - mi.math.ShadowEpsilon)
+            return ray
 
         def behind_lamps(self, lit: Any, ray: Any, active: Any) -> Any:
             """The rest of each ray behind the area lights that it meets first."""
@@ -134,8 +154,8 @@ def register(mi: Any) -> None:
             active &= dr.max(light) > 0.0
             # Mitsuba's rays to distant lights end beyond its own scene, which lacks the solids.
             distant = mi.has_flag(drawn.emitter.flags(), mi.EmitterFlags.Infinite)
-            shadow = si.spawn_ray_to(drawn.p)
-            away = si.spawn_ray(drawn.d)
+            shadow = self.onward_to(si, drawn)
+            away = self.onward(si, drawn.d)
             shadow = dr.select(distant, away, shadow)
             return dr.select(lit.ray_test(shadow, active), 0.0, light)
 

@@ -46,6 +46,9 @@ class PlainScene:
         """All shapes, those of the operands too."""
         return [shape for mi_scene in self.all_scenes() for shape in mi_scene.shapes()]
 
+    def cylinders(self) -> list[Any]:
+        return [shape for shape in self.shapes() if shape.class_name() == "Cylinder"]
+
     def reach(self) -> float:
         """The largest coordinate on any shape."""
         boxes = [mi_scene.bbox() for mi_scene in self.all_scenes()]

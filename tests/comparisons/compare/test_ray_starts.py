@@ -1,0 +1,129 @@
+"""Light that total reflection keeps in glass leaves too soon in Mitsuba: its rays start too far off
+surfaces."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from comparisons.compare import compare, ray_starts
+from comparisons.compare.budget import Budget
+from comparisons.compare.compare import Subject, compare_scene
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.plugins.parameters import is_wide
+from comparisons.mitsuba.scene import picture
+from comparisons.mitsuba.translate import load
+from reference_rt.lights import Constant
+from reference_rt.rendering.scene import Scene
+
+GALLERY = """
+camera: {type: perspective, eye: [0, 0, 0.75], target: [0.908, 0, 1.17], fov: 6}
+film: {width: 16, height: 12, filter: {type: box}}
+sampler: {type: independent, spp: 64}
+integrator: {type: path, max_depth: DEPTH, rr_depth: 1000}
+materials: {glass: {type: dielectric}}
+shapes: [{type: sphere, material: glass}]
+lights: [{type: constant, radiance: 1}]
+""".replace("max_depth: DEPTH", "max_depth: 90")
+"""From inside of a glass sphere.  Rays whose lines pass the centre at more than 1 / 1.5 stay in it
+for ever: half of the picture is black, for ever."""
+
+
+@pytest.fixture
+def wide(monkeypatch: pytest.MonkeyPatch) -> None:
+    if not is_wide(mitsuba()):
+        pytest.skip("needs one of Mitsuba's variants that trace many rays at a time")
+    monkeypatch.setattr(ray_starts, "RAYS", 1 << 14)
+
+
+def judged(
+    scene: Scene, reference: Scene | None = None, seconds: float = 120.0, limit: float = 0.04
+) -> Any:
+    budget = Budget(
+        spp=512, replicates=8, seconds=seconds, pixels=192, light_pixels=192, limit=limit
+    )
+    found: list[str] = []
+    subject = Subject(scene, reference=reference)
+    case = compare_scene(subject, budget, found.append)
+    return case, {rung.name: rung for rung in case.rungs}, found
+
+
+def test_light_that_leaves_glass_too_soon_is_mitsubas(wide: None) -> None:
+    case, rungs, said = judged(Scene.parse(GALLERY))
+    assert rungs["geometry"].status == rungs["whitted"].status == "agree"
+    assert case.verdict == "reference-limited", case.reason
+    assert "ray epsilon" in rungs["statistics"].reason
+    assert rungs["images"].status == "reference-limited"
+    assert any("is measured" in line for line in said)
+
+
+def test_what_noise_hides_is_inconclusive(wide: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A first pass alone, whose noise is too large for the limit."""
+    monkeypatch.setattr(ray_starts, "RAYS", 1 << 10)
+    case, rungs, _ = judged(Scene.parse(GALLERY), seconds=0.1, limit=0.002)
+    assert case.verdict == rungs["statistics"].status == "inconclusive", case.reason
+    assert rungs["images"].status == "reference-limited"
+    assert rungs["statistics"].numbers["ray_epsilon"] < -0.5
+
+
+def test_a_fault_of_ours_is_not_explained_by_it(
+    wide: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same scene, and a sky in ours that is 20 % too bright: only the pictures show it, since
+    the rungs before are made to pass."""
+    right = Scene.parse(GALLERY)
+    wrong = right.changed(lights=[Constant(radiance=(1.2, 1.2, 1.2))])
+
+    def passed(*arguments: Any) -> list[Any]:
+        return [replace(r, status="agree") for r in rungs_before(*arguments)]
+
+    rungs_before = compare._deterministic_rungs
+    monkeypatch.setattr(compare, "_deterministic_rungs", passed)
+    case, rungs, _ = judged(wrong, reference=right)
+    assert case.verdict == "differ"
+    assert "does not explain it" in rungs["statistics"].reason
+
+
+def test_starts_matter_at_long_paths_in_glass_alone(wide: None) -> None:
+    scene = Scene.parse(GALLERY)
+    for text, matters in (
+        ("max_depth: 90", True),
+        ("max_depth: null", True),
+        (f"max_depth: {ray_starts.FOLLOWED}", False),
+    ):
+        other = Scene.parse(GALLERY.replace("max_depth: 90", text))
+        assert ray_starts.may_matter(other, load(other)) == matters
+    plain = Scene.parse(GALLERY.replace("type: dielectric", "type: diffuse"))
+    assert not ray_starts.may_matter(plain, load(plain))
+    assert ray_starts.may_matter(scene, load(scene))
+
+
+def test_rays_that_start_close_see_the_same_where_starts_do_not_matter(wide: None) -> None:
+    """Sky, lamp, point light, cylinder and rough glass: pictures by the same random numbers."""
+    scene = Scene.parse("""
+camera: {type: perspective, eye: [0, -6, 3], target: [0, 0, 0.5], up: [0, 0, 1], fov: 40}
+film: {width: 24, height: 20, filter: {type: box}}
+sampler: {type: independent, spp: 64}
+integrator: {type: path, max_depth: 12}
+materials:
+  glass: {type: dielectric}
+  frosted: {type: rough_dielectric, alpha: 0.2}
+  lamp: {type: emissive, radiance: 3}
+shapes:
+  - {type: rectangle, transform: [{scale: 4}]}
+  - {type: sphere, material: glass, center: [-1.2, 0, 1], radius: 0.8}
+  - {type: cylinder, material: frosted, transform: [{scale: 0.5}, {translate: [1.2, 0, 0.7]}]}
+  - {type: disk, material: lamp, transform: [{rotate: {axis: [1, 0, 0], degrees: 180}},
+     {translate: [0, 0, 4]}]}
+lights:
+  - {type: constant, radiance: 0.3}
+  - {type: point, position: [2, -3, 4], intensity: 5}
+""")
+    counterpart = load(scene)
+    effect = ray_starts.Effect(scene, counterpart, pairs=8)
+    for _ in range(4):
+        effect.render()
+    usual = picture(counterpart.mi_scene, 256, 0)
+    assert np.abs(effect.mean).max() < 0.002 * usual.mean()
+    assert (np.abs(effect.mean) < 5.0 * effect.error).all()
