@@ -10,7 +10,8 @@ This package can be called: see `one_scene.compare_one`.
 pictures of both sides (`pictures`), and hands the `Evidence` to `judge`, which adds the rungs of
 pictures and returns a `comparisons.results.case.Case`.  `looks` adds replicates until the question
 is decided, if the budget has a time limit.  `diagnosis`, with `single_lights` and `path_length`,
-names the likeliest cause of a difference.  `control` compares Mitsuba with itself: a difference
+names the likeliest cause of a difference; `ray_starts` measures whether it is Mitsuba's ray
+epsilon in glass.  `control` compares Mitsuba with itself: a difference
 there is a fault of the harness.
 
 A `Budget` says how much work a comparison may take and which relative bias it must detect; None
