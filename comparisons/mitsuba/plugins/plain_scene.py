@@ -47,6 +47,7 @@ class PlainScene:
         return [shape for mi_scene in self.all_scenes() for shape in mi_scene.shapes()]
 
     def cylinders(self) -> list[Any]:
+        """The cylinders, whose hits are the least accurate: see `whitted.clearance`."""
         return [shape for shape in self.shapes() if shape.class_name() == "Cylinder"]
 
     def reach(self) -> float:

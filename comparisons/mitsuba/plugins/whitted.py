@@ -45,8 +45,8 @@ def clearance(mi: Any, si: Any, reach: float, cylinders: list[Any]) -> Any:
 
 
 def is_shape(mi: Any, found: Any, shape: Any) -> Any:
-    """Whether a ray hit this very shape: another emitter may lie within the tolerance in front of
-    a light."""
+    """Whether the surface interaction `found` is on this very shape: another emitter may lie within
+    the tolerance in front of a light."""
     if parameters.is_wide(mi):
         return found.shape == mi.ShapePtr(shape)
     return found.shape is shape

@@ -30,7 +30,7 @@ class Reading:
     meshes: dict[Any, Any] = field(default_factory=dict)
     """Files of meshes, as read."""
     numbers: dict[Any, Iterator[int]] = field(default_factory=dict)
-    """Of each name that was taken, the numbers that come next."""
+    """The numbers that `unused` appends next, by table and name: "diffuse_2", "diffuse_3"."""
 
     def file(self, node: Node, key: str = "filename") -> Path:
         """The file that an element names.  Raises SceneError if there is none."""
