@@ -1,7 +1,20 @@
-"""The order in which test files are handed to processes."""
+"""What all tests share: which of them a fast run holds, what a test may cost, wording of messages.
 
+A fast run (`pytest`) leaves out the tests marked `slow`.  `@pytest.mark.cases(n)` makes a
+parametrized test slow but for n cases.  The run fails if a fast test takes more CPU time than
+LIMIT, and prints the tests that took most.
+"""
+
+import json
+import os
+import random
+import resource
 import sys
+import zlib
+from collections import defaultdict
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -9,7 +22,7 @@ import pytest
 # package if that is installed as editable.
 sys.path[:] = [path for path in sys.path if Path(path) != Path(__file__).parent]
 
-from reference_rt.jit import parallel_compile  # noqa: E402
+from reference_rt.jit import kernel_cache, parallel_compile  # noqa: E402
 
 LONGEST_FIRST = (
     "test_extremes",  # compiles the kernels of all tests that use `worlds`
@@ -41,16 +54,136 @@ no process is left alone with one at the end.  Files that share kernels are kept
 the second one then finds them compiled."""
 
 
+LIMIT = 5.0
+"""CPU seconds that a fast test may take, its fixtures and child processes included.  A test during
+which a kernel was compiled into the cache is not judged: it is cheaper the next time."""
+
+WORDING = Path(__file__).with_name("wording.json")
+"""Whole messages, by the test that shows each (fixture `wording`)."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--tenth", type=int, metavar="K", help="only the K-th tenth of the tests, 1-10"
+    )
+    parser.addoption("--write-wording", action="store_true", help=f"write {WORDING.name} anew")
+
+
 def pytest_configure(config: pytest.Config) -> None:
-    """xdist would start with the files of the most tests, which are quick ones."""
+    """xdist would start with the files of the most tests, which are quick ones.  It would also
+    replace a process that died by one that waits for ever: the run ends with an error instead."""
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
+        config.option.maxworkerrestart = "0"
     if hasattr(config, "workerinput"):
         # Every core runs a process of tests already: a kernel is compiled in it, not in a child.
         parallel_compile.may_fork = lambda: False
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Other files keep their order."""
+# ---- which tests a run holds --------------------------------------------------------------------
+
+
+@pytest.hookimpl(tryfirst=True)  # before pytest leaves out what is marked `slow`
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    functions: dict[str, list[pytest.Item]] = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("cases") is not None:
+            functions[item.nodeid.partition("[")[0]].append(item)
+    for name, cases in functions.items():
+        (most,) = cases[0].get_closest_marker("cases").args
+        for item in set(cases).difference(_spread(name, cases, most)):
+            item.add_marker(pytest.mark.slow)
+    if (tenth := config.getoption("tenth")) is not None:
+        items[:] = [item for item in items if zlib.crc32(item.nodeid.encode()) % 10 == tenth % 10]
     places = {name: k for k, name in enumerate(LONGEST_FIRST)}
     items.sort(key=lambda item: places.get(Path(item.path).stem, len(places)))
+
+
+def _spread(name: str, cases: list[pytest.Item], most: int) -> list[pytest.Item]:
+    """At most so many of a function's cases: greedily, those that hold the largest number of values
+    of arguments that no earlier one holds, then any.  The same ones in every run."""
+    left = list(cases)
+    random.Random(zlib.crc32(name.encode())).shuffle(left)
+    values = {id(item): set(item.callspec.indices.items()) for item in cases}  # type: ignore[attr-defined]
+    chosen: list[pytest.Item] = []
+    seen: set[tuple[str, int]] = set()
+    while left and len(chosen) < most:
+        best = max(left, key=lambda item: len(values[id(item)] - seen))
+        seen |= values[id(best)]
+        chosen.append(best)
+        left.remove(best)
+    return chosen
+
+
+# ---- what a test costs --------------------------------------------------------------------------
+
+
+def _cpu() -> float:
+    """Seconds that this process and the children that it has waited for have computed."""
+    who = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    return sum(use.ru_utime + use.ru_stime for use in map(resource.getrusage, who))
+
+
+def _kernels() -> int:
+    """The number of compiled kernels in the cache, of any process."""
+    return sum(len(names) for _, _, names in os.walk(kernel_cache.cache_root() / "kernels"))
+
+
+_begun: dict[str, tuple[float, int]] = {}
+_costs: dict[str, float] = {}
+
+
+def pytest_runtest_logstart(nodeid: str) -> None:
+    _begun[nodeid] = _cpu(), _kernels()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Iterator[pytest.TestReport]:
+    """Write the cost of a test into its last report."""
+    report = yield
+    if call.when == "teardown" and item.nodeid in _begun:
+        cpu, kernels = _begun.pop(item.nodeid)
+        report.cpu = _cpu() - cpu
+        judged = item.get_closest_marker("slow") is None and kernels == _kernels()
+        if judged and report.cpu > LIMIT and report.passed:
+            report.outcome = "failed"
+            report.longrepr = (
+                f"{report.cpu:.1f} CPU s: expected at most {LIMIT:g} of a test that is not `slow`"
+            )
+    return report
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    if report.when == "teardown":
+        _costs[report.nodeid] = getattr(report, "cpu", 0.0)
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    longest = sorted(_costs, key=lambda nodeid: -_costs[nodeid])[:10]
+    terminalreporter.section(
+        f"most CPU time, of {sum(_costs.values()):.0f} s, compilation included"
+    )
+    for nodeid in longest:
+        terminalreporter.write_line(f"{_costs[nodeid]:6.1f} s  {nodeid}")
+
+
+# ---- messages -----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def wording(request: pytest.FixtureRequest) -> Iterator[Callable[[str], None]]:
+    """wording(message) checks a message against the one that `wording.json` holds for this test.
+    Tests elsewhere assert what a message is about, not how it is worded.  After a change of wording
+    run the test with `--write-wording` and read the difference of the file."""
+    name = f"{Path(request.node.path).stem}::{request.node.name}"
+    said: list[str] = []
+    yield said.append
+    stored = json.loads(WORDING.read_text(encoding="utf-8")) if WORDING.exists() else {}
+    if request.config.getoption("write_wording"):
+        stored[name] = said
+        text = json.dumps(stored, indent=1, sort_keys=True, ensure_ascii=False)
+        WORDING.write_text(text + "\n", encoding="utf-8")
+    else:
+        assert said == stored.get(name)
