@@ -17,13 +17,6 @@ kernel takes links with the operations that it calls (`link_to_geometry`, `link_
 `linked.linked`), so that all scenes share it.
 """
 
-import warnings
-from typing import Any
-
-import numpy.typing as npt
-
-from reference_rt.core.arrays import FloatArray
-from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering.query.bsdf import Bsdf, BsdfSamples
 from reference_rt.rendering.query.camera import CameraRays, camera_rays
 from reference_rt.rendering.query.crossings import Crossings, crossings
@@ -47,31 +40,6 @@ from reference_rt.rendering.query.light import (
 )
 from reference_rt.rendering.query.radiance import Radiance, radiance, radiance_without_noise
 
-
-def _warn(message: str) -> None:
-    """A DeprecationWarning for the caller of the function that calls this."""
-    warnings.warn(message, DeprecationWarning, stacklevel=3)
-
-
-def closest(
-    scene: SceneTables,
-    origins: npt.ArrayLike,
-    directions: npt.ArrayLike,
-    threads: int | None = None,
-) -> Closest:
-    """Deprecated: use `first_hits`, which returns shape indices instead of internal codes."""
-    _warn("query.closest returns internal codes; use Scene.first_hits or query.first_hits")
-    return closest_primitives(scene, origins, directions, threads)
-
-
-def whitted_radiance(
-    scene: SceneTables, integrator: Any, origins: npt.ArrayLike, directions: npt.ArrayLike
-) -> FloatArray:
-    """Deprecated: the old name of `radiance_without_noise`."""
-    _warn("query.whitted_radiance is now query.radiance_without_noise; see also Scene.radiance")
-    return radiance_without_noise(scene, integrator, origins, directions)
-
-
 __all__ = [
     "Bsdf",
     "BsdfSamples",
@@ -85,7 +53,6 @@ __all__ = [
     "LightSources",
     "Radiance",
     "camera_rays",
-    "closest",
     "closest_primitives",
     "crossings",
     "direct_light",
@@ -97,5 +64,4 @@ __all__ = [
     "radiance",
     "radiance_without_noise",
     "sample_lights",
-    "whitted_radiance",
 ]

@@ -9,7 +9,6 @@ from camera_checks import rays
 from query_scene import LIT
 
 import reference_rt as rt
-from reference_rt.rendering import query
 from reference_rt.rendering.query import tracing
 
 VIEW = """
@@ -169,15 +168,6 @@ def test_neither_threads_nor_the_number_of_rays_change_anything(scene):
     assert 0.1 < many.hit.mean() < 0.99
     for name in NAMES:
         assert getattr(many, name)[:-1].tobytes() == getattr(few, name).tobytes(), name
-
-
-def test_old_names_still_answer(scene):
-    with pytest.warns(DeprecationWarning, match="first_hits"):
-        found = query.closest(scene.tables, [O], [D])
-    assert found.t[0] == scene.intersect(O, D).t
-    with pytest.warns(DeprecationWarning, match="radiance_without_noise"):
-        old = query.whitted_radiance(scene.tables, rt.Whitted().setup(), [O], [D])
-    assert np.array_equal(old, scene.radiance([O], [D]).mean)
 
 
 # ---- the camera and radiance ------------------------------------------------------------------
