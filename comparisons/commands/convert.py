@@ -34,16 +34,15 @@ def convert(
     Scenes in our format render without Mitsuba.
     """
     with compare_extra("converting"):
-        from comparisons.mitsuba.reading.write import check_name, write_scene
         from comparisons.mitsuba.writing import write_xml
-        from comparisons.mitsuba.writing.files import folder_of
+        from comparisons.mitsuba.writing.files import SUFFIXES, check_name, folder_of, write_scene
         from comparisons.mitsuba.writing.resolved import write_resolved
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.files import check_writable
 
     is_mitsuba = output.suffix.lower() == ".xml" and to == "scene"
     if to == "scene" and not is_mitsuba:
-        check_name(output)
+        check_name(output, SUFFIXES)
     check_writable(output)
     found = Scene.load(scene, by_name(define), allow_missing)
     if is_mitsuba:

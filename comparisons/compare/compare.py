@@ -21,7 +21,7 @@ from comparisons.mitsuba.notes import notes_of
 from comparisons.mitsuba.reading.reference import changes_to, file_of, own_scene
 from comparisons.mitsuba.translate import MOST_INSTANCES, UntranslatableError, load
 from comparisons.mitsuba.translate.integrators import in_place_of
-from comparisons.mitsuba.translate.vertices import with_float32_vertices
+from comparisons.mitsuba.translate.moved import with_float32_vertices
 from comparisons.results.case import Case, RungResult
 from comparisons.rungs.layers.rung import applies
 from reference_rt.cameras.film import Film

@@ -24,7 +24,7 @@ from comparisons import statistics
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.lit_scene import LitScene
-from comparisons.mitsuba.plugins.parameters import is_wide
+from comparisons.mitsuba.plugins.base import is_wide
 from comparisons.mitsuba.scene import picture
 from comparisons.mitsuba.translate.integrators import of_solids
 from comparisons.results.case import FloatArray, RungResult

@@ -4,9 +4,9 @@
 - `translate`: Scene -> Mitsuba; `plugins`: materials and an integrator that Mitsuba lacks.
 - `counterpart`: the loaded scene (`Counterpart`) and `trace`, its first hits; `csg`: those of
   solids.
-- `stand_ins`: how each Mitsuba shape represents ours; `hits`: its hits in our numbering; `scene`:
-  rays and pictures as NumPy arrays.
-- `accuracy`, `plastic_error`, `notes`: errors of tables and of Mitsuba's own materials.
+- `hits`: how each Mitsuba shape represents ours, and its hits in our numbering; `scene`: rays and
+  pictures as NumPy arrays.
+- `accuracy`, `notes`: errors of tables and of Mitsuba's own materials.
 
 Arrays are float64, lengths in scene units, angles of normals in radians; Mitsuba rounds to float32.
 -1 is a miss or no instance, an error of 0 means exact.  Everything that needs Mitsuba raises

@@ -286,17 +286,3 @@ def _write_memory(memory: dict[str, str | None]) -> None:
         part.replace(file)
     except OSError:
         part.unlink(missing_ok=True)
-
-
-__all__ = [
-    "LIBRARY",
-    "Backend",
-    "backend",
-    "cache_folder",
-    "choose",
-    "imported",
-    "mitsuba",
-    "prove",
-    "scalar",
-    "variant",
-]

@@ -10,11 +10,19 @@ import numpy as np
 from comparisons.geometry.frame import OURS, Frame
 from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.csg import SLIGHT, SolidCounterpart
-from comparisons.mitsuba.hits import BoolArray, MitsubaHits, assign, assign_nearer, misses, read
+from comparisons.mitsuba.hits import (
+    BoolArray,
+    MitsubaHits,
+    MitsubaShape,
+    StandIn,
+    assign,
+    assign_nearer,
+    misses,
+    read,
+)
 from comparisons.mitsuba.lit_scene import LitScene
-from comparisons.mitsuba.plugins.parameters import is_wide
+from comparisons.mitsuba.plugins.base import is_wide
 from comparisons.mitsuba.scene import first_hits
-from comparisons.mitsuba.stand_ins import MitsubaShape, StandIn
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.query import Intersections
 

@@ -13,9 +13,16 @@ import numpy as np
 
 from comparisons.geometry.flatten import Leaf, Tree
 from comparisons.geometry.float32 import delta, round32
-from comparisons.mitsuba.hits import BoolArray, MitsubaHits, assign, misses, read, rows_of
+from comparisons.mitsuba.hits import (
+    BoolArray,
+    MitsubaHits,
+    MitsubaShape,
+    assign,
+    misses,
+    read,
+    rows_of,
+)
 from comparisons.mitsuba.scene import first_hits
-from comparisons.mitsuba.stand_ins import MitsubaShape
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IdArray, IntArray
 from reference_rt.shapes import Plane

@@ -22,8 +22,7 @@ from comparisons.mitsuba.csg import (
     evaluated,
 )
 from comparisons.mitsuba.hits import CURVED
-from comparisons.mitsuba.plugins.parameters import is_wide
-from comparisons.mitsuba.plugins.plain_scene import PlainScene
+from comparisons.mitsuba.plugins.base import PlainScene, is_wide
 from reference_rt.core import transform
 from reference_rt.shapes import Plane
 

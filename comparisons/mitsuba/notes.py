@@ -1,18 +1,29 @@
 """Notes for the reader on materials whose counterpart is not simply Mitsuba's own material."""
 
+import itertools
+import math
 from functools import singledispatch
 from typing import Any
 
+import numpy as np
+
 from comparisons.mitsuba.accuracy import accuracy
-from comparisons.mitsuba.plastic_error import base_error
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.plugins.exact_coat import (
+    CELLS,
+    accepted,
+    fresnel,
+    rough_coat,
+    smooth_reflectance,
+)
 from comparisons.mitsuba.translate.integrators import (
     counts_lights_often,
     drops_light,
     misplaces,
     squares_opacity,
 )
+from comparisons.mitsuba.translate.materials import has_delta
 from comparisons.mitsuba.translate.textures import TranslationContext
-from comparisons.mitsuba.translate.wrappers import has_delta
 from reference_rt.integrators import Direct
 from reference_rt.materials import (
     Blend,
@@ -28,6 +39,55 @@ from reference_rt.materials import (
 from reference_rt.materials.microfacet.ggx_and_smith import MIN_ALPHA
 from reference_rt.rendering.scene import Scene
 from reference_rt.textures import VertexColours
+
+# ---- the error of Mitsuba's own plastics, measured on its BSDF -----------------------------------
+
+
+COSINES = (0.2, 0.5, 0.75, 1.0)
+"""Cosines of the directions at which `base_error` compares Mitsuba with the exact integral."""
+
+
+def base_error(eta: float, distribution: str = "", alpha: float = 0.0) -> tuple[float, float]:
+    """The relative error of the light that the base of Mitsuba's own plastic scatters: the least
+    and the greatest over pairs of directions with COSINES.
+
+    eta: relative index of the coat;  distribution, alpha: of a rough coat, empty for a smooth one.
+    For a base that is linear, or white; a darker nonlinear one has a smaller error.
+    """
+    import drjit as dr
+
+    mi = mitsuba()
+    rough = {"distribution": distribution, "alpha": alpha} if distribution else {}
+    bsdf = mi.load_dict(
+        {
+            "type": "roughplastic" if rough else "plastic",
+            "int_ior": accepted(eta) if rough else eta,
+            "ext_ior": 1.0,
+            "diffuse_reflectance": {"type": "rgb", "value": [1.0, 1.0, 1.0]},
+            **rough,
+        }
+    )
+    cosines = np.array(COSINES)
+    if distribution:
+        coat = rough_coat(distribution, alpha, eta)
+        reflectance = coat.reflectance
+        passing = np.interp(np.sqrt(cosines), np.linspace(0.0, 1.0, CELLS + 1), coat.transmittance)
+    else:
+        reflectance, passing = smooth_reflectance(eta), 1.0 - fresnel(cosines, eta)
+    context = mi.BSDFContext()
+    context.component = 1  # the base
+    off = []
+    for i, o in itertools.combinations_with_replacement(range(len(COSINES)), 2):
+        si = dr.zeros(mi.SurfaceInteraction3f)
+        si.wi, wo = (mi.Vector3f(math.sqrt(1.0 - COSINES[k] ** 2), 0.0, COSINES[k]) for k in (i, o))
+        value = float(np.ravel(np.array(bsdf.eval(context, si, wo)))[0])
+        exact = passing[i] * passing[o] * COSINES[o] / (math.pi * eta * eta * (1.0 - reflectance))
+        if exact > 0.0:  # else all light is mirrored, in Mitsuba too
+            off.append(value / float(exact) - 1.0)
+    return min(off), max(off)
+
+
+# ---- notes ---------------------------------------------------------------------------------------
 
 
 def notes_of(scene: Scene) -> list[str]:

@@ -194,15 +194,3 @@ def picture(mi_scene: Any, spp: int, seed: int, integrator: Any = None) -> Float
         found = np.array(mitsuba().render(mi_scene, spp=count, seed=part, integrator=integrator))
         total = total + count / spp * found.astype(np.float64)[..., :3]
     return np.asarray(total)
-
-
-__all__ = [
-    "RawHits",
-    "Replicates",
-    "first_hits",
-    "for_rays",
-    "light_id",
-    "picture",
-    "render",
-    "shape_id",
-]

@@ -11,7 +11,7 @@ import numpy as np
 
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
-from comparisons.mitsuba.translate.film import translate_filter
+from comparisons.mitsuba.translate.cameras import translate_filter
 from comparisons.results.case import RungResult
 from comparisons.rungs.grating import grating_error
 from reference_rt.cameras.filters import Filter, GaussianFilter, film_offset

@@ -9,7 +9,7 @@ import pytest
 
 from comparisons.geometry.frame import OURS
 from comparisons.mitsuba.translate import load
-from comparisons.mitsuba.translate.shapes import canonical, tori
+from comparisons.mitsuba.translate.shapes import canonical, quadrics
 from reference_rt import Scene
 
 
@@ -17,7 +17,7 @@ from reference_rt import Scene
 def coarse_meshes(*cells: int) -> Iterator[None]:
     """Meshes in place of curved shapes with fewer cells, (along, around): quicker to make."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tori, "CELLS", cells)
+        patch.setattr(quadrics, "CELLS", cells)
         patch.setattr(canonical, "CURVED", cells)
         yield
 

@@ -13,7 +13,8 @@ import platformdirs
 
 from comparisons.experiments.convergence.methods import Method
 from comparisons.experiments.convergence.store import Store
-from comparisons.mitsuba.backend import LIBRARY, LLVM, backend
+from comparisons.mitsuba.backend import LLVM, backend
+from comparisons.mitsuba.llvm_libraries import LIBRARY
 from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.child_processes import tied

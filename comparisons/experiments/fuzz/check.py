@@ -21,9 +21,9 @@ from comparisons.experiments.fuzz.identities import IDENTITIES, Original
 from comparisons.experiments.fuzz.plain import without_textures
 from comparisons.experiments.fuzz.types import types_in
 from comparisons.geometry.flatten import copies_of
+from comparisons.mitsuba.translate.materials import is_textured
 from comparisons.mitsuba.translate.shapes.stand_ins import coarser
 from comparisons.mitsuba.translate.textures import TranslationContext
-from comparisons.mitsuba.translate.wrappers import is_textured
 from comparisons.results.case import Case, RungResult
 from comparisons.rungs.limited import OF_LIGHT, limited
 from reference_rt.materials import (

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.mitsuba.plugins import parameters
+from comparisons.mitsuba.plugins import base
 from comparisons.mitsuba.plugins.base import base_class
 from reference_rt.core.arrays import FloatArray
 
@@ -60,7 +60,7 @@ def register(mi: Any) -> None:
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
             self.wrap(properties["nested"])
-            self.alphas = [parameters.number(mi, properties[f"alpha_{c}"]) for c in "uv"]
+            self.alphas = [base.number(mi, properties[f"alpha_{c}"]) for c in "uv"]
 
         def correction(self, si: Any, v: Any, active: Any) -> Any:
             alpha_u, alpha_v = (dr.maximum(alpha(si, active), 1e-4) for alpha in self.alphas)

@@ -4,7 +4,7 @@ The diffuse base under a coat is rho / (1 - c R) T(wi) T(wo) / (eta² pi), with 
 reflectance and T its transmittance.  Mitsuba takes R of smooth plastic from a fit made for indices
 up to 2; of rough plastic as the mean over 64 cosines from 0 to 1, both ends included, which is
 about R / 64 below the integral; and T by linear interpolation between these 64 cosines.  Here both
-are integrals in float64: `comparisons.mitsuba.plastic_error` measures the error of Mitsuba's base.
+are integrals in float64: `comparisons.mitsuba.notes` measures the error of Mitsuba's base.
 The specular reflection is Mitsuba's, with the exact masking of `exact_beckmann`.
 
 Mitsuba's plastics choose between coat and base by the means of their colours.  Colours of vertices
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from comparisons.mitsuba.plugins import exact_beckmann, parameters
+from comparisons.mitsuba.plugins import base, exact_beckmann
 from comparisons.mitsuba.plugins.base import base_class
 from reference_rt.core.arrays import FloatArray
 
@@ -162,10 +162,10 @@ def register(mi: Any) -> None:
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
             self.wrap(properties["nested"])
-            self.base = parameters.colour(mi, properties.get_texture("reflectance", 0.5))
-            self.specular: parameters.Parameter | None = None
+            self.base = base.colour(mi, properties.get_texture("reflectance", 0.5))
+            self.specular: base.Parameter | None = None
             if "specular" in properties:
-                self.specular = parameters.colour(mi, properties.get_texture("specular", 1.0))
+                self.specular = base.colour(mi, properties.get_texture("specular", 1.0))
             self.nonlinear = properties["nonlinear"]
             self.eta = float(properties["eta"])
             self.distribution = properties.get("distribution", "")
@@ -173,9 +173,7 @@ def register(mi: Any) -> None:
             if self.distribution:
                 coat = rough_coat(self.distribution, self.alpha, self.eta)
                 self.r, values = coat.reflectance, coat.transmittance
-                self.table = (
-                    mi.Float(values.astype(np.float32)) if parameters.is_wide(mi) else values
-                )
+                self.table = mi.Float(values.astype(np.float32)) if base.is_wide(mi) else values
             else:
                 self.r = smooth_reflectance(self.eta)
 
@@ -190,7 +188,7 @@ def register(mi: Any) -> None:
             if not self.distribution:
                 return 1.0 - mi.fresnel(cosine, self.eta)[0]
             x = dr.sqrt(dr.clip(cosine, 0.0, 1.0)) * CELLS
-            if not parameters.is_wide(mi):
+            if not base.is_wide(mi):
                 k = min(int(x), CELLS - 1)
                 low, high = float(self.table[k]), float(self.table[k + 1])
             else:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.mitsuba.plugins import parameters
+from comparisons.mitsuba.plugins import base
 
 
 def register(mi: Any) -> None:
@@ -28,7 +28,7 @@ def register(mi: Any) -> None:
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
-            self.radiance = parameters.colour(mi, properties["radiance"])
+            self.radiance = base.colour(mi, properties["radiance"])
             self.by_normals = properties.get("by_normals", False)
             self.m_flags = mi.EmitterFlags.Surface | mi.EmitterFlags.SpatiallyVarying
             self.triangles: Any = None
@@ -64,7 +64,7 @@ def register(mi: Any) -> None:
             normal = n
             if mesh.has_vertex_normals():
                 normal = dr.normalize(self.mixed(mesh.vertex_normal, corners, weights, active))
-            wide = parameters.is_wide(mi)
+            wide = base.is_wide(mi)
             si = dr.zeros(mi.SurfaceInteraction3f) if wide else mi.SurfaceInteraction3f()
             si.p, si.n, si.prim_index = p, n, index
             si.shape = mi.ShapePtr(mesh) if wide else mesh

@@ -10,7 +10,7 @@ one is selected.  Everything else here is Mitsuba's.
 
 from typing import Any
 
-from comparisons.mitsuba.plugins import parameters
+from comparisons.mitsuba.plugins import base
 from comparisons.mitsuba.plugins.base import base_class
 
 
@@ -18,8 +18,8 @@ def register(mi: Any) -> None:
     """Define the materials for the current variant, and register them."""
     import drjit as dr
 
-    def share(value: Any) -> parameters.Parameter:
-        found = parameters.number(mi, value)
+    def share(value: Any) -> base.Parameter:
+        found = base.number(mi, value)
         return lambda si, active: dr.clip(found(si, active), 0.0, 1.0)
 
     def one_of(context: Any, component: int) -> Any:

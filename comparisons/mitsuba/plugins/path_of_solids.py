@@ -13,7 +13,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from comparisons.mitsuba.plugins.plain_scene import PlainScene
+from comparisons.mitsuba.plugins.base import PlainScene
 from comparisons.mitsuba.plugins.whitted import clearance, leave
 
 _MOST_RAYS = 1 << 20

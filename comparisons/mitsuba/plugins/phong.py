@@ -8,7 +8,7 @@ alone, also through materials that contain this one.
 import math
 from typing import Any
 
-from comparisons.mitsuba.plugins import parameters
+from comparisons.mitsuba.plugins import base
 from comparisons.mitsuba.plugins.base import base_class
 
 AMBIENT = 0x80000000
@@ -34,7 +34,7 @@ def register(mi: Any) -> None:
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
-            self.colours = {n: parameters.colour(mi, properties[n]) for n in _COLOURS}
+            self.colours = {n: base.colour(mi, properties[n]) for n in _COLOURS}
             self.exponent = float(properties.get("exponent", 32.0))
             self.half_vector = bool(properties.get("half_vector", False))
             # The smooth part is one component, sampled from two lobes.

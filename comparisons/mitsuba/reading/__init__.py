@@ -6,25 +6,81 @@ without a function, is a `SceneError` with file, line, column and plugin: nothin
 silently.  Shapes get Mitsuba's texture coordinates (`textures` says why).
 
 To read another plugin: a function in the file of its kind, a line in that file's `_READERS`, and a
-row in `tests/comparisons/mitsuba/test_reading_plugins.py`.
-"""
+row in `tests/comparisons/mitsuba/test_reading_plugins.py`."""
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from comparisons.mitsuba.reading.context import Reading
 from comparisons.mitsuba.reading.integrators import read_integrator
 from comparisons.mitsuba.reading.lights import belongs_to_shape, read_light
-from comparisons.mitsuba.reading.missing import leave_out_missing
-from comparisons.mitsuba.reading.node import Node
-from comparisons.mitsuba.reading.parse import Parsed, parse_dict, parse_file
+from comparisons.mitsuba.reading.node import MissingError, Node, Reading
+from comparisons.mitsuba.reading.parse import Parsed, module, parse_dict, parse_file
 from comparisons.mitsuba.reading.sensors import read_sensor
 from comparisons.mitsuba.reading.shapes import read_shape
 from reference_rt.sampling import AnySampler, Grid, Sobol
 from reference_rt.scene.model import SceneModel
-from reference_rt.util.errors import SceneWarning
+from reference_rt.util.errors import SceneError, SceneWarning
+
+# ---- what our scenes lack ------------------------------------------------------------------------
+# It is left out in Mitsuba's own description of the scene, so that both renderers get the same one.
+
+
+S = TypeVar("S")
+
+REPLACED = {
+    "BSDF": "diffuse",
+    "Integrator": "path",
+    "Sampler": "independent",
+    "ReconstructionFilter": "box",
+    "Film": "hdrfilm",
+}
+"""Kinds of elements that a scene needs, and the plugins that take the place of others, with their
+default parameters.  Elements of other kinds are left out."""
+
+
+def leave_out_missing(parsed: Parsed, read: Callable[[], S]) -> tuple[S, list[str]]:
+    """Change `parsed` until `read` finds nothing that our scenes lack: the scene, and what was left
+    out, a line each.  Raises the error of what can neither be left out nor replaced, such as a
+    camera."""
+    said: list[str] = []
+    while True:
+        try:
+            return read(), said
+        except MissingError as error:
+            what = error.message.partition("; expected")[0].removesuffix(" here, or unknown")
+            text = f"{what}, and {_leave_out(parsed.state, error)} on both sides"
+            said.append(str(SceneError(text, file=error.file, line=error.line)))
+
+
+def _leave_out(state: Any, error: MissingError) -> str:
+    """Change the element or the parameter of an error; what was done, in words."""
+    props, kind = state.nodes[error.index].props, state.nodes[error.index].type.name
+    if error.key:
+        del props[error.key]
+        return "left out"
+    if kind == "Sensor" or props.plugin_name() == REPLACED.get(kind):
+        raise error
+    if kind in REPLACED:
+        new = module().Properties(REPLACED[kind])
+        new.set_id(props.id())
+        if kind == "Film":
+            for key in ("width", "height"):
+                if key in props:
+                    new[key] = props[key]
+        state.nodes[error.index].props = new
+        return f"replaced by '{REPLACED[kind]}'"
+    for node in state.nodes:
+        for key in list(node.props.keys()):
+            value = node.props[key]
+            if type(value).__name__ == "ResolvedReference" and value.index() == error.index:
+                del node.props[key]
+    return "left out"
+
+
+# ---- whole scenes --------------------------------------------------------------------------------
+
 
 M = TypeVar("M", bound=SceneModel)
 
@@ -117,5 +173,3 @@ _WITHOUT_LINES = "]"
 """In place of a scene's text: it is no YAML, so that errors found later name no line of it."""
 
 _KINDS = ("Sensor", "Shape", "Emitter", "Integrator", "Medium", "Volume", "PhaseFunction")
-
-__all__ = ["read_dict", "read_file", "read_supported"]

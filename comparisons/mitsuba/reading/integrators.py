@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from comparisons.mitsuba.reading.context import Reading
-from comparisons.mitsuba.reading.node import Node
+from comparisons.mitsuba.reading.node import Node, Reading
 from reference_rt.integrators import AnyIntegrator, Direct, Path, RayCast, Whitted
 from reference_rt.lights import Ambient
 from reference_rt.materials import Mask, ThinDielectric

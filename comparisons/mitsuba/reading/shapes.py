@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.mitsuba.reading.context import Reading
 from comparisons.mitsuba.reading.lights import emission
 from comparisons.mitsuba.reading.materials import material_name
 from comparisons.mitsuba.reading.meshes import Surface, finished, mesh, placed
-from comparisons.mitsuba.reading.node import Node
-from comparisons.mitsuba.reading.written import as_transform
+from comparisons.mitsuba.reading.node import Node, Reading
+from comparisons.mitsuba.reading.parse import as_transform
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.transform import Affine, is_similarity
 from reference_rt.materials import Emissive

@@ -18,12 +18,14 @@ from comparisons.geometry.frame import Frame
 from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.counterpart import Counterpart, InstancedGroup
 from comparisons.mitsuba.csg import Operand, SolidCounterpart
+from comparisons.mitsuba.hits import MitsubaShape, Plugin
 from comparisons.mitsuba.lit_scene import LitScene
 from comparisons.mitsuba.scene import light_id, shape_id
-from comparisons.mitsuba.stand_ins import MitsubaShape, Plugin
-from comparisons.mitsuba.translate.cameras import translate_camera
-from comparisons.mitsuba.translate.errors import UntranslatableError
-from comparisons.mitsuba.translate.film import translate_film, translate_sampler
+from comparisons.mitsuba.translate.cameras import (
+    translate_camera,
+    translate_film,
+    translate_sampler,
+)
 from comparisons.mitsuba.translate.integrators import (
     BLACK,
     counts_lights_often,
@@ -32,16 +34,16 @@ from comparisons.mitsuba.translate.integrators import (
     translate_integrator,
 )
 from comparisons.mitsuba.translate.lights import never_samples, translate_light
-from comparisons.mitsuba.translate.moved import frame_of, moved
-from comparisons.mitsuba.translate.shapes import Site, translate_shape
-from comparisons.mitsuba.translate.shapes.meshes import MOST_INSTANCES
-from comparisons.mitsuba.translate.textures import TranslationContext
-from comparisons.mitsuba.translate.wrappers import (
+from comparisons.mitsuba.translate.materials import (
     coloured_parts_of,
     is_oriented,
     is_textured,
     parts_of,
 )
+from comparisons.mitsuba.translate.moved import frame_of, moved
+from comparisons.mitsuba.translate.shapes import Site, translate_shape
+from comparisons.mitsuba.translate.shapes.meshes import MOST_INSTANCES
+from comparisons.mitsuba.translate.textures import TranslationContext, UntranslatableError
 from reference_rt.rendering.scene import Scene
 
 # Without this Embree drops rays that hit a shared edge (Mitsuba issue 1149).

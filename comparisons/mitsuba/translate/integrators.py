@@ -3,7 +3,7 @@
 from functools import singledispatch
 from typing import Any
 
-from comparisons.mitsuba.translate.errors import UntranslatableError
+from comparisons.mitsuba.translate.textures import UntranslatableError
 from reference_rt.integrators import Direct, Path, RayCast, Whitted
 from reference_rt.lights import Constant, Directional, EnvironmentMap, Point, Projector, Spot
 from reference_rt.materials import Emissive, Mask, ThinDielectric

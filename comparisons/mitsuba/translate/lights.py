@@ -8,8 +8,12 @@ import numpy as np
 
 from comparisons.geometry.flatten import Copy, Leaf, Member
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.translate.errors import UntranslatableError
-from comparisons.mitsuba.translate.textures import TranslationContext, projected, rgb
+from comparisons.mitsuba.translate.textures import (
+    TranslationContext,
+    UntranslatableError,
+    projected,
+    rgb,
+)
 from reference_rt.core.transform import is_similarity
 from reference_rt.integrators import Direct
 from reference_rt.lights import (

@@ -1,12 +1,34 @@
-"""Materials that are not made of others -> Mitsuba's BSDFs."""
+"""Materials -> Mitsuba's BSDFs, and the BSDF and emitter of a shape."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from functools import singledispatch
 from typing import Any
 
 import reference_rt as rt
 from comparisons.mitsuba.plugins.exact_coat import COLOURS, SUBSTITUTE, accepted
-from comparisons.mitsuba.translate.errors import UntranslatableError
-from comparisons.mitsuba.translate.textures import TranslationContext, colour, number, rgb
+from comparisons.mitsuba.translate.textures import (
+    TranslationContext,
+    UntranslatableError,
+    colour,
+    depends_on_uv,
+    number,
+    rgb,
+    translate_texture,
+)
+from reference_rt.materials import (
+    Blend,
+    Bump,
+    Diffuse,
+    Emissive,
+    Mask,
+    Material,
+    NormalMap,
+    TwoSided,
+    Wrapper,
+)
+from reference_rt.textures import Bitmap, VertexColours, texture_names
+from reference_rt.textures.texture import UvMap
 
 
 @singledispatch
@@ -180,3 +202,147 @@ def _(material: rt.Phong, context: TranslationContext) -> dict[str, Any]:
         "exponent": material.exponent,
         "half_vector": material.half_vector,
     }
+
+
+# ---- materials made of others --------------------------------------------------------------------
+
+
+def _named(name: str, context: TranslationContext) -> dict[str, Any]:
+    return translate_material(context.materials[name], context)
+
+
+@translate_material.register
+def _(material: Emissive, context: TranslationContext) -> dict[str, Any]:
+    """Only the BSDF: the emission is the shape's emitter, see `parts_of`."""
+    if material.base is None:
+        return {"type": "diffuse", "reflectance": rgb((0.0, 0.0, 0.0))}
+    return _named(material.base, context)
+
+
+@translate_material.register
+def _(material: Mask, context: TranslationContext) -> dict[str, Any]:
+    base = _named(material.base, context)
+    name = "mask" if context.native else "mixture_mask"
+    return {"type": name, "opacity": number(material.opacity, context), "base": base}
+
+
+@translate_material.register
+def _(material: Blend, context: TranslationContext) -> dict[str, Any]:
+    first, second = _named(material.first, context), _named(material.second, context)
+    weight = number(material.weight, context)
+    if has_delta(material, context) and not context.native:
+        return {"type": "mixture_blend", "weight": weight, "first": first, "second": second}
+    return {"type": "blendbsdf", "weight": weight, "0_first": first, "1_second": second}
+
+
+def has_delta(material: Material, context: TranslationContext) -> bool:
+    """Whether a material has a delta lobe: perfect reflection, refraction or transparency."""
+    if isinstance(material, Mask):
+        return True
+    if isinstance(material, Wrapper):
+        return any(has_delta(base, context) for base in _bases(material, context))
+    return material.delta
+
+
+def _bases(material: Wrapper, context: TranslationContext) -> list[Material]:
+    names = (getattr(material, field) for field in material.bases)
+    return [context.materials[name] for name in names if name is not None]
+
+
+@translate_material.register
+def _(material: TwoSided, context: TranslationContext) -> dict[str, Any]:
+    front = _named(material.base, context)
+    if material.back is None:
+        return {"type": "twosided", "0_front": front}
+    back = _named(material.back, context)
+    if has_delta(material, context) and not context.native:
+        return {"type": "mixture_sides", "front": front, "back": back}
+    return {"type": "twosided", "0_front": front, "1_back": back}
+
+
+def _tilt(material: Bump | NormalMap) -> dict[str, Any]:
+    """The options that both have; Mitsuba's are on by default."""
+    return {
+        "flip_invalid_normals": material.flip_invalid_normals,
+        "use_shadowing_function": material.use_shadowing_function,
+    }
+
+
+@translate_material.register
+def _(material: Bump, context: TranslationContext) -> dict[str, Any]:
+    base = _named(material.base, context)
+    texture = context.textures[material.height]
+    if not isinstance(texture, Bitmap) or texture.filter != "bilinear":
+        return base  # no slopes
+    if context.native:
+        height = number(material.height, context)
+        own = {"type": "bumpmap", "scale": material.scale, "height": height, "bsdf": base}
+        return {**own, **_tilt(material)}
+    upright = texture.model_copy(update={"uv": UvMap()})
+    names = ("u_u", "u_v", "u_1", "v_u", "v_v", "v_1")
+    return {
+        "type": "exact_bump",
+        "scale": material.scale,
+        "height": translate_texture(upright, material.height, context, True),
+        "base": base,
+        **dict(zip(names, texture.uv.coefficients().tolist(), strict=True)),
+        **_tilt(material),
+    }
+
+
+@translate_material.register
+def _(material: NormalMap, context: TranslationContext) -> dict[str, Any]:
+    base = _named(material.base, context)
+    texture = context.textures[material.normals]
+    if not isinstance(texture, Bitmap):
+        raise UntranslatableError("NormalMap of a texture that is no image", "material")
+    normals = colour(material.normals, context)
+    return {"type": "normalmap", "normalmap": normals, "bsdf": base, **_tilt(material)}
+
+
+def parts_of(name: str | None, context: TranslationContext) -> dict[str, Any]:
+    """The parts of a shape with material `name`: "bsdf" and, if it is emissive, "emitter".
+
+    Raises as `translate_material` does.
+    """
+    material: Material = Diffuse() if name is None else context.materials[name]
+    parts = {"bsdf": translate_material(material, context)}
+    if isinstance(material, Emissive):
+        radiance = colour(material.radiance, context)
+        parts["emitter"] = {"type": "area", "radiance": radiance}
+    return parts
+
+
+def coloured_parts_of(name: str | None, context: TranslationContext) -> dict[str, Any] | None:
+    """The same for a mesh with vertex colours; None if no texture uses them."""
+    if not any(isinstance(texture, VertexColours) for texture in context.textures.values()):
+        return None
+    return parts_of(name, replace(context, has_colours=True))
+
+
+def is_textured(name: str | None, context: TranslationContext) -> bool:
+    """Whether material `name` depends on a surface's uv or tangents."""
+
+    def has_uv(material: Material) -> bool:
+        names = texture_names(material).values()
+        return any(depends_on_uv(context.textures[t]) for t in names)
+
+    return is_oriented(name, context) or _any_part(name, context, has_uv)
+
+
+def is_oriented(name: str | None, context: TranslationContext) -> bool:
+    """Whether material `name` depends on a surface's tangents."""
+    return _any_part(name, context, lambda material: material.oriented)
+
+
+def _any_part(
+    name: str | None, context: TranslationContext, test: Callable[[Material], bool]
+) -> bool:
+    """Whether a material, or one that is nested in it, passes a test."""
+    if name is None:
+        return False
+    material = context.materials[name]
+    inner = [getattr(material, field) for field in getattr(material, "bases", ())]
+    if isinstance(material, Emissive):
+        inner = [material.base]
+    return test(material) or any(_any_part(base, context, test) for base in inner)

@@ -1,4 +1,5 @@
-"""Textures -> Mitsuba, parameters that may be textures, and the `TranslationContext`."""
+"""Textures -> Mitsuba, parameters that may be textures, the `TranslationContext`, and the error for
+parts of a scene that have no counterpart."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -9,13 +10,34 @@ from typing import Any, Self
 import numpy as np
 
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.translate.errors import UntranslatableError
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.materials.material import Material
 from reference_rt.rendering.scene import Scene
 from reference_rt.textures import Bitmap, Checker, Texture, VertexColours
 from reference_rt.textures.texture import UvMap
+from reference_rt.util.errors import ReferenceRtError
+
+
+class UntranslatableError(ReferenceRtError):
+    """A part of a scene has no counterpart in Mitsuba: the scene is `not-comparable`.
+
+    The exit code is the same as if the reference could not run.
+    """
+
+    exit_code = 4
+
+    def __init__(self, part: Any, kind: str) -> None:
+        name = part if isinstance(part, str) else type(part).__name__
+        self.part, self.kind = name, kind
+        super().__init__(
+            f"the {kind} {name} cannot be compared: comparisons.mitsuba.translate has no "
+            "translation for it"
+        )
+
+
+# ----  --------------------------------------------------------------------------------------------
+
 
 FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
 """The map of (u, v) to (u, 1 - v): v = 0 is the top row of Mitsuba's images, the bottom of ours."""

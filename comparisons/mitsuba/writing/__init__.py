@@ -12,7 +12,7 @@ materials are those of `comparisons.mitsuba.translate`.
 from pathlib import Path
 
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.translate.errors import UntranslatableError
+from comparisons.mitsuba.translate.textures import UntranslatableError
 from comparisons.mitsuba.writing import views
 from comparisons.mitsuba.writing.files import Files, check_name, write_files
 from comparisons.mitsuba.writing.shapes import Shapes
@@ -70,6 +70,3 @@ def _comments(scene: Scene, notes: list[str]) -> list[str]:
 def _plain(text: str) -> str:
     """Text that a comment may hold."""
     return text.replace("--", "- -")
-
-
-__all__ = ["write_xml"]

@@ -1,21 +1,135 @@
-"""The files of a scene that is written: a scene file, and beside it a folder of meshes and images,
-whole or not at all."""
+"""The files of a scene that is written: a scene file, of ours or Mitsuba's, and beside it a folder
+of meshes and images, whole or not at all."""
 
 import secrets
 import shutil
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from comparisons.mitsuba.reading.parse import LookAt, Step
 from reference_rt.core.arrays import FloatArray
+from reference_rt.core.transform import Affine
 from reference_rt.scene.model import SceneModel
-from reference_rt.shapes import Mesh
+from reference_rt.shapes import Mesh, Shape
+from reference_rt.shapes.csg import Solid
 from reference_rt.shapes.meshes.files.data import MeshData
 from reference_rt.util.errors import ImageError, SceneError, UsageError
 from reference_rt.util.files import check_writable, replacing
+
+# ---- elements of a Mitsuba scene file, and their XML with every bit of their numbers -------------
+
+
+class Rgb(NamedTuple):
+    """A colour, linear sRGB."""
+
+    r: float
+    g: float
+    b: float
+
+
+class Vector(NamedTuple):
+    """A point or a direction."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Reference(NamedTuple):
+    """Another element, by its id."""
+
+    id: str
+
+
+@dataclass
+class Element:
+    """An element: its tag, such as "bsdf", its plugin, its parameters, its nested elements that
+    have no name, and its id."""
+
+    tag: str
+    plugin: str
+    values: dict[str, Any] = field(default_factory=dict)
+    children: list["Element | Reference"] = field(default_factory=list)
+    id: str = ""
+
+    def lines(self, name: str = "", indent: str = "    ") -> list[str]:
+        """The element as XML;  name: of the parameter that it is."""
+        attributes = {"type": self.plugin, "id": self.id, "name": name}
+        start = self.tag + _attributes({k: v for k, v in attributes.items() if v})
+        inside = [line for key, value in self.values.items() for line in _lines(key, value)]
+        for child in self.children:
+            inside += [_reference(child, "")] if isinstance(child, Reference) else child.lines()
+        if not inside:
+            return [f"<{start}/>"]
+        return [f"<{start}>", *(indent + line for line in inside), f"</{self.tag}>"]
+
+
+def _lines(name: str, value: Any) -> list[str]:
+    """A parameter as XML."""
+    match value:
+        case bool():
+            return [_simple("boolean", name, str(value).lower())]
+        case int():
+            return [_simple("integer", name, str(value))]
+        case float():
+            return [_simple("float", name, repr(value))]
+        case str():
+            return [_simple("string", name, value)]
+        case Rgb():
+            return [_simple("rgb", name, _numbers(value))]
+        case Vector():
+            return [_simple("vector", name, _numbers(value))]
+        case Reference():
+            return [_reference(value, name)]
+        case Element():
+            return value.lines(name)
+        case tuple():
+            steps = ("    " + _step(step) for step in value)
+            return [f"<transform{_attributes({'name': name})}>", *steps, "</transform>"]
+    raise TypeError(f"no XML for {type(value).__name__}")
+
+
+def _simple(tag: str, name: str, value: str) -> str:
+    return f"<{tag}{_attributes({'name': name, 'value': value})}/>"
+
+
+def _reference(value: Reference, name: str) -> str:
+    return f"<ref{_attributes({'id': value.id, **({'name': name} if name else {})})}/>"
+
+
+def _step(step: Step | LookAt) -> str:
+    if isinstance(step, LookAt):
+        vectors = {"origin": step.origin, "target": step.target, "up": step.up}
+        return f"<lookat{_attributes({key: _numbers(v) for key, v in vectors.items()})}/>"
+    if step.kind == "matrix":
+        return f"<matrix{_attributes({'value': _numbers((*step.numbers, 0.0, 0.0, 0.0, 1.0))})}/>"
+    named = zip("xyz", step.numbers, strict=False)
+    values = {key: repr(float(value)) for key, value in named}
+    if step.kind == "rotate":
+        values["angle"] = repr(float(step.numbers[3]))
+    return f"<{step.kind}{_attributes(values)}/>"
+
+
+def _numbers(values: Any) -> str:
+    return " ".join(repr(float(x)) for x in values)
+
+
+def _attributes(values: dict[str, str]) -> str:
+    return "".join(f" {key}={quoteattr(value)}" for key, value in values.items())
+
+
+def matrix_step(m: Affine) -> Step:
+    """A map (3, 4) as a step."""
+    return Step("matrix", tuple(float(x) for x in m.ravel()))
+
+
+# ---- files ---------------------------------------------------------------------------------------
 
 
 def folder_of(path: Path) -> Path:
@@ -157,4 +271,55 @@ def ply(mesh: MeshData | Mesh, of_colours: tuple[str, str, str] = COLOURS) -> by
     return "\n".join(lines).encode() + b"\n" + table.tobytes() + faces.tobytes()
 
 
-__all__ = ["Files", "check_name", "folder_of", "ply", "write_files"]
+# ---- scenes in our own format --------------------------------------------------------------------
+
+
+SUFFIXES = (".yaml", ".yml", ".json")
+
+
+def write_scene(scene: SceneModel, path: Path) -> int:
+    """Write the scene, and return how many files of its own it has.
+
+    The folder of the scene that it replaces is replaced, too.  Raises ImageError, also if the
+    folder holds anything else; UsageError; SceneError for a file of the scene that cannot be read.
+    """
+    check_name(path, SUFFIXES)
+
+    def text(found: Files) -> str:
+        changed = _with_files(scene, found)
+        return changed.to_json() if path.suffix.lower() == ".json" else changed.to_yaml()
+
+    return write_files(scene, path, text)
+
+
+def _with_files(scene: SceneModel, found: Files) -> SceneModel:
+    """The scene that names the written files."""
+    return scene.changed(
+        textures={k: _with_image(t, found, "textures", k) for k, t in scene.textures.items()},
+        lights=tuple(_with_image(x, found, "lights", k) for k, x in enumerate(scene.lights)),
+        shapes=tuple(_shape(s, found, "shapes", k) for k, s in enumerate(scene.shapes)),
+        groups={
+            name: tuple(_shape(s, found, "groups", name, k) for k, s in enumerate(members))
+            for name, members in scene.groups.items()
+        },
+    )
+
+
+def _with_image(part: Any, found: Files, *path: str | int) -> Any:
+    """A texture or a light with a copy of its image."""
+    if getattr(part, "file", None) is None:
+        return part
+    return part.model_copy(update={"file": found.copy(part.file, *path, "file")})
+
+
+def _shape(shape: Shape, found: Files, *path: str | int) -> Shape:
+    if isinstance(shape, Solid):
+        parts = tuple(_shape(s, found, *path, "of", k) for k, s in enumerate(shape.of))
+        return shape.model_copy(update={"of": parts})
+    if not isinstance(shape, Mesh):
+        return shape
+    if shape.file is not None:
+        return shape.model_copy(update={"file": found.copy(shape.file, *path, "file")})
+    name = found.write("mesh.ply", lambda file: file.write_bytes(ply(shape)))
+    arrays = dict.fromkeys(Mesh.array_fields)
+    return shape.model_copy(update={**arrays, "file": name})

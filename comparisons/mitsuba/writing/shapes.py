@@ -9,13 +9,20 @@ from typing import Any
 import numpy as np
 
 from comparisons.geometry.flatten import Copy, copies_of, place_of
-from comparisons.mitsuba.stand_ins import Plugin
-from comparisons.mitsuba.translate.errors import UntranslatableError
+from comparisons.mitsuba.hits import Plugin
+from comparisons.mitsuba.translate.materials import is_textured
 from comparisons.mitsuba.translate.shapes import Site, translate_shape
-from comparisons.mitsuba.translate.shapes.plugins import is_round
-from comparisons.mitsuba.translate.wrappers import is_textured
-from comparisons.mitsuba.writing.element import Element, Reference, Rgb, Vector, matrix_step
-from comparisons.mitsuba.writing.files import ATTRIBUTE, ply
+from comparisons.mitsuba.translate.shapes.site import is_round
+from comparisons.mitsuba.translate.textures import UntranslatableError
+from comparisons.mitsuba.writing.files import (
+    ATTRIBUTE,
+    Element,
+    Reference,
+    Rgb,
+    Vector,
+    matrix_step,
+    ply,
+)
 from comparisons.mitsuba.writing.surfaces import OURS, Surfaces
 from comparisons.mitsuba.writing.views import transform_steps
 from reference_rt.core import transform
@@ -251,6 +258,3 @@ def _of_dict(value: dict[str, Any]) -> Element:
 
 def _stem(file: str) -> str:
     return file.replace("\\", "/").rpartition("/")[2].rpartition(".")[0] or "mesh"
-
-
-__all__ = ["Shapes"]

@@ -9,12 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.mitsuba.reading.written import FLIP, Step
-from comparisons.mitsuba.translate.errors import UntranslatableError
+from comparisons.mitsuba.reading.parse import FLIP, Step
 from comparisons.mitsuba.translate.materials import translate_material
-from comparisons.mitsuba.translate.textures import VERTEX_COLOUR, TranslationContext, rgb
-from comparisons.mitsuba.writing.element import Element, Reference, Rgb, matrix_step
-from comparisons.mitsuba.writing.files import Files
+from comparisons.mitsuba.translate.textures import (
+    VERTEX_COLOUR,
+    TranslationContext,
+    UntranslatableError,
+    rgb,
+)
+from comparisons.mitsuba.writing.files import Element, Files, Reference, Rgb, matrix_step
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.exr import write_exr
 from reference_rt.core.image_files import open_image
@@ -204,6 +207,3 @@ def steps_of(uv: UvMap) -> tuple[Step, ...]:
     if uv.offset != (0.0, 0.0):
         found.append(Step("translate", (*uv.offset, 0.0)))
     return tuple(found)
-
-
-__all__ = ["Surfaces", "steps_of"]

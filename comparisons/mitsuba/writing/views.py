@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 
 from comparisons.mitsuba.plugins.whitted import MOST_COMPONENTS
-from comparisons.mitsuba.reading.written import LookAt, Step
-from comparisons.mitsuba.translate.cameras import clipping, translate_camera
-from comparisons.mitsuba.translate.errors import UntranslatableError
-from comparisons.mitsuba.translate.film import translate_film
+from comparisons.mitsuba.reading.parse import LookAt, Step
+from comparisons.mitsuba.translate.cameras import clipping, translate_camera, translate_film
 from comparisons.mitsuba.translate.integrators import translate_integrator
 from comparisons.mitsuba.translate.lights import ambient_of
-from comparisons.mitsuba.writing.element import Element, Rgb, Vector, matrix_step
+from comparisons.mitsuba.translate.textures import UntranslatableError
+from comparisons.mitsuba.writing.files import Element, Rgb, Vector, matrix_step
 from comparisons.mitsuba.writing.surfaces import OURS, Surfaces
 from reference_rt.cameras import Orthographic, Perspective, ThinLens
 from reference_rt.cameras.film import Film
@@ -222,6 +221,3 @@ def transform_steps(steps: Any) -> tuple[Step, ...]:
             case _:
                 found.append(matrix_step(step.matrix_of()))
     return tuple(found)
-
-
-__all__ = ["integrator", "lights", "sensor", "transform_steps"]

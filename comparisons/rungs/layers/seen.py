@@ -9,7 +9,7 @@ from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.hits import MitsubaHits
 from comparisons.mitsuba.scene import for_rays
-from comparisons.mitsuba.translate.film import translate_filter
+from comparisons.mitsuba.translate.cameras import translate_filter
 from comparisons.mitsuba.translate.textures import TranslationContext, translate_texture
 from reference_rt.cameras.filters import Filter
 from reference_rt.core.arrays import FloatArray, IdArray, IntArray

@@ -14,7 +14,7 @@ from comparisons.mitsuba.backend import backend, mitsuba
 from comparisons.mitsuba.reading import read_file
 from comparisons.mitsuba.reading.reference import file_of, own_scene
 from comparisons.mitsuba.scene import for_rays, picture
-from comparisons.mitsuba.translate.errors import UntranslatableError
+from comparisons.mitsuba.translate.textures import UntranslatableError
 from comparisons.results.case import Case
 from comparisons.rungs.rays.camera import camera_rays
 from comparisons.suites.keys import case_key

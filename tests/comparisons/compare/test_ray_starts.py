@@ -11,7 +11,7 @@ from comparisons.compare import compare, ray_starts
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, compare_scene
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.plugins.parameters import is_wide
+from comparisons.mitsuba.plugins.base import is_wide
 from comparisons.mitsuba.scene import picture
 from comparisons.mitsuba.translate import load
 from comparisons.results.case import RungResult

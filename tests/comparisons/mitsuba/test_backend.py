@@ -10,6 +10,7 @@ from types import ModuleType
 import pytest
 
 from comparisons.mitsuba import backend
+from comparisons.mitsuba.llvm_libraries import LIBRARY
 from reference_rt.util.errors import ReferenceUnavailableError
 
 
@@ -17,7 +18,7 @@ from reference_rt.util.errors import ReferenceUnavailableError
 def _own_memory(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("REFERENCE_RT_CACHE", str(tmp_path / "cache"))
     monkeypatch.delenv(backend.FORCE, raising=False)
-    monkeypatch.delenv(backend.LIBRARY, raising=False)
+    monkeypatch.delenv(LIBRARY, raising=False)
     # As in a new process: other tests of this one have loaded an LLVM.
     monkeypatch.delitem(sys.modules, "drjit", raising=False)
 
@@ -27,7 +28,7 @@ def bogus(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> str:
     """A library that is none."""
     path = tmp_path / "libLLVM.so.99.1"
     path.write_text("not a library")
-    monkeypatch.setenv(backend.LIBRARY, str(path))
+    monkeypatch.setenv(LIBRARY, str(path))
     return str(path)
 
 
@@ -149,6 +150,7 @@ from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 from comparisons.mitsuba import backend
+from comparisons.mitsuba.llvm_libraries import LIBRARY
 from comparisons.mitsuba.writing import write_xml
 from reference_rt import Scene
 from reference_rt.util.errors import SceneError
@@ -213,8 +215,8 @@ def test_an_llvm_that_is_loaded_already_is_the_one_that_is_proven(
     chosen = backend.choose()
     assert (chosen.variant, chosen.llvm_path, tried) == (backend.LLVM, None, [None])
     assert "Dr.Jit had loaded" in chosen.reason
-    monkeypatch.setenv(backend.LIBRARY, "libLLVM.so.98.1")
+    monkeypatch.setenv(LIBRARY, "libLLVM.so.98.1")
     assert backend.choose().llvm_path == "libLLVM.so.98.1"
     monkeypatch.delitem(sys.modules, "drjit")
-    monkeypatch.delenv(backend.LIBRARY)
+    monkeypatch.delenv(LIBRARY)
     assert backend.choose().llvm_path == "libLLVM.so.99.1"

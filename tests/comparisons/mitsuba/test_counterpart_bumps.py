@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from comparisons.mitsuba.backend import scalar
-from comparisons.mitsuba.coordinates import (
+from comparisons.mitsuba.plugins.exact_coordinates import (
     NUMPY,
     Coordinates,
     Round,

@@ -11,7 +11,7 @@ from comparisons.compare.compare import Subject, compare_scene
 from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.notes import notes_of
-from comparisons.mitsuba.plugins.parameters import is_wide
+from comparisons.mitsuba.plugins.base import is_wide
 from comparisons.mitsuba.reading.reference import changes_to, own_scene
 from comparisons.mitsuba.scene import picture
 from comparisons.mitsuba.translate import UntranslatableError, load, to_mitsuba

@@ -7,7 +7,7 @@ import pytest
 
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.notes import notes_of
-from comparisons.mitsuba.plugins.parameters import is_wide
+from comparisons.mitsuba.plugins.base import is_wide
 from comparisons.mitsuba.reading.reference import changes_to, own_scene
 from comparisons.mitsuba.scene import picture
 from comparisons.mitsuba.translate import load, to_mitsuba

@@ -10,9 +10,12 @@ import pytest
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from comparisons.mitsuba.translate import load
-from comparisons.mitsuba.translate.errors import UntranslatableError
 from comparisons.mitsuba.translate.lights import translate_light
-from comparisons.mitsuba.translate.textures import TranslationContext, translate_texture
+from comparisons.mitsuba.translate.textures import (
+    TranslationContext,
+    UntranslatableError,
+    translate_texture,
+)
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.lights import EnvironmentMap
 from reference_rt.lights.emitters import environment_map

@@ -11,8 +11,7 @@ import pytest
 
 from comparisons.mitsuba import translate
 from comparisons.mitsuba.backend import mitsuba, scalar
-from comparisons.mitsuba.notes import notes_of
-from comparisons.mitsuba.plastic_error import COSINES, base_error
+from comparisons.mitsuba.notes import COSINES, base_error, notes_of
 from comparisons.mitsuba.plugins.exact_beckmann import approximate_g1, exact_g1
 from comparisons.mitsuba.scene import for_rays, picture
 from comparisons.mitsuba.translate import load
@@ -109,7 +108,7 @@ QUICK = {(1.5, 0.01), (1.9, 0.1), (1.3, 0.5)}
     ],
 )
 def test_documented_coats(index, alpha, ggx, beckmann, monkeypatch):
-    monkeypatch.setattr("comparisons.mitsuba.plastic_error.COSINES", (1.0,))
+    monkeypatch.setattr("comparisons.mitsuba.notes.COSINES", (1.0,))
     for distribution, told in (("ggx", ggx), ("beckmann", beckmann)):
         low, high = base_error(index, distribution, alpha)
         assert low == high

@@ -5,7 +5,7 @@ import pytest
 
 import reference_rt as rt
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.translate.film import translate_filter
+from comparisons.mitsuba.translate.cameras import translate_filter
 from comparisons.rungs import film
 from reference_rt.cameras.film import AnyFilter
 

@@ -15,8 +15,8 @@ from typer.testing import CliRunner, Result
 
 from comparisons.commands.convert import convert
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.reading import read_file, serialized
-from comparisons.mitsuba.reading.write import write_scene
+from comparisons.mitsuba.reading import meshes, read_file
+from comparisons.mitsuba.writing.files import write_scene
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ImageError, SceneError, UsageError
@@ -248,19 +248,19 @@ def test_serialized_meshes_are_those_of_mitsuba(tmp_path, version, index, flat):
 
 def test_damaged_serialized_meshes_are_refused():
     whole = packed(4, (CORNERS, TRIANGLES, None, False), (CORNERS, TRIANGLES, UPWARDS, True))
-    serialized.read(whole, 1)
+    meshes.read(whole, 1)
     for cut in range(0, len(whole) - 1, 7):
         with pytest.raises(ValueError, match=r"."):
-            serialized.read(whole[:cut], 1)
+            meshes.read(whole[:cut], 1)
     for index in (-1, 2, 10**9):
         with pytest.raises(ValueError, match="has 2 meshes"):
-            serialized.read(whole, index)
+            meshes.read(whole, index)
     rng = np.random.default_rng(0)
     for _ in range(300):
         damaged = bytearray(whole)
         damaged[rng.integers(len(whole))] = rng.integers(256)
         with suppress(ValueError):  # and nothing else
-            serialized.read(bytes(damaged), 1)
+            meshes.read(bytes(damaged), 1)
 
 
 def test_a_scene_of_mitsuba_loads_by_its_suffix(folder):

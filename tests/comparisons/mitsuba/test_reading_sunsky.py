@@ -9,7 +9,7 @@ import pytest
 from comparisons.commands.convert import convert
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.reading import read_file
-from comparisons.mitsuba.reading.sunsky import HEIGHT, WIDTH
+from comparisons.mitsuba.reading.lights import HEIGHT, WIDTH
 from comparisons.mitsuba.scene import for_rays
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.integrators import Whitted

@@ -13,8 +13,7 @@ from typer.testing import CliRunner
 
 import reference_rt as rt
 from comparisons.commands.convert import convert
-from comparisons.mitsuba.writing.resolved import FORMAT, write_resolved
-from comparisons.mitsuba.writing.tessellated import is_closed, tessellated
+from comparisons.mitsuba.writing.resolved import FORMAT, is_closed, tessellated, write_resolved
 from comparisons.rungs.rays.camera import camera_rays
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene

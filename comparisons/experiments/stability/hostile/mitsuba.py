@@ -34,7 +34,7 @@ def judged(scenes: Sequence[Path]) -> Outcome:
 def _outcome(path: Path, _: str | None, clock: Any) -> dict[str, Any]:
     from comparisons.mitsuba import translate
     from comparisons.mitsuba.scene import picture
-    from comparisons.mitsuba.translate.errors import UntranslatableError
+    from comparisons.mitsuba.translate.textures import UntranslatableError
     from reference_rt.cli.adjusted import adjusted
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.errors import ReferenceRtError

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from comparisons.mitsuba.hits import BoolArray
-from comparisons.mitsuba.translate.shapes.patches import Box, Patch
+from comparisons.mitsuba.translate.shapes.surfaces import Box, Patch
 from reference_rt.core.arrays import FloatArray, IntArray
 
 CURVED = (768, 384)

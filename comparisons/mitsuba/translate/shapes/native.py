@@ -11,20 +11,19 @@ from typing import Any
 import numpy as np
 
 from comparisons.geometry.float32 import UNIT_ROUNDOFF
-from comparisons.mitsuba.coordinates import Round
-from comparisons.mitsuba.hits import CURVED
-from comparisons.mitsuba.stand_ins import Plugin, same_uv
-from comparisons.mitsuba.translate.shapes.choice import translate_shape
+from comparisons.mitsuba.hits import CURVED, Plugin, same_uv
+from comparisons.mitsuba.plugins.exact_coordinates import Round
 from comparisons.mitsuba.translate.shapes.meshes import Soup
-from comparisons.mitsuba.translate.shapes.patches import Implicit, Patch
-from comparisons.mitsuba.translate.shapes.plugins import (
+from comparisons.mitsuba.translate.shapes.site import (
     Site,
     curved_instance,
     in_float32,
     to_world,
+    translate_shape,
     with_mesh_light,
 )
 from comparisons.mitsuba.translate.shapes.stand_ins import stand_in
+from comparisons.mitsuba.translate.shapes.surfaces import Implicit, Patch
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.transform import Affine, apply_points, is_similarity
 from reference_rt.shapes import Box, Disk, Rectangle, Sphere
@@ -117,7 +116,7 @@ def _(shape: Box, site: Site) -> list[Plugin]:
     faces = np.array(CUBE_FACES)
     if np.linalg.det(edges) < 0.0:
         # Mirror it along an axis: the same box.  As a Whitted light its point is in the middle of
-        # this axis, and does not move (see comparisons.mitsuba.plugins.light_points).
+        # this axis, and does not move (see comparisons.mitsuba.plugins.whitted).
         turned = _middle_axis(edges)
         edges[:, turned] *= -1.0
         faces = np.where(faces % 3 == turned, (faces + 3) % 6, faces)

@@ -1,4 +1,4 @@
-"""Cylinders, which Mitsuba has; cones and other quadrics, for which meshes stand in."""
+"""Cylinders, which Mitsuba has; cones, tori and other quadrics, for which meshes stand in."""
 
 from collections.abc import Callable
 from functools import partial
@@ -6,26 +6,104 @@ from functools import partial
 import numpy as np
 
 from comparisons.geometry.sizes import heights_of
-from comparisons.mitsuba.coordinates import of_cone, of_quadric
-from comparisons.mitsuba.stand_ins import Plugin, same_uv
-from comparisons.mitsuba.translate.shapes.around import around_z
+from comparisons.mitsuba.hits import Plugin, same_uv
+from comparisons.mitsuba.plugins.exact_coordinates import Round, of_cone, of_quadric
 from comparisons.mitsuba.translate.shapes.canonical import patches_of
-from comparisons.mitsuba.translate.shapes.caps import cap_faces, heights_over_uv, region
-from comparisons.mitsuba.translate.shapes.choice import translate_shape
 from comparisons.mitsuba.translate.shapes.meshes import Soup, placed
-from comparisons.mitsuba.translate.shapes.patches import Box, Implicit, Patch
-from comparisons.mitsuba.translate.shapes.plugins import (
+from comparisons.mitsuba.translate.shapes.site import (
     Site,
     curved_instance,
     in_float32,
     is_round,
     to_world,
+    translate_shape,
     with_mesh_light,
 )
 from comparisons.mitsuba.translate.shapes.stand_ins import stand_in
+from comparisons.mitsuba.translate.shapes.surfaces import (
+    Box,
+    Implicit,
+    Patch,
+    cap_faces,
+    cut_away,
+    heights_over_uv,
+    region,
+)
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray
-from reference_rt.shapes import Cone, Cylinder, Quadric
+from reference_rt.shapes import Cone, Cylinder, Quadric, Torus
+
+# ---- tori ----------------------------------------------------------------------------------------
+
+
+CELLS = (768, 384)
+"""Around the axis and around the tube."""
+
+
+@translate_shape.register
+def _(shape: Torus, site: Site) -> list[Plugin]:
+    patches, surface = torus_surface(shape)
+    of = Round((0.0, 0.0, 0.0), shape.major_radius)
+    return [stand_in(shape, patches, surface, None, site, of)]
+
+
+def torus_surface(shape: Torus) -> tuple[list[Patch], Implicit]:
+    """The surface in its own coordinates."""
+    major, minor = shape.major_radius, shape.minor_radius
+
+    def point(u: FloatArray, v: FloatArray) -> FloatArray:
+        phi, theta = 2.0 * np.pi * u, 2.0 * np.pi * v
+        rho = major + minor * np.cos(theta)
+        return np.stack([rho * np.cos(phi), rho * np.sin(phi), minor * np.sin(theta)], axis=-1)
+
+    def from_tube(p: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The vector from the nearest point of the circle, and its length."""
+        rho = np.hypot(p[..., 0], p[..., 1])
+        factor = 1.0 - major / rho
+        across = np.stack([p[..., 0] * factor, p[..., 1] * factor, p[..., 2]], axis=-1)
+        return across, np.linalg.norm(across, axis=-1)
+
+    surface = Implicit(
+        value=lambda p: from_tube(p)[1] - minor,
+        gradient=lambda p: from_tube(p)[0] / from_tube(p)[1][..., None],
+    )
+    return [Patch(point, CELLS, has_uv=True)], surface
+
+
+# ---- texture coordinates of a quadric's mesh: the angle around z, and z --------------------------
+# They have a seam and poles, where interpolating between a triangle's corners would go wrong: so
+# the mesh is cut along the seam, and each triangle has corners of its own.
+
+
+def around_z(soup: Soup, box: Box) -> Soup:
+    """The mesh with uv: in coordinates where the box is the cube [-1, 1]³, the angle from +x over
+    2 pi, and z from 0 to 1."""
+    assert soup.normals is not None
+    data = np.hstack([soup.positions, soup.normals])
+    parts, uvs = [], []
+    middle, half = 0.5 * (box[0] + box[1]), 0.5 * (box[1] - box[0])
+    for side in (1.0, -1.0):
+
+        def beyond(rows: FloatArray, side: float = side) -> FloatArray:
+            return np.asarray(side * (middle[1] - rows[:, 1]))
+
+        kept, faces = cut_away(data, soup.faces, beyond)
+        corners = kept[faces]  # (m, 3, 6)
+        q = (corners[..., :3] - middle) / half
+        # On this side of the seam y is not negative, but for rounding.
+        phi = np.arctan2(np.maximum(side * q[..., 1], 0.0), q[..., 0])
+        on_axis = np.hypot(q[..., 0], q[..., 1]) == 0.0
+        others = np.where(on_axis, 0.0, phi).sum(axis=1) / np.maximum(1, (~on_axis).sum(axis=1))
+        phi = np.where(on_axis, others[:, None], phi)
+        u = phi / (2.0 * np.pi)
+        uvs.append(np.stack([u if side > 0.0 else 1.0 - u, 0.5 * (q[..., 2] + 1.0)], axis=-1))
+        parts.append(corners)
+    found, uv = np.concatenate(parts).reshape(-1, 6), np.concatenate(uvs).reshape(-1, 2)
+    return Soup(found[:, :3], found[:, 3:], uv)
+
+
+# ---- cylinders, cones and quadrics ---------------------------------------------------------------
+
 
 SIDE = (4096, 8)
 """Cells around a cone and along its side.  That is straight, but Mitsuba's hit on a triangle of

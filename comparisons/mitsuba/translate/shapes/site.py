@@ -1,12 +1,14 @@
-"""`Site`, the placement of a leaf, and Mitsuba's shapes under any affine map."""
+"""`translate_shape`, the translation of a shape by its type; `Site`, the placement of a leaf; and
+Mitsuba's shapes under any affine map."""
 
+from functools import singledispatch
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.stand_ins import Plugin, ShapeGroup
-from comparisons.mitsuba.translate.errors import UntranslatableError
+from comparisons.mitsuba.hits import Plugin, ShapeGroup
+from comparisons.mitsuba.translate.textures import UntranslatableError
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.transform import Affine, is_similarity
 from reference_rt.shapes.shape import TabulationContext
@@ -104,3 +106,12 @@ def is_round(linear: FloatArray) -> bool:
     x, y, z = linear.T
     z = z * np.linalg.norm(x) / np.linalg.norm(z)
     return is_similarity(np.column_stack([x, y, z]))
+
+
+@singledispatch
+def translate_shape(shape: Any, site: Site) -> list[Plugin]:
+    """The Mitsuba shapes that represent one of ours, in order.
+
+    Raises UntranslatableError, and ValueError for a file that cannot be used.
+    """
+    raise UntranslatableError(shape, "shape")
