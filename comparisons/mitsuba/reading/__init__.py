@@ -123,6 +123,8 @@ def read_supported(parsed: Parsed, cls: type[M]) -> tuple[M, list[str]]:
 
 def _scene(parsed: Parsed, cls: type[M]) -> M:
     reading = Reading(parsed)
+    for index, text in parsed.notes:
+        reading.note(Node(parsed, index), text)
     root = Node(parsed, 0)
     if root.kind != "Scene":
         raise root.error("is no scene; expected an element <scene>")
@@ -148,6 +150,8 @@ def _scene(parsed: Parsed, cls: type[M]) -> M:
     sampler: AnySampler | None
     camera, film, sampler = read_sensor(reading, sensors[0] if sensors else None)
     root.finish()
+    if not sensors and parsed.file != "<dict>":
+        raise root.error("has no sensor; expected one")
     if integrator.deterministic != isinstance(sampler, Grid):
         # Points on a grid are for what is not random, and the others for what is.
         sampler = None if integrator.deterministic else Sobol(spp=sampler.spp)

@@ -229,6 +229,7 @@ def _spot(reading: Reading, node: Node) -> AnyLight:
 
 def _projector(reading: Reading, node: Node) -> AnyLight:
     m, (look, scale) = node.transform(), node.looks()
+    _check_size(node, m[:, 2])
     # What is taller than the image's pixels is a scale of y alone.
     tall = float(np.linalg.norm(m[:, 1]) / np.linalg.norm(m[:, 2]))
     if look is not None:
@@ -275,7 +276,9 @@ def _directional(reading: Reading, node: Node) -> AnyLight:
             raise node.error("has both 'direction' and 'to_world'; expected one of them")
         direction = node.vector("direction", (0.0, 0.0, 1.0))
     else:
-        direction = triple(node.transform()[:, 2])
+        axis = node.transform()[:, 2]
+        _check_size(node, axis)
+        direction = triple(axis)
     return Directional(direction=direction, irradiance=_plain(node, "irradiance"))
 
 
@@ -290,6 +293,7 @@ def _envmap(reading: Reading, node: Node) -> AnyLight:
         raise node.error("'bitmap', an image in memory, is not supported; expected a file")
     linear = node.transform()[:, :3]  # Mitsuba ignores a translation, too
     rotation = _similarity(node, linear)
+    _check_size(node, linear[:, 2])
     turn: Any = ()
     if not np.array_equal(rotation, np.eye(3)):
         of_axes = np.column_stack([linear, np.zeros(3)])
@@ -299,6 +303,16 @@ def _envmap(reading: Reading, node: Node) -> AnyLight:
     return EnvironmentMap(
         file=reading.relative(reading.file(node)), scale=node.number("scale", 1.0), transform=turn
     )
+
+
+def _check_size(node: Node, axis: FloatArray) -> None:
+    """Raise SceneError for a scale that Mitsuba's lights do not divide out."""
+    size = float(np.linalg.norm(axis))
+    if abs(size - 1.0) > TOLERANCE:
+        raise node.error(
+            f"'to_world' scales by {size:g}, which distorts Mitsuba's picture: it takes the vector "
+            "for one of length 1; expected a rotation and a translation"
+        )
 
 
 def _similarity(node: Node, linear: FloatArray) -> FloatArray:

@@ -6,7 +6,9 @@ from typing import Any
 from comparisons.mitsuba.reading.node import Node, Reading
 from comparisons.mitsuba.reading.textures import (
     colour_or_texture,
+    fields_of,
     index_of_refraction,
+    is_checker_of_textures,
     metal,
     number_or_texture,
     texture_name,
@@ -109,13 +111,39 @@ def material_name(reading: Reading, node: Node) -> str:
     if key not in reading.names:
         if node.plugin not in _READERS:
             raise node.unsupported(f"expected one of: {', '.join(sorted(_READERS))}")
-        with node.checking():
-            material = _READERS[node.plugin](reading, node)
-        node.finish()
+        material = _of_checkers(reading, node)
         name = reading.unused(node.name, node.plugin, reading.materials)
         reading.materials[name] = material
         reading.names[key] = name
     return reading.names[key]
+
+
+def _read(reading: Reading, node: Node) -> Material:
+    with node.checking():
+        material = _READERS[node.plugin](reading, node)
+    node.finish()
+    return material
+
+
+def _of_checkers(reading: Reading, node: Node) -> Material:
+    """The material of a BSDF: where a checkerboard has textures for its fields, a blend of one
+    material for each kind of field."""
+    for texture in node.clone().children("Texture"):
+        if texture.index in reading.fields or not is_checker_of_textures(texture):
+            continue
+        names = []
+        for field in ("color0", "color1"):
+            reading.fields[texture.index] = field
+            part = _of_checkers(reading, node.clone())
+            names.append(
+                reading.unused(f"{node.name or node.plugin}_{field}", "", reading.materials)
+            )
+            reading.materials[names[-1]] = part
+        del reading.fields[texture.index]
+        weight = reading.unused(texture.name, texture.plugin, reading.textures)
+        reading.textures[weight] = fields_of(texture)
+        return Blend(first=names[0], second=names[1], weight=weight)
+    return _read(reading, node)
 
 
 def black(reading: Reading) -> str:
@@ -156,18 +184,21 @@ def _metal(reading: Reading, node: Node) -> dict[str, Any]:
     return {"eta": eta, "k": k, "reflectance": reflectance}
 
 
+def _without_zeros(values: dict[str, Any]) -> dict[str, Any]:
+    return values | {"eta": tuple(max(x, NO_INDEX) for x in values["eta"])}
+
+
 def _conductor(reading: Reading, node: Node) -> Material:
     values = _metal(reading, node)
     if max(values["eta"]) == 0.0:
         if min(values["k"]) > 0.0:
             return Mirror(reflectance=values["reflectance"])
         raise node.error("'eta' and 'k' are 0; expected an index of refraction")
-    return Conductor(**values)
+    return Conductor(**_without_zeros(values))
 
 
 def _rough_conductor(reading: Reading, node: Node) -> Material:
-    values = _metal(reading, node)
-    values["eta"] = tuple(max(x, NO_INDEX) for x in values["eta"])
+    values = _without_zeros(_metal(reading, node))
     return RoughConductor(**values, **_roughness(reading, node))
 
 

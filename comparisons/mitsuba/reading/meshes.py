@@ -15,7 +15,7 @@ import numpy.typing as npt
 from comparisons.mitsuba.reading.node import Node, Reading
 from comparisons.mitsuba.reading.parse import as_transform, scalar
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.transform import Affine, apply_points
+from reference_rt.core.transform import Affine, apply_points, flattens
 from reference_rt.shapes import Mesh
 from reference_rt.shapes.meshes.files import read_mesh
 from reference_rt.shapes.meshes.files.data import MeshData, RawMesh, checked
@@ -137,7 +137,7 @@ class Surface:
 def mesh(reading: Reading, node: Node, material: str | None) -> Mesh:
     """An obj, ply or serialized mesh."""
     path = reading.file(node)
-    m, of_normals = node.maps()
+    m, of_normals = node.maps(may_flatten=True)
     flat, flip = node.flag("face_normals"), node.flag("flip_normals")
     if node.plugin == "serialized":
         data = _data(reading, node, path, node.integer("shape_index", 0))
@@ -145,6 +145,11 @@ def mesh(reading: Reading, node: Node, material: str | None) -> Mesh:
     else:
         data = _data(reading, node, path)
         upside_down = node.flag("flip_tex_coords", node.plugin == "obj")
+    if data.normals is not None and not flat and flattens(m):
+        raise node.error(
+            "'to_world' flattens a mesh with normals, which Mitsuba refuses, too; expected a map "
+            "that can be undone, or 'face_normals'"
+        )
     uv = data.uv
     if uv is not None and upside_down:
         uv = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
@@ -157,7 +162,7 @@ def mesh(reading: Reading, node: Node, material: str | None) -> Mesh:
         surface = _coloured(node, surface, names, path)
     found = finished(surface, flip, reading.uses_uv(material), material)
     is_made = data.normals is None and not flat
-    if names or flip or is_made or np.linalg.det(m[:, :3]) < 0.0 or not _is_normal(m, of_normals):
+    if names or flip or is_made or np.linalg.det(m[:, :3]) < 0.0 or not is_normal(m, of_normals):
         return found
     assert found.faces is not None
     if not np.array_equal(found.faces, data.faces):
@@ -169,7 +174,7 @@ def mesh(reading: Reading, node: Node, material: str | None) -> Mesh:
     return Mesh(faces=data.faces, face_normals=normals is None, material=material, **update)
 
 
-def _is_normal(m: Affine, of_normals: FloatArray) -> bool:
+def is_normal(m: Affine, of_normals: FloatArray) -> bool:
     """Whether `of_normals` is the inverse transpose of m: see `Node.maps`."""
     product = m[:, :3] @ of_normals.T
     return bool(np.abs(product - np.eye(3)).max() <= 1e-9)

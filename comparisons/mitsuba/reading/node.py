@@ -56,6 +56,10 @@ class Node:
         self._keys = [str(key) for key in self._props.keys()]  # noqa: SIM118
         self._left = dict.fromkeys(self._keys)
 
+    def clone(self) -> "Node":
+        """The element as if nothing of it were taken."""
+        return Node(self._parsed, self.index)
+
     # ---- errors ---------------------------------------------------------------------------------
 
     @property
@@ -207,8 +211,9 @@ class Node:
             )
         return m
 
-    def maps(self, key: str = "to_world") -> tuple[Affine, FloatArray]:
-        """The map of points (3, 4), and Mitsuba's map of normals (3, 3).
+    def maps(self, key: str = "to_world", may_flatten: bool = False) -> tuple[Affine, FloatArray]:
+        """The map of points (3, 4), and Mitsuba's map of normals (3, 3), which is not
+        finite for a map that flattens space.
 
         The second is the inverse transpose of the first, but where a rotation's axis is no unit
         vector: Mitsuba takes it for one.
@@ -226,7 +231,8 @@ class Node:
         if np.abs(m[3] - [0.0, 0.0, 0.0, 1.0]).max() > 0.0:
             raise self.error(f"'{key}' is a perspective map; expected an affine one")
         try:
-            invert(m[:3])
+            if not may_flatten:
+                invert(m[:3])
         except ValueError as error:
             raise self.error(f"'{key}': {error}") from None
         return m[:3], of_normals
@@ -304,6 +310,8 @@ class Reading:
     """The names of what has been read, by index of its element and what it is read for."""
     attributes: dict[str, str] = field(default_factory=dict)
     """Which attribute of meshes a texture shows, by the texture's name."""
+    fields: dict[int, str] = field(default_factory=dict)
+    """By index of a checkerboard of textures which field is being read: "color0" or "color1"."""
     meshes: dict[Any, Any] = field(default_factory=dict)
     """Files of meshes, as read."""
     numbers: dict[Any, Iterator[int]] = field(default_factory=dict)

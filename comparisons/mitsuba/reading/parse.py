@@ -3,6 +3,7 @@ their author wrote them."""
 
 import codecs
 import re
+import tempfile
 import warnings
 import xml.parsers.expat
 from collections.abc import Callable, Iterator, Mapping
@@ -13,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.mitsuba.backend import imported
+from comparisons.mitsuba.reading.foreign import OLD_ELEMENT, Note, adapt
 from reference_rt.core.transform import Affine, compose, rotate, scale, translate
 from reference_rt.util.errors import ReferenceUnavailableError, SceneError
 from reference_rt.util.files import read_input
@@ -139,7 +141,8 @@ class _Reader:
         if self.name is not None:
             self._step(tag, attributes)
         elif tag == "transform":
-            self.name, self.steps, self.is_known = attributes.get("name", ""), [], True
+            name = re.sub("(?<=[a-z])[A-Z]", r"_\g<0>", attributes.get("name", "")).lower()
+            self.name, self.steps, self.is_known = name, [], True  # "toWorld" of Mitsuba 0.x, too
         elif tag == "default":
             self.values.setdefault(attributes.get("name", ""), attributes.get("value", ""))
         self.elements.append(self.place())
@@ -179,7 +182,7 @@ class _Reader:
                 found = Step(tag, (*vector(0.0), angle))
             case "matrix":
                 found = Step(tag, _rows(numbers.pop("value")))
-            case "lookat":
+            case "lookat" | "lookAt":
                 origin, target, up = (numbers.pop(key) for key in ("origin", "target", "up"))
                 found = LookAt(_triple(origin), _triple(target), _triple(up))
             case _:
@@ -219,7 +222,10 @@ MOST_NESTED = 200
 calls itself for each, and a file of a million ends the process."""
 
 MOST_BYTES = 1 << 28
-"""The largest file that is read."""
+"""Of a file and all that it includes, each as often as it is included."""
+
+MOST_FILES = 1000
+"""Most files that are read for a scene, each as often as it is included."""
 
 
 class Parsed(NamedTuple):
@@ -228,7 +234,7 @@ class Parsed(NamedTuple):
     state: `mitsuba.parser.ParserState`, upgraded to Mitsuba 3 and its references resolved;  file:
     the name for messages;  folder: where relative file names count from, first;  resolve: the
     file that Mitsuba finds for a name;  defaults: values for <default> elements;  written: see
-    `transforms`.
+    `transforms`;  notes: what `foreign` has changed.
     """
 
     state: Any
@@ -237,6 +243,7 @@ class Parsed(NamedTuple):
     paths: tuple[Path, ...]
     defaults: Mapping[str, str]
     written: dict[str, Transforms]
+    notes: list[Note]
 
     def transforms(self, file: str) -> Transforms:
         """The transforms of a file as they are written."""
@@ -290,31 +297,52 @@ def parse_file(path: Path, defaults: Mapping[str, str]) -> Parsed:
     """Parse an .xml file;  defaults: values for its <default> elements.  Raises SceneError."""
     mi = module()
     folder = path.parent
-    check_nesting(path, folder)
+    check = _Included(folder, dict(defaults))
+    check.read(path, path.name, (), 0)
     old = mi.file_resolver()
     resolver = mi.FileResolver(old)
     resolver.prepend(str(folder))
-    before = len(resolver)
-    mi.set_file_resolver(resolver)
-    try:
-        state = _upgraded(
-            mi, path, lambda config: mi.parser.parse_file(config, str(path), **defaults)
-        )
-        added = len(resolver) - before
-        paths = tuple(Path(str(resolver[k])) for k in range(added))
-    finally:
-        mi.set_file_resolver(old)
-    return Parsed(state, str(path), folder, paths, defaults, {})
+    with tempfile.TemporaryDirectory() as copies:
+        start = path
+        if check.old:  # Mitsuba's parser finds the copies first
+            resolver.prepend(copies)
+            for name, (_, content) in check.old.items():
+                copy = Path(copies, name)
+                copy.parent.mkdir(parents=True, exist_ok=True)
+                copy.write_bytes(OLD_ELEMENT.sub(rb"\1lookat", content))
+            if path.name in check.old:
+                start = Path(copies, path.name)
+        before = len(resolver)
+        mi.set_file_resolver(resolver)
+        try:
+            state, notes = _upgraded(
+                mi, path, lambda config: mi.parser.parse_file(config, str(start), **defaults)
+            )
+            added = len(resolver) - before
+            paths = tuple(Path(str(resolver[k])) for k in range(added))
+        except SceneError as error:
+            inside = error.file is not None and Path(error.file).is_relative_to(copies)
+            name = str(Path(error.file or "").relative_to(copies)) if inside else ""
+            file = str(check.old[name][0]) if inside else error.file
+            message = error.message.replace(copies, str(folder))
+            raise SceneError(message, file=file, line=error.line) from None
+        finally:
+            mi.set_file_resolver(old)
+        own = {str(Path(copies, name)): str(place) for name, (place, _) in check.old.items()}
+        state.files = [own.get(str(file), str(file)) for file in state.files]
+    if check.old:
+        notes.insert(0, (0, "<lookAt> of Mitsuba 0.x is read as <lookat>, on both sides"))
+    return Parsed(state, str(path), folder, paths, defaults, {}, notes)
 
 
 def parse_dict(scene: Mapping[str, Any], folder: Path) -> Parsed:
     """Parse a dictionary for `mitsuba.load_dict`.  Raises SceneError."""
     mi = module()
-    state = _upgraded(mi, None, lambda config: mi.parser.parse_dict(config, dict(scene)))
-    return Parsed(state, "<dict>", folder, (), {}, {})
+    state, notes = _upgraded(mi, None, lambda config: mi.parser.parse_dict(config, dict(scene)))
+    return Parsed(state, "<dict>", folder, (), {}, {}, notes)
 
 
-def _upgraded(mi: Any, path: Path | None, parse: Any) -> Any:
+def _upgraded(mi: Any, path: Path | None, parse: Any) -> tuple[Any, list[Note]]:
     config = mi.parser.ParserConfig(VARIANT)
     try:
         state = parse(config)
@@ -322,7 +350,7 @@ def _upgraded(mi: Any, path: Path | None, parse: Any) -> Any:
         mi.parser.transform_resolve_references(config, state)
     except (RuntimeError, TypeError, ValueError) as error:
         raise _scene_error(str(error), path) from None
-    return state
+    return state, adapt(mi, state)
 
 
 _PLACE = re.compile(r"Error while loading (?P<file>.*?) \(line (?P<line>\d+), col (?P<col>\d+)\): ")
@@ -354,49 +382,103 @@ class _TooDeepError(Exception):
     pass
 
 
-def check_nesting(path: Path, folder: Path, depth: int = 0, files: int = 0) -> None:
-    """Check that a file and its includes are regular files and nest less deep than MOST_NESTED.
+class _Included:
+    """What `read` has found in a file and all that it includes.
 
-    Everything else that is wrong with them, Mitsuba's parser says better.  Raises SceneError.
+    old: the files with spellings of Mitsuba 0.x by the name under which they are included.
     """
-    try:
-        content = read_input(path, MOST_BYTES)
-    except OSError as error:
-        if depth == 0:
+
+    def __init__(self, folder: Path, values: dict[str, str]) -> None:
+        self.folders, self.values = [folder], values
+        self.files = self.bytes = 0
+        self.old: dict[str, tuple[Path, bytes]] = {}
+
+    def read(self, path: Path, name: str, around: tuple[Path, ...], depth: int) -> None:
+        """Check that a file and its includes are regular, of limited size and number, in UTF-8, do
+        not include themselves, and nest less deep than MOST_NESTED.  name: under which it is
+        included;  around: the files that include it;  depth: of elements around it.
+
+        Everything else that is wrong with them, Mitsuba's parser says better.  Raises SceneError.
+        """
+        try:
+            content = read_input(path, MOST_BYTES)
+        except OSError as error:
+            if depth == 0:
+                raise SceneError(
+                    f"cannot be read: {error.strerror}; expected a scene file", file=str(path)
+                ) from None
+            return
+        self.files, self.bytes = self.files + 1, self.bytes + len(content)
+        if self.files > MOST_FILES or self.bytes > MOST_BYTES:
             raise SceneError(
-                f"cannot be read: {error.strerror}; expected a scene file", file=str(path)
+                f"includes more than {MOST_FILES} files or {MOST_BYTES >> 20} MB, each as "
+                "often as it is included; expected fewer",
+                file=str((*around, path)[0]),
+            )
+        _check_utf8(path, content)
+        if OLD_ELEMENT.search(content):
+            self.old[name] = path, content
+        parser = xml.parsers.expat.ParserCreate()
+        level, includes = 0, list[tuple[str, int, int]]()
+
+        def start(tag: str, attributes: dict[str, str]) -> None:
+            nonlocal level
+            level += 1
+            if depth + level > MOST_NESTED:
+                raise _TooDeepError
+            if tag == "default":
+                self.values.setdefault(attributes.get("name", ""), attributes.get("value", ""))
+            elif tag == "path" and "value" in attributes:
+                self.folders += [path.parent / attributes["value"], Path(attributes["value"])]
+            elif tag == "include" and "filename" in attributes:
+                known = re.sub(
+                    r"\$(\w+)",
+                    lambda found: self.values.get(found[1], found[0]),
+                    attributes["filename"],
+                )
+                includes.append((known, level, parser.CurrentLineNumber))
+
+        def end(tag: str) -> None:
+            nonlocal level
+            level -= 1
+
+        parser.StartElementHandler, parser.EndElementHandler = start, end
+        try:
+            parser.Parse(content, True)
+        except _TooDeepError:
+            raise SceneError(
+                f"column {parser.CurrentColumnNumber + 1}: elements nest deeper than {MOST_NESTED}"
+                "; expected fewer levels",
+                file=str(path),
+                line=parser.CurrentLineNumber,
             ) from None
-        return
-    parser = xml.parsers.expat.ParserCreate()
-    level, deepest, includes = 0, 0, list[str]()
+        except (xml.parsers.expat.ExpatError, ValueError) as error:
+            if b"<include" in content:  # Mitsuba's parser might read on where this one ends
+                raise SceneError(f"is no well-formed XML: {error}", file=str(path)) from None
+        around = (*around, path.resolve())
+        for other, inside, line in includes:
+            folders = (path.parent, *self.folders, Path())
+            place = next((folder / other for folder in folders if (folder / other).is_file()), None)
+            if place is None:
+                continue
+            if place.resolve() in around:
+                cycle = [*around[around.index(place.resolve()) :], place]
+                raise SceneError(
+                    f"<include> of '{other}' makes a cycle ({' > '.join(p.name for p in cycle)}); "
+                    "expected none",
+                    file=str(path),
+                    line=line,
+                )
+            self.read(place, other, around, depth + inside)
 
-    def start(name: str, attributes: dict[str, str]) -> None:
-        nonlocal level, deepest
-        level += 1
-        deepest = max(deepest, level)
-        if depth + level > MOST_NESTED:
-            raise _TooDeepError
-        if name == "include" and "filename" in attributes:
-            includes.append(attributes["filename"])
 
-    def end(name: str) -> None:
-        nonlocal level
-        level -= 1
-
-    parser.StartElementHandler, parser.EndElementHandler = start, end
+def _check_utf8(path: Path, content: bytes) -> None:
+    """Mitsuba's parser hands on what is no UTF-8, but for comments."""
     try:
-        parser.Parse(content, True)
-    except _TooDeepError:
+        re.sub(rb"<!--.*?-->", b"", _as_utf8(content), flags=re.DOTALL).decode()
+    except UnicodeDecodeError as error:
         raise SceneError(
-            f"column {parser.CurrentColumnNumber + 1}: elements nest deeper than {MOST_NESTED}; "
-            "expected fewer levels",
+            f"is no UTF-8 ({error.reason}: {error.object[error.start : error.start + 1]!r}); "
+            "expected UTF-8, or the encoding in the <?xml ...?> line",
             file=str(path),
-            line=parser.CurrentLineNumber,
         ) from None
-    except (xml.parsers.expat.ExpatError, ValueError):
-        pass
-    for name in includes if files < 15 else ():  # Mitsuba's own limit of includes in each other
-        for place in (path.parent / name, folder / name):
-            if place.is_file():
-                check_nesting(place, folder, depth + deepest, files + 1)
-                break

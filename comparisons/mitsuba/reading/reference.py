@@ -244,6 +244,7 @@ def changes_to(scene: Scene) -> list[str]:
     found += notes_of_integrator(scene)
     found += dict.fromkeys(note for _, note in inexact(scene))
     found += sample_visible(parsed)
+    found += dict.fromkeys(text for _, text in parsed.notes)
     return found
 
 

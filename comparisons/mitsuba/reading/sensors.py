@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.mitsuba.reading.node import Node, Reading
+from comparisons.mitsuba.reading.node import Node, Reading, triple
 from reference_rt.cameras import AnyCamera, Orthographic, Perspective, ThinLens
 from reference_rt.cameras.film import Film
 from reference_rt.cameras.filters import (
@@ -218,6 +218,12 @@ CLIP = {"near_clip": 1e-2, "far_clip": 1e4}
 """Mitsuba's defaults."""
 
 
+_NO_CAMERAS = {
+    "distant": "its rays start on a disk around the whole scene, or at a target from there; ",
+    "irradiancemeter": "it measures on a surface, not an image; ",
+}
+
+
 class View(NamedTuple):
     """What a sensor says: `sampler` is never None."""
 
@@ -233,7 +239,8 @@ def read_sensor(reading: Reading, node: Node | None) -> View:
         film = film.model_copy(update={"filter": GaussianFilter()})
         return View(_camera_without_element(frame), film, Independent(spp=4))
     if node.plugin not in _CAMERAS:
-        raise node.unsupported(f"expected one of: {', '.join(sorted(_CAMERAS))}")
+        why = _NO_CAMERAS.get(node.plugin, "")
+        raise node.unsupported(f"{why}expected one of: {', '.join(sorted(_CAMERAS))}")
     for medium in node.children("Medium"):
         raise medium.unsupported("expected a scene without media")
     # The shutter has no effect: nothing moves.
@@ -386,9 +393,33 @@ def _view_rectangle(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
     return ThinLens(**place, view=(l, r, b, t), aperture_radius=radius, focus_distance=focus)
 
 
+POINT = 1e-12
+"""The width of what a camera of parallel rays sees, in place of one ray."""
+
+
+def _radiance_meter(reading: Reading, node: Node, frame: Frame) -> AnyCamera:
+    """One ray: a camera of parallel rays that sees next to nothing."""
+    if node.has("origin") or node.has("direction"):
+        eye = np.array(node.vector("origin", (0.0, 0.0, 0.0)))
+        towards = np.array(node.vector("direction", (1.0, 0.0, 0.0)))
+        node.ignore("to_world")
+    else:
+        m = node.transform()
+        eye, towards = m[:, 3], m[:, 2]
+    if (frame.crop_width, frame.crop_height) != (1, 1):
+        raise node.error(
+            f"has a film of {frame.crop_width} x {frame.crop_height} pixels for one ray; expected "
+            "1 x 1"
+        )
+    target = eye + max(1.0, float(np.abs(eye).max())) * towards / np.linalg.norm(towards)
+    up = np.eye(3)[np.argmin(np.abs(towards))]
+    return Orthographic(eye=triple(eye), target=triple(target), up=triple(up), width=POINT)
+
+
 _CAMERAS = {
     "perspective": _perspective,
     "thinlens": _thin_lens,
     "orthographic": _orthographic,
+    "radiancemeter": _radiance_meter,
     "view_rectangle": _view_rectangle,
 }

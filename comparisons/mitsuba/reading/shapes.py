@@ -7,14 +7,15 @@ import numpy as np
 
 from comparisons.mitsuba.reading.lights import emission
 from comparisons.mitsuba.reading.materials import material_name
-from comparisons.mitsuba.reading.meshes import Surface, finished, mesh, placed
+from comparisons.mitsuba.reading.meshes import Surface, finished, is_normal, mesh, placed
 from comparisons.mitsuba.reading.node import Node, Reading
 from comparisons.mitsuba.reading.parse import as_transform
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.transform import Affine, is_similarity
 from reference_rt.materials import Emissive
-from reference_rt.shapes import Box, Cylinder, Disk, Quadric, Rectangle, Shape, Sphere
+from reference_rt.shapes import Box, Cylinder, Disk, Mesh, Quadric, Rectangle, Shape, Sphere
 from reference_rt.shapes.instances import Instance
+from reference_rt.shapes.meshes.triangle_table import geometric_normals
 
 Reader = Callable[[Reading, Node, "str | None"], Shape]
 
@@ -27,7 +28,43 @@ def read_shape(reading: Reading, node: Node) -> None:
     if node.plugin == "shapegroup":
         group_name(reading, node)
         return
-    reading.shapes.append(shape(reading, node))
+    reading.shapes += _shapes(reading, node)
+
+
+def _shapes(reading: Reading, node: Node, in_group: bool = False) -> list[Shape]:
+    """The shape of an element; the children of `merge`, which only joins meshes."""
+    if node.plugin != "merge":
+        seen = [] if _is_nothing(node) else [shape(reading, node, in_group)]
+        if any(isinstance(part, Mesh) and _area(part) == 0.0 for part in seen):
+            seen = []
+        if not seen:
+            reading.note(node, "has no area under 'to_world', and is left out")
+        return seen
+    reading.note(node, "is read as the shapes inside it")
+    found = [part for child in node.children("Shape") for part in _shapes(reading, child, in_group)]
+    node.finish()
+    return found
+
+
+def _is_nothing(node: Node) -> bool:
+    """Whether 'to_world' leaves nothing of a shape that Mitsuba hits."""
+    matrix = getattr(node.properties.get("to_world", None), "matrix", np.eye(4))
+    linear = np.array(matrix, np.float64)[:3, :3]
+    if not np.isfinite(linear).all():
+        return False  # which is an error of the shape's own reader
+    rank = np.linalg.matrix_rank(linear)
+    if node.plugin in ("rectangle", "disk"):
+        return bool(np.linalg.matrix_rank(linear[:, :2]) < 2)
+    # Of a line, Mitsuba makes round spheres and cylinders.
+    return bool(rank < (1 if node.plugin in ("sphere", "cylinder", "instance") else 2))
+
+
+def _area(mesh: Mesh) -> float:
+    """In its own coordinates, or 1 under a transform: that undoes no map which flattens."""
+    if mesh.transform:
+        return 1.0
+    corners = np.asarray(mesh.vertices)[np.asarray(mesh.faces)]
+    return float(np.abs(geometric_normals(corners.reshape(-1, 9))).sum())
 
 
 def shape(reading: Reading, node: Node, in_group: bool = False) -> Shape:
@@ -73,7 +110,9 @@ def group_name(reading: Reading, node: Node) -> str:
     key = ("group", node.index)
     if key not in reading.names:
         node.ignore("to_world")  # which Mitsuba does not use, either
-        members = [shape(reading, child, in_group=True) for child in node.children("Shape")]
+        members = [
+            part for child in node.children("Shape") for part in _shapes(reading, child, True)
+        ]
         if not members:
             raise node.error("has no shapes; expected one or more")
         node.finish()
@@ -234,7 +273,7 @@ def _cube(reading: Reading, node: Node, material: str | None) -> Shape:
     node.ignore("face_normals")  # it has vertex normals all the same
     flip = node.flag("flip_normals")
     m, of_normals = node.maps()
-    if not (flip or reading.uses_uv(material)):
+    if is_normal(m, of_normals) and not (flip or reading.uses_uv(material)):
         steps: Any = as_transform(node.written(), m)
         return Box(transform=steps, material=material)
     surface = Surface(_CUBE, _CUBE_FACES, _CUBE_NORMALS, _CUBE_UV)

@@ -148,6 +148,9 @@ def colour_or_texture(
             raise node.error(f"'{key}' is a {value.kind.lower()}; expected a texture")
         if value.plugin in SPECTRA:
             return constant(value)
+        if value.index in reading.fields:
+            field = reading.fields[value.index]
+            return colour_or_texture(reading, value, field, FIELDS[field], use)
         return texture_name(reading, value, as_number=False)
     return colour(node, key, default, use)
 
@@ -163,6 +166,9 @@ def number_or_texture(reading: Reading, node: Node, key: str, default: float) ->
         value = node.take(key)
         if value.kind != "Texture":
             raise node.error(f"'{key}' is a {value.kind.lower()}; expected a number or a texture")
+        if value.index in reading.fields:
+            field = "color1" if reading.fields[value.index] == "color0" else "color0"
+            return number_or_texture(reading, value, field, FIELDS[field])  # see `_checker`
         if value.plugin not in SPECTRA:
             return texture_name(reading, value, as_number=True)
         if value.plugin in ("uniform", "rawconstant"):
@@ -230,8 +236,26 @@ def _bitmap(reading: Reading, node: Node, is_projected: bool) -> Bitmap:
     )
 
 
+FIELDS = {"color0": 0.4, "color1": 0.2}
+"""The fields of a checkerboard, and Mitsuba's defaults."""
+
+
+def is_checker_of_textures(node: Node) -> bool:
+    return node.plugin == "checkerboard" and any(
+        child.plugin not in SPECTRA for child in node.clone().children("Texture")
+    )
+
+
+def fields_of(node: Node) -> Checker:
+    """0 in the fields `color0` of a checkerboard, 1 in the others."""
+    node.ignore(*FIELDS)
+    uv = _uv(node, is_image=False, is_projected=False)
+    node.finish()
+    return Checker(first=(0.0, 0.0, 0.0), second=(1.0, 1.0, 1.0), uv=uv)
+
+
 def _checker(node: Node, as_number: bool, is_projected: bool) -> Checker:
-    first, second = colour(node, "color0", 0.4), colour(node, "color1", 0.2)
+    first, second = (colour(node, key, default) for key, default in FIELDS.items())
     if as_number:
         # Mitsuba's `eval_1` exchanges the two colours of its `eval` (src/textures/checkerboard.cpp,
         # 3.9.1).

@@ -83,7 +83,7 @@ def map_of(inside: str) -> str:
 
 
 REFUSED = {
-    '<bsdf type="hair"/>': "",  # nobody uses it: it is no part of the picture
+    '<sensor type="perspective"/><bsdf type="hair"/>': "",  # nobody uses it
     shape('<bsdf type="hair"/>'): "scene.xml:2: column 25: bsdf 'hair': is not supported; expected "
     "one of: blendbsdf,",
     shape("", "sdfgrid"): "scene.xml:2: column 4: shape 'sdfgrid': is not supported",
@@ -97,7 +97,7 @@ REFUSED = {
     shape('<string name="filename" value="none.obj"/>', "obj"): "there is no file",
     shape("", "instance"): "has no shape group",
     shape("", "shapegroup"): "has no shapes",
-    shape(map_of('<scale value="0"/>')): "flat",
+    shape(map_of('<scale x="0"/>')): "flat",
     shape(map_of('<rotate x="1" y="1" angle="30"/>')): "no unit vector",
     shape(map_of('<scale x="1" y="2" z="1"/>')): "makes it an ellipsoid",
     on_sphere('type="twosided">'): "has 0 nested BSDFs",
@@ -115,7 +115,7 @@ REFUSED = {
     '<emitter type="point">'
     + map_of('<translate x="1" y="0" z="0"/>')
     + '<point name="position" x="1" y="2" z="3"/></emitter>': "both 'position' and 'to_world'",
-    '<emitter type="constant"/><emitter type="constant"/>': "more than one environment",
+    sensor("") + 2 * '<emitter type="constant"/>': "more than one environment",
     '<emitter type="constant"><spectrum name="radiance" type="blackbody">'
     '<float name="temperature" value="3000"/></spectrum></emitter>': "rgb variants cannot use it",
     '<integrator type="ptracer"/>': "integrator 'ptracer': is not supported",

@@ -230,7 +230,7 @@ def test_serialized_meshes_are_those_of_mitsuba(tmp_path, version, index, flat):
     )
     (tmp_path / "m.serialized").write_bytes(packed(version, *meshes))
     (tmp_path / "scene.xml").write_text(
-        f"""<scene version="3.0.0"><shape type="serialized">
+        f"""<scene version="3.0.0"><sensor type="perspective"/><shape type="serialized">
         <string name="filename" value="m.serialized"/><boolean name="face_normals" value="{flat}"/>
         <integer name="shape_index" value="{index}"/></shape></scene>"""
     )
