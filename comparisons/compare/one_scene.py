@@ -9,8 +9,8 @@ from comparisons.compare.compare import Subject, compare_scene
 from comparisons.compare.looks import FIRST, SECONDS
 from comparisons.compare.notebook import NotebookCase
 from comparisons.mitsuba.backend import mitsuba
+from reference_rt.rendering.render import with_settings
 from reference_rt.rendering.scene import Scene
-from reference_rt.rendering.settings import with_settings
 
 
 def compare_one(

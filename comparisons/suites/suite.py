@@ -12,7 +12,7 @@ from comparisons.suites.work import Changes, Plan, Work, control_name, read
 from reference_rt.core.model import Description, Positive
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene import yaml_text
-from reference_rt.scene.yaml_lines import line_of
+from reference_rt.scene.yaml_text import line_of
 from reference_rt.util.errors import SceneError, UsageError, printable
 from reference_rt.util.files import read_text
 

@@ -7,8 +7,8 @@ All four find the same hits, to the last bit; only their speed differs:
   boxes; all other shapes one ray and one primitive at a time); through a link to shapes, one type
   of shape after another (`shapes/brute_force_linked.py`);
 - single-ray traversal: the loop is in `geometry.py`, its steps are in `single_ray.py`;
-- stream traversal, `stream/`: a block of up to BLOCK = 64 rays, each one step at a time;
-- packet traversal, `packet/`: 16 coherent rays that share their box tests.
+- stream traversal, `stream.py`: a block of up to BLOCK = 64 rays, each one step at a time;
+- packet traversal, `packet_traversal.py`: 16 coherent rays that share their box tests.
 
 Who calls what, and which way it takes:
 
@@ -27,7 +27,7 @@ Who calls what, and which way it takes:
 
     query.crossings, t_min > 0      next_crossing -------------------> no BVH:    brute force
                                                                        else:      single ray
-    query.solid_crossings           csg.evaluate.surface_along         only one solid, no search
+    query.solid_crossings           csg.surface_along                  only one solid, no search
 
 `closest_hit`, `closest_hits`, `occluded`, `any_hits` and `next_crossing` are operations: their
 callers have the tables of a geometry, or a link to it (`geometries` in `geometry.py`).  A linked
@@ -50,7 +50,7 @@ Who decides:
 
 Solids and instances are references in leaves of the BVH (kinds SOLID and INSTANCE, see `leaf.py`).
 A solid is evaluated in its leaf, whichever traversal reaches it; its mesh operands have BVHs of
-their own, which `csg/mesh_walk.py` traverses ray by ray.  At an instance the ray is transformed and
+their own, which `csg.py` traverses ray by ray.  At an instance the ray is transformed and
 goes on at the root of the group's BVH: only single-ray traversal does that.  What has no finite box
 (planes, some solids) is in a tree of its own, `Bvh.unbounded`, which all traversals visit.
 
@@ -79,4 +79,4 @@ test against `geometry.closest_hit`.
 from reference_rt.accel import block_query as block_query
 from reference_rt.accel import geometry as geometry
 from reference_rt.accel import next_crossing as next_crossing
-from reference_rt.accel.packet import traversal as traversal
+from reference_rt.accel import packet_traversal as packet_traversal

@@ -8,8 +8,8 @@ import numpy.typing as npt
 
 from reference_rt.accel.block_query import any_hits, closest_hits, hit_of
 from reference_rt.accel.geometry import Geometry, closest_hit, occluded
-from reference_rt.accel.packet.packet import PACKET_SIZE
-from reference_rt.accel.packet.traversal import FOUND, INCOHERENT, closest_of_packet
+from reference_rt.accel.packet import PACKET_SIZE
+from reference_rt.accel.packet_traversal import FOUND, INCOHERENT, closest_of_packet
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import BLOCK, Hit, Ray
 from reference_rt.core.ray_block import (

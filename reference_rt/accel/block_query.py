@@ -7,7 +7,7 @@ import numpy as np
 from reference_rt import shapes as any_shape
 from reference_rt.accel.bvh import Bvh
 from reference_rt.accel.geometry import Geometry, closest_hit, geometries, occluded
-from reference_rt.accel.stream.traversal import any_of_block, closest_of_block, trace_block
+from reference_rt.accel.stream import any_of_block, closest_of_block, trace_block
 from reference_rt.core.ray import Hit, Ray
 from reference_rt.core.ray_block import (
     HIT_FLOATS,

@@ -1,9 +1,9 @@
 """Rays against the contents of a BVH leaf: primitives, SIMD triangles, solids."""
 
 from reference_rt import shapes as any_shape
+from reference_rt.accel import csg
 from reference_rt.accel.bvh import Bvh, first_of, is_triangle_leaf, kind_of, row_of, size_of
 from reference_rt.accel.crossing_order import precedes
-from reference_rt.accel.csg import evaluate
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import Crossing, Hit, Ray
 from reference_rt.core.ray_block import HitBlock, RayBlock, hit_of, put_hit, ray_of
@@ -60,7 +60,7 @@ def nearer_primitive(
     """The nearer of `closest` and the ray's hit with one reference, a primitive or a solid."""
     if solids is not None:
         if kind == SOLID:
-            hit = evaluate.intersect(solids, shapes, bvh, row, ray, closest.t)
+            hit = csg.intersect(solids, shapes, bvh, row, ray, closest.t)
             found = Crossing(hit.t, hit.u, hit.v)
             return _nearer(shapes, found, hit.kind, hit.row, instance, closest)
     found = any_shape.intersect(shapes, kind, row, ray, shear)

@@ -4,6 +4,7 @@ only the closest hit."""
 import math
 from typing import Any
 
+from reference_rt.accel import csg
 from reference_rt.accel.bvh import NOTHING, Bvh, first_of, kind_of, row_of, size_of
 from reference_rt.accel.crossing_order import (
     FROM_THE_START,
@@ -12,7 +13,6 @@ from reference_rt.accel.crossing_order import (
     nothing_at,
     ordered_crossing,
 )
-from reference_rt.accel.csg import evaluate
 from reference_rt.accel.geometry import STACK, Geometry, geometries, local_ray
 from reference_rt.accel.leaf import INSTANCE, SOLID
 from reference_rt.accel.single_ray import can_be_nearer, enter, nearest_child
@@ -44,10 +44,10 @@ def crossings_of_solid(
     geometry: Geometry, s: int, ray: Ray, t: FloatArray, widths: FloatArray, part: IntArray
 ) -> int:
     """How many crossings a ray has with solid s of a geometry that has solids; t, resolution and
-    operand of as many as the arrays have room for, in order: see `evaluate.surface_along`."""
+    operand of as many as the arrays have room for, in order: see `csg.surface_along`."""
     solids: Any = geometry.solids
     bvh: Any = geometry.bvh
-    count, _ = evaluate.surface_along(
+    count, _ = csg.surface_along(
         solids, geometry.shapes, bvh, s, ray, math.inf, t, widths, part, -1, FROM_THE_START
     )
     return count
@@ -182,7 +182,7 @@ def _of_reference(
     if solids is not None:
         if kind == SOLID:
             none, no_parts = local_floats(0), local_integers(0)
-            _, found = evaluate.surface_along(
+            _, found = csg.surface_along(
                 solids, shapes, bvh, row, ray, best.hit.t, none, none, no_parts, instance, after
             )
             return _first(found, after, best)

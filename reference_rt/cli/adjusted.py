@@ -29,7 +29,7 @@ def adjusted(
     seed: int | None = None,
 ) -> "Scene":
     """The scene with the options of the command line.  Raises UsageError."""
-    from reference_rt.rendering.settings import with_settings
+    from reference_rt.rendering.render import with_settings
 
     pixels = None
     if size is not None:

@@ -8,8 +8,9 @@ from numba import types
 
 from reference_rt.jit.kernel import Signature, is_compiled
 from reference_rt.jit.parallel_compile import Call
+from reference_rt.rendering.kernels import operation_of
 from reference_rt.rendering.scene import Scene
-from reference_rt.rendering.warm_up import operation_of, picture_calls, specialised_calls
+from reference_rt.rendering.warm_up import picture_calls, specialised_calls
 
 Lines = list[tuple[str, str]]
 

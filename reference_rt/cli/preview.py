@@ -13,9 +13,8 @@ from reference_rt.cli.terminal_picture import Pixels, draws_sixels, half_blocks,
 from reference_rt.rendering.image import display, eight_bits
 from reference_rt.rendering.loop import Limits
 from reference_rt.rendering.picture import Picture
+from reference_rt.rendering.render import Session, with_settings
 from reference_rt.rendering.scene import Scene
-from reference_rt.rendering.session import Session
-from reference_rt.rendering.settings import with_settings
 from reference_rt.scene.build import BuiltScene
 from reference_rt.scene.model import SceneModel
 from reference_rt.util.console import ProgressLine

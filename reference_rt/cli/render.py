@@ -3,6 +3,7 @@
 import math
 import time
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,11 +11,10 @@ from reference_rt.cli.quantities import bytes_of, duration, percentage, seconds_
 from reference_rt.cli.where import Where
 from reference_rt.jit.kernel_cache import cache_root
 from reference_rt.rendering import image
-from reference_rt.rendering.executor import Remote
+from reference_rt.rendering.framebuffer import delete_old
 from reference_rt.rendering.loop import Limits
-from reference_rt.rendering.render_folders import delete_old
+from reference_rt.rendering.render import Session, Storage
 from reference_rt.rendering.scene import Scene
-from reference_rt.rendering.session import Session, Storage, Workers
 from reference_rt.util.console import ProgressLine
 from reference_rt.util.errors import ImageError, UsageError
 from reference_rt.util.files import check_writable
@@ -99,7 +99,7 @@ def render_to_file(
         session = Session(
             scene,
             threads=where.threads,
-            workers=_remote(where) if where.is_elsewhere else None,
+            workers=partial(where.open, Processes) if where.is_elsewhere else None,
             compiling=progress.compiling,
             limits=limits,
             storage=storage,
@@ -115,10 +115,6 @@ def render_to_file(
             if session.loop.save_error:
                 progress.line(f"warning: the checkpoint is not complete: {session.loop.save_error}")
             return _write(session, output, limits, code), code
-
-
-def _remote(where: Where) -> Workers:
-    return lambda scene: Remote(scene, where.open(Processes))
 
 
 def _check_resumed(session: Session) -> None:

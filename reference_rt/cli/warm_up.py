@@ -14,8 +14,9 @@ from rich.progress import TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from reference_rt.jit.kernel import CACHE_FOLDER, is_cached, precompile
 from reference_rt.jit.kernel_cache import cache_root
 from reference_rt.jit.parallel_compile import Call, compile_all
+from reference_rt.rendering.kernels import cost
 from reference_rt.rendering.scene import Scene
-from reference_rt.rendering.warm_up import cost, linked_calls, picture_calls, specialised_calls
+from reference_rt.rendering.warm_up import linked_calls, picture_calls, specialised_calls
 from reference_rt.util.console import Bar
 from reference_rt.util.errors import ImageError, UsageError
 from reference_rt.util.files import check_writable

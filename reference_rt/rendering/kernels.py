@@ -11,6 +11,7 @@ the specialised ones meanwhile, and they take over between two tiles or in the n
 
 import math
 import os
+import re
 import signal
 import time
 from collections.abc import Callable, Sequence
@@ -24,7 +25,7 @@ from reference_rt.accel.block_query import tracer_of
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit import parallel_compile
 from reference_rt.jit.function_pointer import pointer_to
-from reference_rt.jit.kernel import is_compiled, precompile, signature_of
+from reference_rt.jit.kernel import is_compiled, is_named_tuple, precompile, signature_of
 from reference_rt.jit.links import Link, Linker
 from reference_rt.jit.parallel_compile import (
     Ahead,
@@ -35,7 +36,6 @@ from reference_rt.jit.parallel_compile import (
     precompile_all,
 )
 from reference_rt.rendering.accumulation import ABSENT, Job
-from reference_rt.rendering.compile_cost import cost
 from reference_rt.rendering.linking import (
     EMPTY_SCENE,
     EMPTY_VIEW,
@@ -226,3 +226,35 @@ class Specialised:
 
 def _bound(job: Job, kernel: Any, arguments: tuple[Any, ...], absent: Any) -> Callable[..., None]:
     return lambda sums, *tile: kernel(*arguments, *job.given(sums, absent), *tile)
+
+
+# ---- how long kernels take to compile ------------------------------------------------------------
+
+_COSTS = {
+    "trace_block": 4.0,  # of specialised kernels only
+    "render_tile": 1.6,
+    "closest_hits": 1.3,
+    "any_hits": 0.9,
+    "closest_hit": 0.8,
+    "occluded": 0.6,
+    "first_hits_tile": 0.4,
+    "aov_tile": 0.4,
+}
+_COST = 0.13
+_COST_SPECIALISED = 8.0
+
+
+def cost(call: Call) -> float:
+    """About how many seconds it takes to compile a kernel (measured: means; others take _COST),
+    for the order and for progress bars."""
+    compiled, signature = call
+    arguments = signature if isinstance(signature, tuple) else signature.args
+    if any(is_named_tuple(of, SceneTables) for of in arguments):
+        return _COST_SPECIALISED
+    return _COSTS.get(operation_of(compiled), _COST)
+
+
+def operation_of(compiled: Any) -> str:
+    """The name of a kernel's operation, or of a kernel that is none; without the code of the type
+    that kernels of operations end with."""
+    return re.sub(r"_\d+$", "", compiled.__name__)

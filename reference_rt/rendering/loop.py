@@ -16,10 +16,9 @@ import numpy as np
 
 from reference_rt.core.arrays import IntArray
 from reference_rt.rendering.accumulation import Sums
-from reference_rt.rendering.executor import Executor
+from reference_rt.rendering.executor import Done, Executor, StoppedError
 from reference_rt.rendering.framebuffer import Framebuffer
 from reference_rt.rendering.noise import relative_error
-from reference_rt.rendering.prepared import Done, StoppedError
 from reference_rt.rendering.units import Unit, plan
 from reference_rt.util.errors import ImageError
 

@@ -1,6 +1,7 @@
 """`Picture`: a rendered scene, its layers, and how it is saved and shown."""
 
 import base64
+import importlib.metadata
 import io
 import os
 from dataclasses import dataclass, field
@@ -11,7 +12,6 @@ import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.rendering.image import check_suffix, display, eight_bits, write
-from reference_rt.rendering.provenance import provenance
 from reference_rt.scene.model import SceneModel
 
 BRIGHT = 99.0
@@ -130,12 +130,43 @@ class Picture:
         return f"<div>{_image(self.png(), 480)}<div>{text}</div>{others}</div>"
 
 
+def provenance(scene: SceneModel) -> dict[str, str]:
+    """The provenance of a picture, for its header: the same scene has the same bytes."""
+    return {
+        "software": f"reference_rt {importlib.metadata.version('reference-rt')}",
+        "scene": scene.name,
+        "sceneSha256": scene.digest(),
+        "integrator": scene.integrator.model_dump_json(),
+        "sampler": scene.resolved_sampler.model_dump_json(),
+        "filter": scene.film.filter.model_dump_json(),
+    }
+
+
 def header_of(scene: SceneModel | None, taken: Taken | None) -> dict[str, str]:
     """The provenance in the header of a picture's file, and that it is partial if it is."""
     header = {} if scene is None else provenance(scene)
     if taken is not None and taken.partial:
         header["partial"] = taken.partial
     return header
+
+
+MOST_PLACES = 4
+
+
+class Written(NamedTuple):
+    """What was found while a picture was written.  nonfinite: how many pixels are not finite;
+    places: (column, row) of the first of them;  black: whether all of the shown layer is black."""
+
+    nonfinite: int
+    places: tuple[tuple[int, int], ...]
+    black: bool
+
+
+def written(picture: Picture, first_row: int = 0) -> Written:
+    """The same of a picture, or of some rows of one."""
+    bad = picture.nonfinite_pixels
+    places = tuple((int(x), int(y) + first_row) for x, y in bad[:MOST_PLACES])
+    return Written(len(bad), places, not picture.layers[picture.shown].any())
 
 
 _RADIANCE = ("colour", "variance")

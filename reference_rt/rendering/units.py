@@ -6,8 +6,7 @@ any thread, process or machine may compute it, twice if one dies, and the result
 Since samples are added one after another, no bit depends on how a picture is divided into units.
 
 Pixels are counted along rows.  Samples are counted for chunks of pixels (`chunk_of`), which units
-never divide.
-"""
+never divide."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -98,3 +97,17 @@ def _pass(planned: IntArray, pixels: int, last: int, size: int, chunk: int) -> I
         planned[k:stop] = last
         yield Unit(k * chunk, min(stop * chunk, pixels), first, last)
         k = stop
+
+
+SAMPLES_PER_TILE = 1 << 15
+"""Samples of one kernel call, about 20 ms: short enough for progress and Ctrl-C, long against the
+0.1 ms that a task of the thread pool costs."""
+
+
+def tiles_of(unit: Unit) -> Iterator[Unit]:
+    """The kernel calls of a unit, in order."""
+    step = max(1, SAMPLES_PER_TILE // (unit.last - unit.first))
+    for begin in range(unit.begin, unit.end, step):
+        end = min(begin + step, unit.end)
+        for first in range(unit.first, unit.last, SAMPLES_PER_TILE):
+            yield Unit(begin, end, first, min(first + SAMPLES_PER_TILE, unit.last))

@@ -22,8 +22,7 @@ from reference_rt.sampling.blocks import INTEGERS as PAIR_INTEGERS
 from reference_rt.sampling.blocks import BlockSample
 from reference_rt.sampling.grid import Grid, GridSample, GridSetup
 from reference_rt.sampling.independent import Independent, IndependentSample, IndependentSetup
-from reference_rt.sampling.orders import GROUP
-from reference_rt.sampling.sobol import Sobol, SobolSample, SobolSetup
+from reference_rt.sampling.sobol import GROUP, Sobol, SobolSample, SobolSetup
 
 AnySampler = Annotated[Sobol | Independent | Grid, Field(discriminator="type")]
 

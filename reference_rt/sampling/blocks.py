@@ -19,8 +19,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.numba_codegen import call_llvm, constant, data_of, nothing, variable
 from reference_rt.sampling import sobol
-from reference_rt.sampling.orders import GROUP, OF_DIGITS
-from reference_rt.sampling.sobol import SobolSetup, pair, reverse_bits, seeds_of
+from reference_rt.sampling.sobol import GROUP, OF_DIGITS, SobolSetup, pair, reverse_bits, seeds_of
 
 BLOCK_SAMPLES = 16
 """Samples in a block."""

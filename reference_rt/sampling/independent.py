@@ -7,9 +7,6 @@ from pydantic import Field
 
 from reference_rt.core.model import Description
 from reference_rt.jit.kernel import kernel
-from reference_rt.sampling.hashing import LOW32, combine, mix
-
-_32 = np.uint64(32)
 
 
 class Independent(Description):
@@ -44,4 +41,29 @@ def start(setup: IndependentSetup, pixel: int, sample: int) -> IndependentSample
 def draw(sampler: IndependentSample, dimension: int) -> tuple[float, float]:
     """Two multiples of 2^-32 plus 2^-33, the middles of cells: never 0, never 1."""
     h = mix(sampler.key + np.uint64(dimension + 1) * np.uint64(0x9E3779B97F4A7C15))
-    return (float(h >> _32) + 0.5) * 2.0**-32, (float(h & LOW32) + 0.5) * 2.0**-32
+    return (float(h >> np.uint64(32)) + 0.5) * 2.0**-32, (float(h & LOW32) + 0.5) * 2.0**-32
+
+
+# ---- hashes --------------------------------------------------------------------------------------
+# In uint64 arithmetic, with the same results in compiled code and plain Python.
+
+LOW32 = np.uint64(0xFFFFFFFF)
+_32 = np.uint64(32)
+_30, _27, _31 = np.uint64(30), np.uint64(27), np.uint64(31)
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+_M1, _M2 = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
+
+
+@kernel
+def mix(x: np.uint64) -> np.uint64:
+    """A bijection of 64 bits in which each input bit affects each output bit (splitmix64's
+    finaliser: Stafford 2011, variant 13)."""
+    x = (x ^ (x >> _30)) * _M1
+    x = (x ^ (x >> _27)) * _M2
+    return x ^ (x >> _31)
+
+
+@kernel
+def combine(a: np.uint64, b: np.uint64) -> np.uint64:
+    """A hash of an ordered pair."""
+    return mix(a ^ mix(b + _GOLDEN))

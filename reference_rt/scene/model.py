@@ -1,6 +1,7 @@
 """`SceneModel`, the description of a scene: fields, checks, reading and writing YAML and JSON."""
 
 import hashlib
+import importlib.metadata
 import json
 import warnings
 from collections.abc import Iterable, Mapping
@@ -20,13 +21,19 @@ from reference_rt.lights import AnyLight, Constant, EnvironmentMap
 from reference_rt.materials import AnyMaterial, Emissive, Material, Wrapper
 from reference_rt.materials.nested.paths import material_paths
 from reference_rt.sampling import AnySampler, Grid, Sobol
-from reference_rt.scene import readers, yaml_text
-from reference_rt.scene.yaml_lines import line_of
+from reference_rt.scene import yaml_text
+from reference_rt.scene.yaml_text import line_of
 from reference_rt.shapes import Shape
 from reference_rt.shapes.csg import AnyShape, Solid
 from reference_rt.shapes.instances import Instance
 from reference_rt.textures import AnyTexture, texture_names
-from reference_rt.util.errors import SceneError, SceneWarning, meant, printable
+from reference_rt.util.errors import (
+    ReferenceUnavailableError,
+    SceneError,
+    SceneWarning,
+    meant,
+    printable,
+)
 from reference_rt.util.files import read_text
 
 MOST_NESTED = 100
@@ -240,8 +247,8 @@ class SceneModel(Description):
         reason), ReferenceUnavailableError where Mitsuba is needed and missing.
         """
         path = Path(path)
-        if path.suffix.lower() not in readers.OWN:
-            read_file = readers.reader_of(path).read_file
+        if path.suffix.lower() not in OWN:
+            read_file = reader_of(path).read_file
             return read_file(path, cls, defaults or {}, allow_missing)  # type: ignore[no-any-return]
         if defaults:
             raise SceneError("has no defaults; expected a Mitsuba scene, .xml", file=str(path))
@@ -282,7 +289,7 @@ class SceneModel(Description):
     def from_mitsuba(cls, scene: Mapping[str, Any], folder: str | Path = ".") -> Self:
         """A scene from a dictionary for `mitsuba.load_dict`;  folder: of the files that it names.
         Raises as `load` does."""
-        read_dict = readers.reader_of(Path("scene.xml")).read_dict
+        read_dict = reader_of(Path("scene.xml")).read_dict
         return read_dict(scene, cls, Path(folder))  # type: ignore[no-any-return]
 
     def changed(self, **parts: Any) -> Self:
@@ -308,3 +315,36 @@ class SceneModel(Description):
 def json_schema() -> dict[str, Any]:
     """The JSON Schema of scene files."""
     return SceneModel.model_json_schema(by_alias=True) | {"title": "Scene"}
+
+
+# ---- readers of other programs' scenes -----------------------------------------------------------
+# Installed packages add them.  A package names a module in the entry-point group
+# `reference_rt.scene_readers`, under the suffix without its dot.  The module has
+#
+# - `read_file(path, cls, defaults, allow_missing)`: the scene in a file, an object of `cls`;
+#   `defaults`: the values of `-D name=value`, by name; `allow_missing`: whether to leave out what
+#   is not supported;
+# - `read_dict(scene, cls, folder)`: the same from the program's own dictionaries.
+
+GROUP = "reference_rt.scene_readers"
+
+OWN = (".yaml", ".yml", ".json")
+"""The suffixes of our own scenes."""
+
+_PACKAGES = {".xml": "scenes of Mitsuba need Mitsuba: pip install 'reference-rt[compare]'"}
+"""What to do about a suffix that nobody reads."""
+
+
+def reader_of(path: Path) -> Any:
+    """The module that reads a file of this suffix.  Raises SceneError, and
+    ReferenceUnavailableError where a package is missing."""
+    suffix = path.suffix.lower()
+    for entry in importlib.metadata.entry_points(group=GROUP, name=suffix.removeprefix(".")):
+        try:
+            return entry.load()
+        except ImportError as error:
+            advice = _PACKAGES.get(suffix, f"{error.name} is not installed")
+            raise ReferenceUnavailableError(f"{path}: {advice}") from None
+    if suffix in _PACKAGES:
+        raise ReferenceUnavailableError(f"{path}: {_PACKAGES[suffix]}")
+    raise SceneError("is not a scene file; expected .yaml or .json", file=str(path))

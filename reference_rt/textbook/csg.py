@@ -3,7 +3,7 @@
 Both begin with the crossings of the ray's line with each operand, computed by the renderer's own
 kernels.  The interval method then uses only the intervals in which the line is inside an operand;
 the other uses only point-in-operand tests, which `inside` computes from the description.  The
-renderer does neither: `accel.csg.evaluate` walks through the crossings in order, and merges those
+renderer does neither: `accel.csg` walks through the crossings in order, and merges those
 that rounding cannot separate.
 """
 

@@ -7,8 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from reference_rt.rendering.executor import Done, StoppedError
 from reference_rt.rendering.noise import statistics
-from reference_rt.rendering.prepared import Done, StoppedError
 from reference_rt.rendering.units import chunk_of
 
 

@@ -1,5 +1,6 @@
 """The cost of features that a scene does not use, against kernels specialised by hand."""
 
+import functools
 import os
 from collections.abc import Callable
 from typing import Any
@@ -17,9 +18,9 @@ from reference_rt.jit.kernel import precompile, signature_of
 from reference_rt.lights import Constant
 from reference_rt.materials import AnyMaterial, Diffuse
 from reference_rt.rendering.picture import Picture
+from reference_rt.rendering.query.radiance import run_tiles
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
-from reference_rt.rendering.thread_pool import run_tiles
 from reference_rt.sampling import Sobol
 from reference_rt.shapes import Sphere
 
@@ -127,12 +128,8 @@ def render_pruned(scene: Scene, threads: int | None = None) -> Picture:
     )
     pixels, threads = out[..., 0].size, threads or os.cpu_count() or 1
     band = precompile(spheres_only.render_tile, signature_of(*arguments, 0, 0, 0, 0))
-    run_tiles(band, arguments, pixels, sampler.spp, threads, _silent)
+    run_tiles(functools.partial(band, *arguments), pixels, sampler.spp, threads)
     return Picture({"colour": out})
-
-
-def _silent(what: str, fraction: float) -> None:
-    pass
 
 
 def measure(setting: Setting) -> list[Row]:

@@ -40,7 +40,7 @@ EVENTS = Method(
     "csg.renderer",
     "T12",
     "crossings in order, near ones at once: the renderer's own",
-    "reference_rt.accel.csg.evaluate",
+    "reference_rt.accel.csg",
     CsgParameters,
     _prepare_renderer,
     RENDERS.run,

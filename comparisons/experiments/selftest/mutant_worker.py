@@ -18,7 +18,7 @@ import numpy as np
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, gather
 from comparisons.rungs.rays import any_hit
-from reference_rt.rendering.query import batches, hits, tracing
+from reference_rt.rendering.query import hits, tracing
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
@@ -38,7 +38,7 @@ FEW = 64
 def main() -> None:
     """{"scenes": [paths], "calls": whether to list functions, "before": pictures or None}."""
     task = json.load(sys.stdin)
-    for module in (batches, hits, tracing, any_hit):
+    for module in (hits, tracing, any_hit):
         setattr(module, "FEW", FEW)  # noqa: B010
     out: dict[str, Any] = {}
     for path in task["scenes"]:

@@ -2,9 +2,9 @@
 
 Builders see only the primitives' bounding boxes (spatial splits also triangles' vertices).  `build`
 makes a binary BVH, `Nodes` in world space, by one of four methods: `sah.py` with `bins.py` and
-`spatial.py`, `median.py`, or a single leaf.  `widened` (`widening.py`) makes it a BVH of eight
-children a node, `Wide`; `joined` (`wide.py`) puts several into one `Bvh`, the arrays that
-traversals read.  `statistics` measures a BVH.
+`spatial.py`, `median.py`, or a single leaf.  `widened` makes it a BVH of eight children a node,
+`Wide`; `joined` puts several into one `Bvh`, the arrays that traversals read (both in `wide.py`).
+`statistics` measures a BVH.
 
 To add a method: a module with build(boxes (n, 6)) -> (Nodes, references), deterministic, no deeper
 than STACK_SIZE allows, leaves of at most LEAF_SIZE; a name in `Method` and a branch in `build`; the
@@ -16,8 +16,13 @@ from typing import Literal
 import numpy as np
 
 from reference_rt.accel.bvh import median, sah
-from reference_rt.accel.bvh.nodes import FAR_SLACK, LEAF_SIZE, STACK_SIZE, Nodes, half_area
-from reference_rt.accel.bvh.statistics import Statistics, of_wide, statistics
+from reference_rt.accel.bvh.nodes import (
+    FAR_SLACK,
+    LEAF_SIZE,
+    STACK_SIZE,
+    Nodes,
+    half_area,
+)
 from reference_rt.accel.bvh.wide import (
     CENTER,
     CHILDREN,
@@ -25,16 +30,19 @@ from reference_rt.accel.bvh.wide import (
     NOTHING,
     WIDE_STACK,
     Bvh,
+    Statistics,
     Wide,
     child_of,
     first_of,
     is_triangle_leaf,
     joined,
     kind_of,
+    of_wide,
     row_of,
     size_of,
+    statistics,
+    widened,
 )
-from reference_rt.accel.bvh.widening import widened
 from reference_rt.core.arrays import FloatArray, IntArray
 
 __all__ = [

@@ -1,9 +1,9 @@
 """Array queries of a scene: rays, points and directions in, hits, densities and radiance out.
 
-`hits`: first hits and occlusion;  `crossings`: all hits along a ray;  `camera`: camera rays;
-`bsdf`: evaluate and sample a material;  `light`: light samples and densities;  `radiance`: any
-integrator along given rays;  `tracing`: the entry kernels;  `batches`: which of them traces how
-many rays;  `linked`: a scene's tables behind links;  `rays`: checks, broadcasting, threads.
+`hits`: first hits, occlusion, and all crossings along a ray;  `bsdf`: evaluate and sample a
+material;  `light`: light samples and densities;  `radiance`: any integrator along given rays;
+`tracing`: the entry kernels, and which of them traces how many rays;  `linked`: a scene's tables
+behind links;  `rays`: checks, broadcasting, threads; camera rays.
 `Scene` has the queries as methods; most functions here take the scene's tables instead.
 
 Contract: all arrays are float64 or int64.  Origins and directions are (..., 3) in world coordinates
@@ -18,13 +18,13 @@ kernel takes links with the operations that it calls (`link_to_geometry`, `link_
 """
 
 from reference_rt.rendering.query.bsdf import Bsdf, BsdfSamples
-from reference_rt.rendering.query.camera import CameraRays, camera_rays
-from reference_rt.rendering.query.crossings import Crossings, crossings
 from reference_rt.rendering.query.hits import (
     Closest,
+    Crossings,
     Hits,
     Intersections,
     closest_primitives,
+    crossings,
     first_hits,
     intersect,
     occluded,
@@ -39,6 +39,7 @@ from reference_rt.rendering.query.light import (
     sample_lights,
 )
 from reference_rt.rendering.query.radiance import Radiance, radiance, radiance_without_noise
+from reference_rt.rendering.query.rays import CameraRays, camera_rays
 
 __all__ = [
     "Bsdf",

@@ -22,7 +22,6 @@ from reference_rt.jit.links import Linker
 from reference_rt.lights import TABLES, Constant, EnvironmentMap, Lights
 from reference_rt.materials import scratch_floats
 from reference_rt.rendering.linking import linked_lights, linked_shapes, linked_textures
-from reference_rt.rendering.query.batches import FirstHits
 from reference_rt.rendering.query.hits import BoolArray
 from reference_rt.rendering.query.linked import (
     Linked,
@@ -39,7 +38,7 @@ from reference_rt.rendering.query.rays import (
     rays_of,
     shaped,
 )
-from reference_rt.rendering.query.tracing import NO_LIMIT, empty_hits, hit_of
+from reference_rt.rendering.query.tracing import NO_LIMIT, FirstHits, empty_hits, hit_of
 from reference_rt.scene.build import BuiltScene
 from reference_rt.shapes import TABLES as SHAPE_TABLES
 from reference_rt.shapes import Shapes

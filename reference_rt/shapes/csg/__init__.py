@@ -8,11 +8,11 @@ meshes.
 - `tables.py`: operands and programs of all solids of a scene;
 - `anchor.py`: the local origin from which the coordinates of a solid's operands count.
 
-Rays are evaluated in `accel/csg`: the program combines, for each stretch of the ray, whether it is
-inside of each operand.
+Rays are evaluated in `accel/csg.py`: the program combines, for each stretch of the ray, whether it
+is inside of each operand.
 
 To add an operation: a description as `Union` in `shapes/shape.py`; a code in `tables.py`; a case in
-`postfix`, and one in `accel/csg/evaluate.py`.
+`postfix`, and one in `accel/csg.py`.
 """
 
 from reference_rt.shapes.csg.anchor import Anchored, anchored

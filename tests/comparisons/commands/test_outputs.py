@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import pytest
+import reference_rt.rendering.prepared
 from suite_runs import run_in, scenes
 from typer.testing import CliRunner
 
 import comparisons.commands.register
 import comparisons.experiments.convergence.methods
 import comparisons.mitsuba.backend
-import reference_rt.rendering.prepared
 import reference_rt.scene.build
 from reference_rt.cli.main import app
 

@@ -8,8 +8,8 @@ from builders import cube, icosphere, same_in_plain_python, unit_vectors, write_
 
 import reference_rt as rt
 from reference_rt.accel.geometry import closest_hit
-from reference_rt.accel.packet.nodes import enter_packet
-from reference_rt.accel.packet.packet import PACKET_SIZE, SPAN_FLOATS, packet_of
+from reference_rt.accel.packet import PACKET_SIZE, SPAN_FLOATS, packet_of
+from reference_rt.accel.packet_traversal import enter_packet
 from reference_rt.accel.single_ray import enter, slab_ray_of
 from reference_rt.core.ray import Ray
 from reference_rt.core.scaled_ray import is_representable, scaled

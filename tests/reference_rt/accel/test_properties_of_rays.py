@@ -146,7 +146,7 @@ def are_one(t, cosine, o, d, reach):
 def test_somewhere_else(seed, offset):
     """Solids count crossings as one that lie within the rounding of where they are: 16 sqrt(3) u
     (|anchor| + |p| + size) of the surface and 16 sqrt(3) u (|o| + |p|) of the ray, over the cosine
-    (`csg.evaluate.width`), 111 u times the largest number at most.  Only rays of which crossings
+    (`csg.width`), 111 u times the largest number at most.  Only rays of which crossings
     are that close may differ."""
     scene, (o, d) = scene_of(seed), rays_of(seed)
     other = then(scene, transform.Translate(translate=offset))

@@ -5,7 +5,7 @@ import pytest
 from bvh_checks import METHODS, bounds, build, slivers, small_triangles
 
 from reference_rt.accel import bvh
-from reference_rt.accel.bvh import widening
+from reference_rt.accel.bvh import wide
 from reference_rt.accel.bvh.wide import (
     CENTER,
     CHILDREN,
@@ -118,7 +118,7 @@ def _cheapest(nodes, is_triangle, references):
     def child(node):
         held = below(node)
         triangles = int(is_triangle[held].sum())
-        leaf = area(node) * widening._leaf_cost(len(held), triangles)
+        leaf = area(node) * wide._leaf_cost(len(held), triangles)
         return leaf if nodes.size[node] > 0 else min(leaf, area(node) + opened(node))
 
     def opened(node):
@@ -156,7 +156,7 @@ def test_is_the_cheapest_of_all(seed):
                 rows = tree.references[bvh.first_of(code) :][: bvh.size_of(code), 1]
                 tests = 1.0
                 if code < 0:
-                    tests = widening._leaf_cost(len(rows), int(is_triangle[rows].sum()))
+                    tests = wide._leaf_cost(len(rows), int(is_triangle[rows].sum()))
                 cost += tests * (x * y + y * z + z * x)[lane]
     # Planes are rounded outwards to float32: by 2^-23 of the tree's size, about 4, areas of up to
     # 16 by up to 8e-6 each and some 1e-6 of a box's own; measured at most 1.3e-7 of the cost.

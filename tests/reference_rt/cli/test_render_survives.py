@@ -165,7 +165,7 @@ def test_a_disk_that_is_full(tmp_path):
     """Files of a checkpoint may have no byte: the render goes on without, and says so."""
     code = (
         "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-        "import reference_rt.rendering.checkpoint as c, reference_rt.rendering.session\n"
+        "import reference_rt.rendering.framebuffer as c, reference_rt.rendering.render\n"
         "write = c.Checkpoint.write\n"
         "def full(self, k, band):\n"
         "    resource.setrlimit(resource.RLIMIT_FSIZE, (100, -1))\n"

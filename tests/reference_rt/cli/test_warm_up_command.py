@@ -17,7 +17,8 @@ from rich.console import Console
 import reference_rt as rt
 from reference_rt.cli.explain_kernels import kernels_of
 from reference_rt.cli.warm_up import CountBar
-from reference_rt.rendering.warm_up import cost, linked_calls, picture_calls
+from reference_rt.rendering.kernels import cost
+from reference_rt.rendering.warm_up import linked_calls, picture_calls
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
@@ -25,7 +26,8 @@ _FEW = """
 import signal; signal.signal(signal.SIGINT, signal.default_int_handler)
 import reference_rt as rt
 import reference_rt.cli.warm_up as command
-from reference_rt.rendering.warm_up import cost, picture_calls
+from reference_rt.rendering.kernels import cost
+from reference_rt.rendering.warm_up import picture_calls
 
 scenes = [rt.Scene(shapes=(rt.Sphere(),), integrator=i()) for i in (rt.Path, rt.Direct, rt.Whitted)]
 calls = {{call for scene in scenes for call in picture_calls(scene)}}

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is com
 _RAYS_AND_PICTURE = """
 import reference_rt as rt
 from reference_rt.jit import links
-from reference_rt.rendering.query.camera import camera_kernel
+from reference_rt.rendering.query.rays import camera_kernel
 from reference_rt.rendering.tiles import aov_tile
 scene = rt.Scene(
     shapes=(rt.Sphere(),), integrator=rt.RayCast(), film=rt.Film(width=2, height=2)

@@ -14,7 +14,7 @@ from small_scenes import same, small
 
 import reference_rt as rt
 from reference_rt.rendering.executor import Remote
-from reference_rt.rendering.session import Session
+from reference_rt.rendering.render import Session
 from reference_rt.util.cluster import Cluster, batch_cluster
 from reference_rt.util.errors import UsageError, WorkersError
 

@@ -75,7 +75,7 @@ def test_colour_is_the_same_bits_with_and_without(cornell):
 def test_same_bits_for_any_threads_and_tiling(cornell, band, monkeypatch):
     expected = rt.render(cornell, threads=1).layers
     monkeypatch.setattr(
-        importlib.import_module("reference_rt.rendering.thread_pool"), "SAMPLES_PER_TILE", band
+        importlib.import_module("reference_rt.rendering.units"), "SAMPLES_PER_TILE", band
     )
     for threads in (1, 3):
         layers = rt.render(cornell, threads=threads).layers

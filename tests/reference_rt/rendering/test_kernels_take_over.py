@@ -58,7 +58,7 @@ class Watched:
                 self.children.append(child)
             return child
 
-        rendering = sys.modules["reference_rt.rendering.thread_pool"]
+        rendering = sys.modules["reference_rt.rendering.units"]
         monkeypatch.setattr(kernels.Running, "run", watched_run)
         monkeypatch.setattr(kernels, "fork_with_compiler", watched_fork)
         monkeypatch.setattr(parallel_compile, "may_fork", lambda: True)

@@ -12,7 +12,7 @@ from PIL import Image
 import reference_rt as rt
 from reference_rt.core.exr import read_exr
 from reference_rt.rendering.image import srgb
-from reference_rt.rendering.settings import with_settings
+from reference_rt.rendering.render import with_settings
 
 LAYERS = ("albedo", "normal", "position", "depth", "id", "variance")
 

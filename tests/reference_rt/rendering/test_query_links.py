@@ -11,9 +11,9 @@ from builders import SCENES, cube, same_in_plain_python, unit_vectors, write_obj
 from crossing_forms import GROUPS, kinds, tilted
 
 import reference_rt as rt
-from reference_rt.rendering.query import batches, bsdf, direct_light, hits, light, linked, tracing
+from reference_rt.rendering.query import bsdf, direct_light, hits, light, linked, tracing
+from reference_rt.rendering.query.hits import solid_crossings
 from reference_rt.rendering.query.radiance import cast_kernel
-from reference_rt.rendering.query.solid_crossings import crossings as solid_crossings
 
 FEW = rt.Scene(shapes=(rt.Sphere(radius=0.7), rt.Box(), rt.Torus(), rt.Cylinder(radius=0.9)))
 SOLID = rt.Scene(
@@ -47,7 +47,7 @@ def traced(scene, o, d):
 @contextlib.contextmanager
 def many_from(n):
     """More than n rays are many."""
-    with mock.patch.object(batches, "FEW", n), mock.patch.object(hits, "FEW", n):
+    with mock.patch.object(tracing, "FEW", n), mock.patch.object(hits, "FEW", n):
         yield
 
 
@@ -182,7 +182,7 @@ def test_links_last_as_long_as_the_query():
     """Though the links of other scenes have taken their place."""
     scene = rt.Scene(shapes=(rt.Sphere(radius=0.5), rt.Box()))
     o, d = np.array([[0.0, 0.0, 3.0]]), np.array([[0.0, 0.0, -1.0]])
-    traced_later = batches.FirstHits(scene.tables, 1, surfaces=True)
+    traced_later = tracing.FirstHits(scene.tables, 1, surfaces=True)
     for _ in range(linked.SCENES):
         rt.Scene(shapes=(rt.Sphere(),)).intersect(o, d)
     taken = [np.full(n, -1) for n in range(1, 500)]  # the memory of links that are no more

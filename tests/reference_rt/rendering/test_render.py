@@ -27,7 +27,7 @@ def cornell():
 def test_same_bits_for_any_threads_and_tiling(cornell, band, monkeypatch):
     expected = render(cornell, threads=1).colour
     monkeypatch.setattr(
-        importlib.import_module("reference_rt.rendering.thread_pool"), "SAMPLES_PER_TILE", band
+        importlib.import_module("reference_rt.rendering.units"), "SAMPLES_PER_TILE", band
     )
     for threads in (1, 2, 3):
         assert np.array_equal(render(cornell, threads=threads).colour, expected)
@@ -69,7 +69,7 @@ def test_an_error_in_progress_stops_the_render(cornell):
 
 def test_an_interrupt_while_bands_are_handed_out(monkeypatch):
     """Of the hundred bands that wait by then, a sleeping thread must not go on to do them all."""
-    module = importlib.import_module("reference_rt.rendering.thread_pool")
+    module = importlib.import_module("reference_rt.rendering.units")
     ran = []
 
     class Pool(ThreadPoolExecutor):

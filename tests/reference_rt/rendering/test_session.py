@@ -11,11 +11,10 @@ from small_scenes import LAYERS, same, small
 
 import reference_rt as rt
 from reference_rt.core.exr import read_exr
-from reference_rt.rendering.executor import Remote
+from reference_rt.rendering.executor import Remote, compute_remotely, remote_scene
 from reference_rt.rendering.framebuffer import Framebuffer
 from reference_rt.rendering.loop import Limits, Snapshot
-from reference_rt.rendering.remote import compute_remotely, remote_scene
-from reference_rt.rendering.session import Session, Storage
+from reference_rt.rendering.render import Session, Storage
 from reference_rt.rendering.units import BAND, Unit
 from reference_rt.util.errors import UsageError, WorkersError
 
@@ -141,7 +140,7 @@ def test_bands_on_disk_change_no_bit(tmp_path, monkeypatch):
     scene = sized(small("cornell_box"), width=700, height=700, layers=LAYERS)
     scene = scene.changed(sampler=rt.Sobol(spp=2))
     monkeypatch.setattr(
-        "reference_rt.rendering.session.check_fits",
+        "reference_rt.rendering.render.check_fits",
         lambda scene, widths, memory, store: memory and 2 * BAND * 8 * 17,
     )
     with Session(scene, storage=Storage(tmp_path / "parts"), memory=1) as session:

@@ -22,16 +22,16 @@ from reference_rt.rendering import kernels
 from reference_rt.rendering.accumulation import radiance_job
 from reference_rt.rendering.kernels import Linked
 from reference_rt.rendering.query import tracing
-from reference_rt.rendering.query.ahead import query_calls
-from reference_rt.rendering.query.camera import camera_kernel
+from reference_rt.rendering.query.hits import solid_crossings
 from reference_rt.rendering.query.light import direct_light
-from reference_rt.rendering.query.solid_crossings import crossings as solid_crossings
+from reference_rt.rendering.query.rays import camera_kernel
 from reference_rt.rendering.tiles import GivenRays
 from reference_rt.rendering.warm_up import (
     cost,
     linked_calls,
     operation_of,
     picture_calls,
+    query_calls,
     specialised_calls,
 )
 from reference_rt.shapes.meshes.triangle_table import Triangles

@@ -18,7 +18,7 @@ from reference_rt.sampling import (
     start_in_block,
     start_sample,
 )
-from reference_rt.sampling.orders import COLUMNS, GROUP, after, pascal_columns, product
+from reference_rt.sampling.sobol import COLUMNS, GROUP, after, pascal_columns, product
 
 SAMPLERS = [rt.Sobol, rt.Independent]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from reference_rt.rendering.scene import Scene
-from reference_rt.scene import readers
+from reference_rt.scene import model
 from reference_rt.util.errors import ReferenceUnavailableError, SceneError
 
 
@@ -15,7 +15,7 @@ def entries(*found: EntryPoint):
 
 
 def test_without_a_reader_the_message_says_what_to_install(monkeypatch):
-    monkeypatch.setattr(readers.importlib.metadata, "entry_points", entries())
+    monkeypatch.setattr(model.importlib.metadata, "entry_points", entries())
     with pytest.raises(ReferenceUnavailableError, match=r"scene\.xml: .*pip install"):
         Scene.load("scene.xml")
     with pytest.raises(ReferenceUnavailableError, match="pip install"):
@@ -25,8 +25,8 @@ def test_without_a_reader_the_message_says_what_to_install(monkeypatch):
 
 
 def test_with_a_broken_reader_too(monkeypatch):
-    broken = EntryPoint("xml", "no_such_package.reader", readers.GROUP)
-    monkeypatch.setattr(readers.importlib.metadata, "entry_points", entries(broken))
+    broken = EntryPoint("xml", "no_such_package.reader", model.GROUP)
+    monkeypatch.setattr(model.importlib.metadata, "entry_points", entries(broken))
     with pytest.raises(ReferenceUnavailableError, match=r"scene\.xml: .*pip install"):
         Scene.load("scene.xml")
 
@@ -35,8 +35,8 @@ def test_a_reader_is_called_for_its_suffix(monkeypatch):
     def read_file(path: Path, cls: type[Scene], defaults: dict[str, str], some: bool) -> Scene:
         return cls(description=f"{path.name} {defaults} {some}")
 
-    this = EntryPoint("abc", "test_readers", readers.GROUP)
-    monkeypatch.setattr(readers.importlib.metadata, "entry_points", entries(this))
+    this = EntryPoint("abc", "test_readers", model.GROUP)
+    monkeypatch.setattr(model.importlib.metadata, "entry_points", entries(this))
     monkeypatch.setattr(EntryPoint, "load", lambda self: type("M", (), {"read_file": read_file}))
     assert Scene.load("x/a.ABC", {"n": "1"}).description == "a.ABC {'n': '1'} False"
     assert Scene.load("a.abc").description == "a.abc {} False"

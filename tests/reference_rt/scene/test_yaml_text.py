@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from reference_rt.scene import yaml_text
-from reference_rt.scene.yaml_lines import line_of
+from reference_rt.scene.yaml_text import line_of
 
 FILES = sorted([*SCENES.glob("*.yaml"), *SCENES.parent.glob("comparisons/suites/*.yaml")])
 

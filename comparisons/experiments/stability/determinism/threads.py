@@ -11,7 +11,7 @@ from comparisons.mitsuba.backend import LLVM, SCALAR, backend, variant
 from comparisons.mitsuba.scene import picture
 from comparisons.mitsuba.translate import load
 
-_module: Any = importlib.import_module("reference_rt.rendering.thread_pool")
+_module: Any = importlib.import_module("reference_rt.rendering.units")
 
 Outcomes = dict[str, Outcome]
 

@@ -17,7 +17,7 @@ from comparisons.geometry.sizes import LeafSizes
 from reference_rt import textbook
 from reference_rt.core.arrays import IntArray
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.rendering.query.solid_crossings import SolidCrossings, crossings
+from reference_rt.rendering.query.hits import SolidCrossings, solid_crossings
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import csg
 from reference_rt.shapes.shape import TabulationContext
@@ -47,7 +47,7 @@ class Lists(NamedTuple):
 
 
 def ours(solid: Any, folder: Path, o: FloatArray, d: FloatArray) -> Lists:
-    return _lists(crossings(scene_of(solid, folder).tables, 0, o, d, MOST))
+    return _lists(solid_crossings(scene_of(solid, folder).tables, 0, o, d, MOST))
 
 
 def _lists(found: SolidCrossings) -> Lists:
@@ -147,7 +147,7 @@ def _alone(tables: SceneTables, k: int, o: FloatArray, d: FloatArray) -> Lists:
         steps=zero,
     )
     geometry = tables.geometry._replace(solids=alone)
-    return _lists(crossings(tables._replace(geometry=geometry), 0, o, d, MOST))
+    return _lists(solid_crossings(tables._replace(geometry=geometry), 0, o, d, MOST))
 
 
 def _truth(tree: Any, found: list[list[Any]], touching: bool, stated: list[Lists]) -> Truth:

@@ -27,8 +27,7 @@ from reference_rt.cli.guarded import guarded
 from reference_rt.integrators import RayCast
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering import image
-from reference_rt.rendering.picture import Picture
-from reference_rt.rendering.provenance import provenance
+from reference_rt.rendering.picture import Picture, provenance
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables

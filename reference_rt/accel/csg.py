@@ -1,16 +1,22 @@
-"""CSG along a ray: the operands' crossings in order, and a postfix program that combines them.
+"""Rays against CSG solids, in a leaf of the scene's BVH: the operands' crossings in order, and a
+postfix program that combines them.
 
 The operands' crossings are processed in order of t; after each, the postfix program computes from
 the operands' states whether the point is inside the solid.  The solid's surface is where this
 changes.  Crossings that are closer than their rounding errors are processed as one: coincident
 faces leave no film of rounding error between them.
+
+An operand that is a closed mesh has a BVH of its own; other operands give their crossings as
+`Spans`, see `shapes.dispatch.spans`.  t is that of the ray as given.  Inside, rays start near the
+solid's anchor (`ray_near`), so that rounding is relative to the solid's size rather than to its
+distance from the origin.
 """
 
 import math
 from typing import NamedTuple
 
 from reference_rt import shapes as any_shape
-from reference_rt.accel.bvh import Bvh
+from reference_rt.accel.bvh import NOTHING, WIDE_STACK, Bvh, first_of, row_of, size_of
 from reference_rt.accel.crossing_order import (
     FROM_THE_START,
     OrderedCrossing,
@@ -18,14 +24,81 @@ from reference_rt.accel.crossing_order import (
     nothing_at,
     ordered_crossing,
 )
-from reference_rt.accel.csg.mesh_walk import Step, next_mesh_crossing, winding
+from reference_rt.accel.single_ray import enter, nearest_child, slab_ray_of
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Hit, Ray, at, surface_error
 from reference_rt.core.vec3 import dot, length
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
-from reference_rt.shapes import Shapes
+from reference_rt.jit.simd import VECTOR_WIDTH
+from reference_rt.shapes import TRIANGLE, Shapes
 from reference_rt.shapes.csg.anchor import ray_near
 from reference_rt.shapes.csg.tables import AND, NOT, OR, Solids
+from reference_rt.shapes.meshes.watertight import shear_of
+
+# ---- closed meshes: a ray's crossings in order, and its origin's winding number ------------------
+
+
+class Step(NamedTuple):
+    """A crossing: t, inf for none; the triangle and its barycentrics; sign, +1 where the ray goes
+    in, -1 where it comes out."""
+
+    t: float
+    row: int
+    u: float
+    v: float
+    sign: int
+
+
+@kernel
+def next_mesh_crossing(
+    shapes: Shapes, bvh: Bvh, root: int, ray: Ray, after: float, row: int
+) -> Step:
+    """The first crossing of a mesh that comes after (t = `after`, `row`), ordered by t and then by
+    row, so that none is skipped where several have the same t."""
+    found, _ = _walk(shapes, bvh, root, ray, after, row, False)
+    return found
+
+
+@kernel
+def winding(shapes: Shapes, bvh: Bvh, root: int, ray: Ray) -> int:
+    """The winding number of a closed mesh about the ray's origin: 0 outside, 1 inside."""
+    _, total = _walk(shapes, bvh, root, ray, 0.0, -1, True)
+    return -total
+
+
+@kernel
+def _walk(
+    shapes: Shapes, bvh: Bvh, root: int, ray: Ray, after: float, row: int, total: bool
+) -> tuple[Step, int]:
+    """(the next crossing, with `total` the sum of the signs of all crossings at t > 0)."""
+    found, balance = Step(math.inf, -1, 0.0, 0.0, 0), 0
+    stack, waiting = local_integers(WIDE_STACK), local_floats(WIDE_STACK)
+    distances = local_floats(VECTOR_WIDTH)
+    slab_ray, shear = slab_ray_of(bvh, root, ray), shear_of(ray)
+    node, top = root, 0
+    while True:
+        while node >= 0:
+            met = enter(bvh, node, slab_ray, math.inf if total else found.t, distances)
+            if met == 0:
+                node = NOTHING
+            else:
+                node, top = nearest_child(bvh, node, met, distances, stack, waiting, top)
+        begin = first_of(node)
+        for k in range(begin, begin + size_of(node)):
+            i = row_of(bvh, k)
+            t, u, v = any_shape.intersect(shapes, TRIANGLE, i, ray, shear)
+            if t < math.inf and (t > after or (t == after and i > row)):
+                if t < found.t or (t == found.t and i < found.row):
+                    found = Step(t, i, u, v, any_shape.enters(shapes, TRIANGLE, i, shear))
+                if total:
+                    balance += any_shape.enters(shapes, TRIANGLE, i, shear)
+        if top == 0:
+            return found, balance
+        top -= 1
+        node = stack[top]
+
+
+# ---- solids --------------------------------------------------------------------------------------
 
 CROSSINGS = 4
 """The most crossings of an operand that is not a mesh: the ends of its `Spans`."""
