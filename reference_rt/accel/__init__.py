@@ -67,11 +67,11 @@ Why all ways find the same bits:
    and accepts only a smaller t.
 4. Any-hit queries return only whether there is a hit.
 
-Tests, all bit for bit: `test_ray_simd` (brute force), `test_streams`, `test_packets`, `test_bvh`
-and `test_properties_of_rays` (every kind of BVH and none).
+Tests, all bit for bit: `test_ways` (every way, every kind of BVH and none) and
+`test_properties_of_rays`.
 
 To add a way: a branch in `block_query` or `array_query`, leaves by `leaf.nearest_of_leaf`, and a
-test against `geometry.closest_hit`.
+line in `same_by_every_way` of `test_ways`.
 """
 
 # Operations are numbered as they are defined, and cached kernels contain the numbers: whatever is

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import pytest
-import reference_rt.rendering.prepared
 from suite_runs import run_in, scenes
 from typer.testing import CliRunner
 
 import comparisons.commands.register
 import comparisons.experiments.convergence.methods
 import comparisons.mitsuba.backend
+import reference_rt.rendering.executor
 import reference_rt.scene.build
 from reference_rt.cli.main import app
 
@@ -122,7 +122,7 @@ def idle(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
     for module, name in (
         (reference_rt.scene.build, "build_tables"),
-        (reference_rt.rendering.prepared, "build_tables"),
+        (reference_rt.rendering.executor, "build_tables"),
         (comparisons.mitsuba.backend, "mitsuba"),
         (subprocess, "Popen"),
         (subprocess, "run"),

@@ -20,7 +20,7 @@ from reference_rt.materials.bsdfs.tables import by_code as bsdfs
 from reference_rt.materials.nested.flattened import FlattenedMaterials, flattened_materials
 from reference_rt.rendering import kernels
 from reference_rt.rendering.accumulation import radiance_job
-from reference_rt.rendering.kernels import Linked
+from reference_rt.rendering.kernels import Linked, operation_of
 from reference_rt.rendering.query import tracing
 from reference_rt.rendering.query.hits import solid_crossings
 from reference_rt.rendering.query.light import direct_light
@@ -29,7 +29,6 @@ from reference_rt.rendering.tiles import GivenRays
 from reference_rt.rendering.warm_up import (
     cost,
     linked_calls,
-    operation_of,
     picture_calls,
     query_calls,
     specialised_calls,

@@ -35,40 +35,24 @@ def fov(degrees, camera="perspective"):
 MISTAKES = {
     "no camera": (BALL + SKY, "", "no camera"),
     "fov": (fov(0.87) + BALL + SKY, "camera.fov", "expected 49.85"),
-    "fov of a lens": (
-        "camera: {type: thin_lens, aperture_radius: 0.1, fov: 1.2}\n" + BALL + SKY,
-        "camera.fov",
-        "expected 68.75",
-    ),
+    "fov of a lens": ("camera: {type: thin_lens, aperture_radius: 0.1, fov: 1.2}\n" + BALL + SKY,
+     "camera.fov", "expected 68.75"),
     "spot": (CAMERA + BALL + spot(0.35), "lights[0].cutoff_angle", "expected 20.05"),
     "turn": (CAMERA + turned(1.5708) + SKY, "shapes[0].transform[0].rotate.degrees", "90"),
-    "turns in a group": (
-        CAMERA + BALL + SKY + "groups: {g: [{type: union, of: [{type: sphere, transform: "
-        "[{rotate: {axis: [0, 1, 0], degrees: 0.5236}}]}]}]}\n",
-        "groups.g[0].of[0].transform[0].rotate.degrees",
-        "expected degrees, here 30",
-    ),
+    "turns in a group": (CAMERA + BALL + SKY + "groups: {g: [{type: union, of: [{type: sphere, "
+     "transform: [{rotate: {axis: [0, 1, 0], degrees: 0.5236}}]}]}]}\n",
+     "groups.g[0].of[0].transform[0].rotate.degrees", "expected degrees, here 30"),
     "no lights": (CAMERA + BALL, "", "no lights and no emissive materials"),
     "no lights, whitted": (CAMERA + BALL + WHITTED, "", "integrator 'ray_cast'"),
     "a lamp that no shape has": (CAMERA + BALL + LAMP, "", "emissive material 'lamp'"),
-    "a dark light": (
-        CAMERA + BALL + "lights: [{type: point, position: [0, 9, 0], intensity: 0}]\n",
-        "lights",
-        "intensity 0",
-    ),
-    "a dark lamp": (
-        CAMERA + "materials: {lamp: {type: emissive, radiance: 0}}\n"
-        "shapes: [{type: sphere, material: lamp}]\n",
-        "",
-        "radiance",
-    ),
-    "ambient light without whitted": (
-        CAMERA + BALL + "lights: [{type: ambient, radiance: 1}]\n",
-        "lights",
-        "ambient light",
-    ),
+    "a dark light": (CAMERA + BALL + "lights: [{type: point, position: [0, 9, 0], intensity: 0}]\n",
+     "lights", "intensity 0"),
+    "a dark lamp": (CAMERA + "materials: {lamp: {type: emissive, radiance: 0}}\n"
+     "shapes: [{type: sphere, material: lamp}]\n", "", "radiance"),
+    "ambient light without whitted": (CAMERA + BALL + "lights: [{type: ambient, radiance: 1}]\n",
+     "lights", "ambient light"),
     "no shapes": (CAMERA + CAST, "", "no shapes"),
-}
+}  # fmt: skip
 
 MEANT = {
     "ray casting needs no light": CAMERA + BALL + CAST,
@@ -93,24 +77,23 @@ def found(text):
     return likely_mistakes(scene, rt.build_tables(scene)), scene
 
 
-@pytest.mark.parametrize("name", MISTAKES)
-def test_named(name):
-    text, keys, words = MISTAKES[name]
-    (mistake,), scene = found(text)
-    assert words in mistake.message
-    error = scene.error(mistake.message, *mistake.path)
-    assert str(error).startswith(f"<scene>:{error.line}: {keys}".rstrip())
+def test_named():
+    for name, (text, keys, words) in MISTAKES.items():
+        (mistake,), scene = found(text)
+        assert words in mistake.message, name
+        error = scene.error(mistake.message, *mistake.path)
+        assert str(error).startswith(f"<scene>:{error.line}: {keys}".rstrip()), name
 
 
-@pytest.mark.parametrize("name", MEANT)
-def test_not_named(name):
-    assert found(MEANT[name])[0] == []
+def test_not_named():
+    for name, text in MEANT.items():
+        assert found(text)[0] == [], name
 
 
-@pytest.mark.parametrize("file", sorted(SCENES.glob("*.yaml")), ids=lambda p: p.stem)
-def test_scenes_of_the_project_have_none(file):
-    scene = rt.Scene.load(file)
-    assert likely_mistakes(scene, rt.build_tables(scene)) == []
+def test_scenes_of_the_project_have_none():
+    for file in SCENES.glob("*.yaml"):
+        scene = rt.Scene.load(file)
+        assert likely_mistakes(scene, rt.build_tables(scene)) == [], file
 
 
 def test_a_scene_of_python_has_the_default_camera():
