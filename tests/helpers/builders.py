@@ -125,10 +125,28 @@ def cube(n: int) -> tuple[FloatArray, IntArray]:
 
 def icosphere(subdivisions: int) -> tuple[FloatArray, IntArray]:
     """A closed ball of 20 * 4^subdivisions triangles about the origin, radius 1, facing out."""
-    from trimesh.creation import icosphere as make
+    t = (1.0 + 5.0**0.5) / 2.0
+    pairs = ((-1.0, t), (1.0, t), (-1.0, -t), (1.0, -t))
+    corners = [np.roll((x, y, 0.0), axis) for axis in range(3) for x, y in pairs]
+    v = np.array(corners) / np.linalg.norm((1.0, t))
+    f = np.array(ICOSAHEDRON).reshape(-1, 3)
+    for _ in range(subdivisions):
+        edges = np.sort(f[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        found, inverse = np.unique(edges[:, ::-1], axis=0, return_inverse=True)
+        (a, b, c), (ab, bc, ca) = f.T, inverse.reshape(-1, 3).T + len(v)
+        f = np.stack([a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca], axis=1).reshape(-1, 3)
+        v = np.concatenate([v, v[found[:, ::-1]].mean(axis=1)])
+        scale = np.sqrt((v**2).sum(axis=1, keepdims=True))
+        v += v / scale * (1.0 - scale)
+    return v, f
 
-    mesh = make(subdivisions=subdivisions)
-    return np.array(mesh.vertices), np.array(mesh.faces)
+
+ICOSAHEDRON = (
+    *(0, 11, 5, 0, 5, 1, 0, 1, 7, 0, 7, 10, 0, 10, 11, 1, 5, 9, 5, 11, 4, 11, 10, 2, 10, 7, 6),
+    *(7, 1, 8, 3, 9, 4, 3, 4, 2, 3, 2, 6, 3, 6, 8, 3, 8, 9, 4, 9, 5, 2, 4, 11, 6, 2, 10),
+    *(8, 6, 7, 9, 8, 1),
+)
+"""Vertices of its faces."""
 
 
 PETAL = """\

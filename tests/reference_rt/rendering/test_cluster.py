@@ -30,18 +30,16 @@ def machines(tmp_path):
     found.end()
 
 
-class Small(Remote):
+@pytest.fixture
+def small_units(monkeypatch):
     """Units so small that there are many."""
+    monkeypatch.setattr(Remote, "size", 1 << 14)
 
-    size = 1 << 14
 
-
-def rendered(scene, address, watch=lambda: None):
-    def workers(remote):
-        return Small(remote, Cluster(address))
-
-    with Session(scene, workers=workers) as session:
-        session.run(lambda what, fraction: None, watch)
+def rendered(scene, address, watch=lambda fraction: None):
+    """watch: called now and then with the fraction that is done."""
+    with Session(scene, workers=lambda: Cluster(address)) as session:
+        session.run(lambda what, fraction: watch(fraction))
         return session.picture()
 
 
@@ -51,38 +49,41 @@ def box():
     return scene.changed(film=scene.film.model_copy(update={"width": 64, "height": 64}))
 
 
-def test_workers_that_die(machines, box):
+@pytest.mark.slow
+def test_workers_that_die(machines, box, small_units):
     """Two of three, one of them replaced."""
     for _ in range(3):
         machines.start_worker()
-    times = []
+    killed = []
 
-    def watch():
-        times.append(time.monotonic())
-        if len(times) in (15, 30):
-            machines.workers[len(times) // 15 - 1].send_signal(signal.SIGKILL)
-            if len(times) == 30:
+    def watch(fraction):
+        if len(killed) < 2 and fraction > (0.1, 0.4)[len(killed)]:
+            killed.append(machines.workers[len(killed)])
+            killed[-1].send_signal(signal.SIGKILL)
+            if len(killed) == 2:
                 machines.start_worker()
 
     assert same(rendered(box, machines.address, watch), rt.render(box))
+    assert len(killed) == 2
 
 
-def test_a_scheduler_that_restarts(machines, box):
+@pytest.mark.slow
+def test_a_scheduler_that_restarts(machines, box, small_units):
     """With its workers, as a batch system does it."""
     machines.start_worker()
-    scene, times = box.changed(sampler=rt.Sobol(spp=2000)), []
+    restarted = []
 
-    def watch():
-        times.append(time.monotonic())
-        if len(times) == 40:
+    def watch(fraction):
+        if fraction > 0.2 and not restarted:
+            restarted.append(fraction)
             machines.scheduler.kill()
             machines.scheduler.wait()
             machines.workers[0].kill()
             machines.start_scheduler()
             machines.start_worker()
 
-    assert same(rendered(scene, machines.address, watch), rt.render(scene))
-    assert len(times) > 40
+    assert same(rendered(box, machines.address, watch), rt.render(box))
+    assert restarted
 
 
 @pytest.fixture
@@ -104,6 +105,7 @@ def error_of(future):
         return error
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
 @pytest.mark.parametrize("is_forgotten", [False, True])
 def test_what_a_scheduler_took_along_ends(machines, cluster, number, is_forgotten):
@@ -122,6 +124,7 @@ def test_what_a_scheduler_took_along_ends(machines, cluster, number, is_forgotte
     assert cluster.threads == 1
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("is_alive", [True, False])
 @pytest.mark.parametrize("is_forgotten", [False, True])
 @pytest.mark.parametrize("how", ["stop", "close"])
@@ -227,7 +230,7 @@ def test_no_scheduler(box, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_worker_killed_every_five_seconds_for_a_minute(machines, box):
+def test_a_worker_killed_every_five_seconds_for_a_minute(machines, box, small_units):
     """Of four; each is replaced; the scheduler is restarted once."""
     for _ in range(4):
         machines.start_worker()
@@ -235,7 +238,7 @@ def test_a_worker_killed_every_five_seconds_for_a_minute(machines, box):
     began = last = time.monotonic()
     killed, restarted = [], []
 
-    def watch():
+    def watch(fraction):
         nonlocal last
         now = time.monotonic()
         if now - last < 5.0 or now - began > 65.0:
@@ -307,7 +310,7 @@ def test_jobs_of_slurm(tmp_path, box, monkeypatch):
         f"walltime: '01:00:00'\ninterface: lo\npython: {sys.executable}\n"
         f"local_directory: {tmp_path}\n"
     )
-    with Session(box, workers=lambda remote: Remote(remote, Cluster(file=file))) as session:
+    with Session(box, workers=lambda: Cluster(file=file)) as session:
         session.run(lambda what, fraction: None)
         assert same(session.picture(), rt.render(box))
     assert "#SBATCH -p long" in log.read_text()

@@ -49,7 +49,7 @@ def end_at(fraction):
     return say
 
 
-@pytest.mark.parametrize("name", ["cornell_box", "spheres_whitted", "many_lights", "mesh_knot"])
+@pytest.mark.parametrize("name", ["cornell_box", "spheres_whitted", "many_lights"])
 def test_passes_change_no_bit(name):
     """A render that may end early computes the same as one that may not."""
     scene = small(name)
@@ -115,30 +115,31 @@ def test_damaged_files_are_computed_again(box, whole, tmp_path):
 
 
 def test_a_partial_picture_says_so(box, tmp_path):
-    with Session(box.changed(sampler=rt.Sobol(spp=10**6)), limits=Limits(seconds=4.0)) as session:
-        session.run(silent)
+    with Session(box.changed(sampler=rt.Sobol(spp=10**6)), limits=Limits(1e9)) as session:
+        with pytest.raises(Ended):
+            session.run(end_at(40e-6))  # passes of 16 samples
         session.save(tmp_path / "out.exr")
         taken = session.taken
         picture = session.picture()
-    assert 0 < taken.fewest <= taken.most < 10**6
+    assert 16 <= taken.fewest <= taken.most < 10**6
     _, header = read_exr(tmp_path / "out.exr")
     assert header["partial"] == taken.partial
     assert str(10**6) in taken.partial
     assert picture.taken == taken
     # Each pixel is the mean of its own samples: those of a whole picture of so many.
-    others = {n: rt.render(box, spp=n).colour for n in {taken.fewest, taken.most} if n > 1}
-    same_as_one = [(picture.colour == other).all(axis=-1) for other in others.values()]
-    if taken.most - taken.fewest < 300:  # of one or two passes
-        assert np.logical_or.reduce(same_as_one).all()
+    counts = np.unique(session.frame.samples())
+    others = [rt.render(box, spp=int(n)).colour for n in counts]
+    same_as_one = [(picture.colour == other).all(axis=-1) for other in others]
+    assert np.logical_or.reduce(same_as_one).all()
 
 
 # ---- memory -------------------------------------------------------------------------------------
 
 
 def test_bands_on_disk_change_no_bit(tmp_path, monkeypatch):
-    """Four bands of which two are in memory; all layers; written some rows at a time."""
-    scene = sized(small("cornell_box"), width=700, height=700, layers=LAYERS)
-    scene = scene.changed(sampler=rt.Sobol(spp=2))
+    """Three bands of which two are in memory; all layers; written some rows at a time."""
+    scene = sized(small("cornell_box"), width=600, height=600, layers=LAYERS)
+    scene = scene.changed(sampler=rt.Sobol(spp=2), integrator=rt.Path(max_depth=2))
     monkeypatch.setattr(
         "reference_rt.rendering.render.check_fits",
         lambda scene, widths, memory, store: memory and 2 * BAND * 8 * 17,
@@ -173,28 +174,30 @@ def test_processes_change_no_bit(box, whole):
     assert same(rt.render(box, workers=2), whole)
 
 
+@pytest.mark.slow
 def test_killed_processes_are_replaced(box, monkeypatch):
-    """One is killed whenever something was computed since the last one died, six times."""
+    """One is killed whenever something was computed since the last one died, twice."""
     monkeypatch.setattr(Remote, "size", 1 << 14)
     killed, last = [], 0.0
 
     def kill(what, fraction):
         nonlocal last
         children = multiprocessing.active_children()
-        if what == "render" and fraction > last and children and len(killed) < 6:
+        if what == "render" and fraction > last and children and len(killed) < 2:
             os.kill(children[0].pid, signal.SIGKILL)
             killed.append(children[0].pid)
             last = fraction
 
-    scene = box.changed(sampler=rt.Sobol(spp=600))
+    scene = box.changed(sampler=rt.Sobol(spp=200))
     found = rt.render(scene, workers=2, progress=kill)
     assert same(found, rt.render(scene))
-    assert len(set(killed)) > 1
+    assert len(set(killed)) == 2
 
 
 def test_processes_that_cannot_live_end_the_render(box, monkeypatch):
     monkeypatch.setattr("reference_rt.rendering.executor.compute_remotely", die)
-    with pytest.raises(WorkersError, match="died 5 times"):
+    monkeypatch.setattr("reference_rt.util.workers._MOST_DEATHS", 1)
+    with pytest.raises(WorkersError, match="died 1 times"):
         rt.render(box, workers=1)
 
 
