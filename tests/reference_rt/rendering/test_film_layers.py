@@ -3,8 +3,6 @@
 Scenes have all layers, and the same kinds of shapes and materials, so that they share kernels.
 """
 
-import importlib
-
 import numpy as np
 import pytest
 from builders import SCENES
@@ -69,18 +67,6 @@ def test_colour_is_the_same_bits_with_and_without(cornell):
     assert list(picture.layers) == ["colour", *ALL]
     assert list(plain.layers) == ["colour"]
     assert np.array_equal(picture.colour, plain.colour)
-
-
-@pytest.mark.parametrize("band", [1, 3, 50])
-def test_same_bits_for_any_threads_and_tiling(cornell, band, monkeypatch):
-    expected = rt.render(cornell, threads=1).layers
-    monkeypatch.setattr(
-        importlib.import_module("reference_rt.rendering.units"), "SAMPLES_PER_TILE", band
-    )
-    for threads in (1, 3):
-        layers = rt.render(cornell, threads=threads).layers
-        for name in expected:
-            assert np.array_equal(layers[name], expected[name]), name
 
 
 def test_a_checked_wall():

@@ -53,7 +53,7 @@ INTEGRATORS: dict[str, dict[str, Any]] = {
 }
 
 
-SOME = ("csg_nested", "textured_room")
+SOME = ("textured_room",)
 """Scenes for the quick run by all integrators."""
 
 # ---- what linking asks for ----------------------------------------------------------------------

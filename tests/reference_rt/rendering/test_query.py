@@ -9,7 +9,6 @@ from camera_checks import rays
 from query_scene import LIT
 
 import reference_rt as rt
-from reference_rt.rendering.query import tracing
 
 VIEW = """
 camera: {type: thin_lens, eye: [0.3, 0.5, 4], target: [0, 0, -1], fov: 40, aperture_radius: 0.1}
@@ -45,17 +44,17 @@ def test_a_single_ray_gives_numbers(scene):
     assert scene.crossings(O, D).count.tolist() == [3]
 
 
-@pytest.mark.parametrize("shape", [(), (5,), (4, 3), (2, 1, 3)])
-def test_rays_keep_the_shape_of_their_arrays(scene, shape):
+def test_rays_keep_the_shape_of_their_arrays(scene):
     rng = np.random.default_rng(1)
-    d = np.array(D) + 0.1 * rng.normal(size=(*shape, 3))
-    flat = d.reshape(-1, 3)
-    hits, each = scene.intersect(O, d), scene.intersect(np.tile(O, (len(flat), 1)), flat)
-    for name in NAMES:
-        assert np.shape(getattr(hits, name)) == shape + getattr(each, name).shape[1:]
-    assert_same(hits, each)
-    assert np.shape(scene.occluded(O, d)) == shape
-    assert np.shape(scene.first_hits(O, d).t) == shape
+    for shape in ((), (5,), (4, 3), (2, 1, 3)):
+        d = np.array(D) + 0.1 * rng.normal(size=(*shape, 3))
+        flat = d.reshape(-1, 3)
+        hits, each = scene.intersect(O, d), scene.intersect(np.tile(O, (len(flat), 1)), flat)
+        for name in NAMES:
+            assert np.shape(getattr(hits, name)) == shape + getattr(each, name).shape[1:]
+        assert_same(hits, each)
+        assert np.shape(scene.occluded(O, d)) == shape
+        assert np.shape(scene.first_hits(O, d).t) == shape
 
 
 def test_origins_directions_and_limits_broadcast(scene):
@@ -78,20 +77,19 @@ ARRAYS = {
 }
 
 
-@pytest.mark.parametrize("make", ARRAYS.values(), ids=ARRAYS)
-def test_any_array_of_numbers_will_do(scene, make):
-    o, d = np.array([O, O]), np.array([D, [0.0, 0.0, -1.0]])
-    # Integers, or numbers that float32 has.
-    digits = 1 if make is ARRAYS["integers"] else 64
-    o, d = (np.round(a * digits) / digits for a in (o, d))
-    hits = scene.intersect(o, d)
-    assert hits.hit.all()
-    assert_same(scene.intersect(make(o), make(d)), hits)
+def test_any_array_of_numbers_will_do(scene):
+    for name, make in ARRAYS.items():
+        digits = 1 if name == "integers" else 64  # integers, or numbers that float32 has
+        o, d = np.array([O, O]), np.array([D, [0.0, 0.0, -1.0]])
+        o, d = (np.round(a * digits) / digits for a in (o, d))
+        hits = scene.intersect(o, d)
+        assert hits.hit.all()
+        assert_same(scene.intersect(make(o), make(d)), hits)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
+def test_what_is_wrong_with_arrays_of_rays_is_reported(scene):
+    names = ("origins", "directions", "t_min", "t_max", "threads")
+    for arguments, message in (
         (([0, 0], [0, 0, 1]), r"origins: expected shape \(..., 3\), got \(2,\)"),
         ((0.0, [0, 0, 1]), "origins: expected shape"),
         (([0, 0, 1], [[0, 0, 1, 2]]), "directions: expected shape"),
@@ -105,21 +103,16 @@ def test_any_array_of_numbers_will_do(scene, make):
         (([0, 0, 1], [0, 0, 1], 0.0, np.nan), "t_max: expected numbers, got NaN"),
         (([[0, 0, 1]] * 2, [0, 0, 1], [1, 2, 3]), "broadcast to one"),
         (([0, 0, 1], [0, 0, 1], 0.0, 1.0, 0), "threads: expected 1 or more, got 0"),
-    ],
-)
-def test_what_is_wrong_with_arrays_of_rays_is_reported(scene, arguments, message):
-    asked = [scene.intersect, scene.first_hits, scene.crossings]
-    for ask in asked:
+    ):
+        for ask in (scene.intersect, scene.first_hits, scene.crossings):
+            with pytest.raises(ValueError, match=message):
+                ask(*arguments)
         with pytest.raises(ValueError, match=message):
-            ask(*arguments)
-    names = ("origins", "directions", "t_min", "t_max", "threads")
-    with pytest.raises(ValueError, match=message):
-        scene.occluded(**dict(zip(names, arguments, strict=False)))
+            scene.occluded(**dict(zip(names, arguments, strict=False)))
 
 
-@pytest.mark.parametrize(
-    ("ask", "message"),
-    [
+def test_what_is_wrong_with_other_arrays_is_reported(scene):
+    for ask, message in (
         (lambda s: s.radiance([0, 0], [0, 0, 1]), "origins: expected shape"),
         (lambda s: s.radiance(O, D, integrator=rt.RayCast(show="id")), "shows 'id'"),
         (lambda s: s.sample_lights([0, 0], [0.5] * 3), "points: expected shape"),
@@ -134,11 +127,9 @@ def test_what_is_wrong_with_arrays_of_rays_is_reported(scene, arguments, message
         (lambda s: s.bsdf("grey").sample(D, [0.5, 0.5, -0.1]), "u: expected numbers from 0"),
         (lambda s: s.camera_rays([1, 2, 3]), "pixels: expected shape"),
         (lambda s: s.camera_rays([1, 2], lens=[2.0, 0.0]), "lens: expected numbers from 0 to 1"),
-    ],
-)
-def test_what_is_wrong_with_other_arrays_is_reported(scene, ask, message):
-    with pytest.raises((ValueError, rt.SceneError), match=message):
-        ask(scene)
+    ):
+        with pytest.raises((ValueError, rt.SceneError), match=message):
+            ask(scene)
 
 
 def test_rays_that_are_none_miss(scene):
@@ -154,20 +145,14 @@ def test_rays_that_are_none_miss(scene):
     assert not scene.bsdf("grey").sample(bad, (0.5, 0.5, 0.5)).pdf.any()
 
 
-def test_neither_threads_nor_the_number_of_rays_change_anything(scene):
-    """Few rays are traced by other kernels, and first hits by others again."""
+def test_threads_change_nothing(scene):
+    """And first hits, by other kernels, are the same (see also `test_ways`)."""
     rng = np.random.default_rng(2)
     o, d = np.array(O) + rng.normal(size=(30_000, 3)), unit_vectors(rng, 30_000)
     one, two = (scene.intersect(o, d, threads=n) for n in (1, 2))
     assert_same(one, two)
     assert_same(scene.first_hits(o, d), one, NAMES[:5])
     assert np.array_equal(scene.occluded(o, d), one.hit)
-    rng = np.random.default_rng(7)
-    o, d = np.array(O) + rng.normal(size=(tracing.FEW + 1, 3)), D + 0.1 * rng.normal(size=(1, 3))
-    many, few = scene.intersect(o, d), scene.intersect(o[:-1], d)
-    assert 0.1 < many.hit.mean() < 0.99
-    for name in NAMES:
-        assert getattr(many, name)[:-1].tobytes() == getattr(few, name).tobytes(), name
 
 
 # ---- the camera and radiance ------------------------------------------------------------------
@@ -271,3 +256,64 @@ def test_a_mirror_is_sampled_and_not_evaluated(scene):
     assert drawn.pdf == 1.0
     assert not bsdf.evaluate(wo, drawn.wi).any()
     assert bsdf.pdf(wo, drawn.wi) == 0.0
+
+
+# ---- lights -----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def lit():
+    return rt.Scene.parse(LIT)
+
+
+def test_light_numbers_say_what_they_are_of(lit):
+    found = lit.light_sources()
+    assert found.shape.tolist() == [2, -1, -1, -1]
+    assert found.light.tolist() == [-1, 3, 2, 1]  # areas, points, directions, the environment
+    assert found.probability.sum() == pytest.approx(1.0)
+
+
+def test_samples_of_lights_are_where_they_say(lit):
+    rng = np.random.default_rng(5)
+    p, u = np.array([0.5, 1.0, 2.0]), rng.uniform(size=(4000, 3))
+    found, sources = lit.sample_lights(p, u), lit.light_sources()
+    there = found.pdf > 0.0
+    for k in range(4):
+        mine = found.light == k
+        share = (mine | ~there).mean() if k == 0 else mine.mean()
+        assert share == pytest.approx(sources.probability[k], abs=5 * 0.5 / math.sqrt(4000))
+        one = np.flatnonzero(mine)[0]
+        assert bool(found.is_delta[one]) == (k in (1, 2))
+    chance = sources.probability[np.maximum(found.light, 0)]
+    points = found.light == 1
+    r = np.array([2.0, 3.0, 3.0]) - p
+    np.testing.assert_allclose(
+        found.radiance[points], np.tile([9.0, 8.0, 7.0] / (r @ r), (points.sum(), 1)), rtol=8 * U
+    )
+    np.testing.assert_allclose(found.pdf[points], chance[points], rtol=4 * U)
+    sun = found.light == 2
+    np.testing.assert_allclose(found.wi[sun], np.tile([0, 0.5**0.5, 0.5**0.5], (sun.sum(), 1)))
+    assert np.isinf(found.distance[sun]).all()
+    # What `light_pdf` says of directions that nothing stands in the way of.
+    soft = there & ~found.is_delta
+    free = soft & ~lit.occluded(p, found.target - p, t_max=1.0) | (found.light == 3)
+    hits = lit.intersect(p, found.wi)
+    free &= np.where(found.light == 0, hits.shape == 2, ~hits.hit)
+    assert free.sum() > 1000
+    pdf = lit.light_pdf(p, found.wi[free])
+    np.testing.assert_allclose(pdf, found.pdf[free], rtol=1e-12)
+
+
+def test_light_densities_integrate_to_their_chance(lit):
+    """Over all directions from a point in the open, where the lamp and the sky are all there is."""
+    lit = lit.changed(shapes=lit.shapes[2:])
+    rng = np.random.default_rng(6)
+    n = 400_000
+    pdf = lit.light_pdf((-1.0, 0.3, 1.5), unit_vectors(rng, n))
+    sources = lit.light_sources()
+    soft = sources.probability[[0, 3]].sum()
+    # The lamp covers some of the sky, whose density is missing there.
+    sky = sources.probability[3] / (4 * math.pi)
+    covered = np.mean(lit.first_hits((-1.0, 0.3, 1.5), unit_vectors(rng, n)).hit) * 4 * math.pi
+    mean, error = 4 * math.pi * pdf.mean(), 4 * math.pi * pdf.std() / math.sqrt(n)
+    assert mean == pytest.approx(soft - sky * covered, abs=5 * error)

@@ -9,8 +9,10 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from builders import SCENES
+from small_scenes import LAYERS, same
 
 import reference_rt as rt
+from reference_rt.rendering import units
 from reference_rt.rendering.render import render
 
 FILM = rt.Film(width=40, height=23)
@@ -25,12 +27,12 @@ def cornell():
 
 @pytest.mark.parametrize("band", [1, 7, 64, 10**9])
 def test_same_bits_for_any_threads_and_tiling(cornell, band, monkeypatch):
-    expected = render(cornell, threads=1).colour
-    monkeypatch.setattr(
-        importlib.import_module("reference_rt.rendering.units"), "SAMPLES_PER_TILE", band
-    )
+    """In every layer."""
+    cornell = cornell.changed(film=FILM.model_copy(update={"layers": LAYERS}))
+    expected = render(cornell, threads=1)
+    monkeypatch.setattr(units, "SAMPLES_PER_TILE", band)
     for threads in (1, 2, 3):
-        assert np.array_equal(render(cornell, threads=threads).colour, expected)
+        assert same(render(cornell, threads=threads), expected)
 
 
 def test_seeds_differ(cornell):
@@ -69,7 +71,7 @@ def test_an_error_in_progress_stops_the_render(cornell):
 
 def test_an_interrupt_while_bands_are_handed_out(monkeypatch):
     """Of the hundred bands that wait by then, a sleeping thread must not go on to do them all."""
-    module = importlib.import_module("reference_rt.rendering.units")
+    module = importlib.import_module("reference_rt.rendering.query.radiance")
     ran = []
 
     class Pool(ThreadPoolExecutor):
@@ -78,13 +80,13 @@ def test_an_interrupt_while_bands_are_handed_out(monkeypatch):
                 raise KeyboardInterrupt
             return super().submit(run, begin, end)
 
-    def band(begin, end):
+    def band(begin, end, *samples):
         time.sleep(0.02)
         ran.append(begin)
 
     monkeypatch.setattr(module, "ThreadPoolExecutor", Pool)
     with pytest.raises(KeyboardInterrupt):
-        module.run_tiles(band, (), 1000, module.SAMPLES_PER_TILE, 1, lambda what, fraction: None)
+        module.run_tiles(band, 1000, units.SAMPLES_PER_TILE, 1)
     assert len(ran) < 50
 
 

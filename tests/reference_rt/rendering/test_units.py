@@ -1,9 +1,8 @@
 """Units: every sample of every pixel once, in order, whatever was done before."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -44,26 +43,25 @@ def test_every_sample_once(pixels, spp, size, seed, least):
         assert unit.samples <= max(size, chunk * (unit.last - unit.first))
 
 
-@pytest.mark.parametrize("pixels", [1, 63, 64, 65, 4096, 65536, 65537, 1 << 20, 1 << 26, 1 << 30])
-def test_chunks_divide_bands_and_are_many(pixels):
-    chunk = chunk_of(pixels)
-    assert BAND % chunk == 0
-    assert chunk == 64 or pixels // chunk >= 512
+def test_chunks_divide_bands_and_are_many():
+    for pixels in (1, 63, 64, 65, 4096, 65536, 65537, 1 << 20, 1 << 26, 1 << 30):
+        chunk = chunk_of(pixels)
+        assert BAND % chunk == 0
+        assert chunk == 64 or pixels // chunk >= 512
 
 
-@pytest.mark.parametrize("chunk", [64, 2048])
-@pytest.mark.parametrize("spp", [1, 15, 16, 17, 64, 1000, 1 << 17])
-def test_passes(spp, chunk):
+def test_passes():
     """They end at multiples of 16, so that limits do not divide what the sampler computes at once;
     none takes long."""
-    ends = list(passes(spp, chunk))
-    assert ends[-1] == spp
-    assert all(end % 16 == 0 for end in ends[:-1])
-    steps = [b - a for a, b in pairwise([0, *ends])]
-    assert min(steps) > 0
-    assert max(steps) * chunk <= max(16 * chunk, 1 << 21)
-    # A quarter more, so that pixels of two passes have nearly the same noise.
-    assert all(b - a <= max(16, a // 4) for a, b in pairwise(ends))
+    for spp, chunk in product((1, 15, 16, 17, 64, 1000, 1 << 17), (64, 2048)):
+        ends = list(passes(spp, chunk))
+        assert ends[-1] == spp
+        assert all(end % 16 == 0 for end in ends[:-1])
+        steps = [b - a for a, b in pairwise([0, *ends])]
+        assert min(steps) > 0
+        assert max(steps) * chunk <= max(16 * chunk, 1 << 21)
+        # A quarter more, so that pixels of two passes have nearly the same noise.
+        assert all(b - a <= max(16, a // 4) for a, b in pairwise(ends))
 
 
 def test_passes_do_not_depend_on_the_end():

@@ -53,10 +53,12 @@ def described(calls):
     return {(kernel.py_func.__code__.co_filename, kernel.__name__, str(s)) for kernel, s in calls}
 
 
+@pytest.mark.cases(40)
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_every_scene(file, known):
-    """By its own integrator, and by all others that may render it."""
+    """Its queries, and its pictures by its own integrator and by all others that may render it."""
     scene = rt.Scene.load(file)
+    assert described(set(query_calls(scene)) - set(known)) == set()
     assert described(set(picture_calls(scene)) - set(known)) == set()
     assert len(picture_calls(scene)) > 3
     film = rt.Film(layers=("albedo", "normal", "depth", "id", "variance"))
@@ -70,47 +72,32 @@ def test_every_scene(file, known):
         assert described(set(calls) - set(known)) == set()
 
 
-@pytest.mark.parametrize("write", [every_shape, every_law, every_light])
-def test_what_the_tests_have_for_every_type(write, known, tmp_path):
-    scene = rt.Scene.load(write(tmp_path))
-    assert described(set(picture_calls(scene)) - set(known)) == set()
+def test_what_the_tests_have_for_every_type(known, tmp_path):
+    for write in (every_shape, every_law, every_light):
+        scene = rt.Scene.load(write(tmp_path))
+        assert described(set(picture_calls(scene)) - set(known)) == set()
 
 
-@pytest.mark.parametrize("integrator", [rt.Path(), rt.Direct(), rt.Whitted()])
-def test_radiance_along_given_rays(integrator, known):
+def test_radiance_along_given_rays(known):
     """By the same drivers: the rays are in the place of the camera's."""
-    tables = rt.Scene(shapes=(rt.Sphere(),), integrator=integrator).tables
     rays = GivenRays(np.zeros((4, 3)), np.ones((4, 3)))
-    job = radiance_job(integrator.setup(), rt.Independent(spp=2), (4, 1), has_variance=True)
-    assert described(set(Linked([job], tables, rays, None).calls) - set(known)) == set()
+    for integrator in INTEGRATORS_OF[:3]:
+        tables = rt.Scene(shapes=(rt.Sphere(),), integrator=integrator).tables
+        job = radiance_job(integrator.setup(), rt.Independent(spp=2), (4, 1), has_variance=True)
+        assert described(set(Linked([job], tables, rays, None).calls) - set(known)) == set()
 
 
-@pytest.mark.parametrize(
-    "group",
-    [
-        shapes.operations,
-        bsdfs.operations,
-        lights.operations,
-        geometries.operations,
-        flattened_materials.operations,
-        light_trees.operations,
-        textures_operations,
-        views.operations,
-        film_filters.operations,
-    ],
-    ids=lambda group: next(iter(group)),
-)
-def test_every_type_of_every_operation(group, known):
+def test_every_type_of_every_operation(known):
     """A type that is added to a group must be added to a scene of the warm-up, too."""
     compiled = {kernel for kernel, _ in known}
-    for operation in group.values():
-        needed = {operation.call_for(code, numba.types.int64)[0] for code in operation.rows}
-        assert needed <= compiled
-
-
-@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
-def test_queries_of_every_scene(file, known):
-    assert described(set(query_calls(rt.Scene.load(file))) - set(known)) == set()
+    for group in (
+        *(shapes.operations, bsdfs.operations, lights.operations, geometries.operations),
+        *(flattened_materials.operations, light_trees.operations, textures_operations),
+        *(views.operations, film_filters.operations),
+    ):
+        for name, operation in group.items():
+            needed = {operation.call_for(code, numba.types.int64)[0] for code in operation.rows}
+            assert needed <= compiled, name
 
 
 SOLID = """
@@ -122,14 +109,11 @@ lights: [{type: constant, radiance: 1}]
 """
 
 
-@pytest.mark.parametrize("solids", [False, True])
-def test_operations_on_solids_are_compiled_where_there_are_some(solids):
+def test_operations_on_solids_are_compiled_where_there_are_some():
     """They do not compile for a geometry without, and `warm-up` would fail."""
-    text = (
-        SOLID if solids else "shapes: [{type: rectangle}]\nlights: [{type: constant, radiance: 1}]"
-    )
-    names = {kernel.__name__ for kernel, _ in query_calls(rt.Scene.parse(text))}
-    assert any(name.startswith("crossings_of_solid") for name in names) == solids
+    for text, solids in ((SOLID, True), ("shapes: [{type: rectangle}]", False)):
+        names = {kernel.__name__ for kernel, _ in query_calls(rt.Scene.parse(text))}
+        assert any(name.startswith("crossings_of_solid") for name in names) == solids
 
 
 def test_queries_call_these_kernels():
@@ -189,11 +173,11 @@ def subsets(names):
     return {c for n in range(len(names) + 1) for c in itertools.combinations(names, n)}
 
 
-@pytest.mark.parametrize("table", [Triangles, FlattenedMaterials, Textures])
-def test_every_combination_of_optional_columns(table, known):
-    # A scene without textures has no such table.
-    nothing = {()} if table is Textures else set()
-    assert present(table, known) == subsets(optional(table)) - nothing
+def test_every_combination_of_optional_columns(known):
+    for table in (Triangles, FlattenedMaterials, Textures):
+        # A scene without textures has no such table.
+        nothing = {()} if table is Textures else set()
+        assert present(table, known) == subsets(optional(table)) - nothing
 
 
 def test_every_combination_of_geometry(known):
