@@ -138,7 +138,7 @@ def test_cost_is_that_of_random_lines(method):
     nodes, _ = build(slivers(60, 0.3), method)
     low, high = nodes.boxes[:, :3], nodes.boxes[:, 3:]
     middle, radius = 0.5 * (low[0] + high[0]), 0.5 * np.linalg.norm(high[0] - low[0])
-    count = 60_000
+    count = 20_000
     d = unit_vectors(rng, count)
     across = np.cross(d, unit_vectors(rng, count))
     across /= np.linalg.norm(across, axis=1, keepdims=True)

@@ -105,7 +105,7 @@ def error_of(future):
         return error
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
 @pytest.mark.parametrize("is_forgotten", [False, True])
 def test_what_a_scheduler_took_along_ends(machines, cluster, number, is_forgotten):
@@ -124,7 +124,7 @@ def test_what_a_scheduler_took_along_ends(machines, cluster, number, is_forgotte
     assert cluster.threads == 1
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("is_alive", [True, False])
 @pytest.mark.parametrize("is_forgotten", [False, True])
 @pytest.mark.parametrize("how", ["stop", "close"])
@@ -142,6 +142,7 @@ def test_all_ends_with_stop(machines, cluster, is_alive, is_forgotten, how):
     assert {type(error_of(future)) for future in futures} == {CancelledError}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("give_up", ["stop", "cancel"])
 def test_what_is_given_up_leaves_its_worker(cluster, machines, give_up):
     """What had not begun never runs."""
@@ -159,6 +160,7 @@ def test_what_is_given_up_leaves_its_worker(cluster, machines, give_up):
     assert not begun.exists()
 
 
+@pytest.mark.slow
 def test_stopped_while_it_waits_for_a_scheduler(machines, cluster):
     """Of a batch system, which may let it wait for days."""
     machines.scheduler.kill()
@@ -171,6 +173,7 @@ def test_stopped_while_it_waits_for_a_scheduler(machines, cluster):
     assert isinstance(error_of(given), CancelledError)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="no SIGSTOP")
 def test_a_scheduler_that_does_not_answer(machines, cluster, monkeypatch):
     """Nor does it end, as if its machine were too busy."""

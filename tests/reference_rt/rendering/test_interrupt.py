@@ -9,13 +9,13 @@ import sys
 import numpy as np
 import pytest
 from builders import SCENES
+from typer.testing import CliRunner
 
 import reference_rt as rt
+from reference_rt.cli.main import app
 from reference_rt.core.exr import read_exr
 
 SPP = 100000
-
-PROGRAM = [sys.executable, "-c", "from reference_rt.cli.main import main; main()"]
 
 
 def start(folder, *extra):
@@ -43,6 +43,7 @@ def start(folder, *extra):
     return process
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c(number, tmp_path):
     """The picture so far, which says so in its header."""
@@ -65,6 +66,7 @@ def test_ctrl_c(number, tmp_path):
     assert found.mean() == pytest.approx(whole.mean(), rel=0.05)
 
 
+@pytest.mark.slow
 def test_kill(tmp_path):
     """Nothing is at the output's place, and what was there before stays."""
     old = tmp_path / "out.exr"
@@ -80,8 +82,8 @@ def test_progress_without_a_terminal_is_lines(tmp_path):
     """No control characters, no carriage returns."""
     arguments = ["render", str(SCENES / "spheres_whitted.yaml"), "-o", str(tmp_path / "out.png"),
                  "--size", "32x20"]  # fmt: skip
-    done = subprocess.run([*PROGRAM, *arguments], capture_output=True, text=True, check=True)
-    assert done.stdout == ""
+    done = CliRunner().invoke(app, arguments)
+    assert (done.exit_code, done.stdout) == (0, "")
     assert done.stderr.splitlines()[-1].startswith(f"{tmp_path}/out.png: 32 x 20, ")
     assert "\x1b" not in done.stderr
     assert "\r" not in done.stderr

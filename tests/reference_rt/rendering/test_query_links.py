@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from unittest import mock
 
 import numpy as np
+import pytest
 from builders import SCENES, cube, same_in_plain_python, unit_vectors, write_obj
 from crossing_forms import GROUPS, kinds, tilted
 
@@ -142,6 +143,7 @@ def write_scattered(_folder, file):
     np.savez(file, **arrays_of(found))
 
 
+@pytest.mark.slow
 def test_materials_and_lights_are_those_of_plain_python(tmp_path):
     compiled = same_in_plain_python(write_scattered, tmp_path)
     found = {name for name in compiled.files if compiled[name].any()}

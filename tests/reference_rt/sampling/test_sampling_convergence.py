@@ -78,6 +78,7 @@ likely; -3/4 in two dimensions for those with a jump along a curve (He & Wang 20
 the lamp or miss it; kinks, as at the horizon of the sky, lie between."""
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("case", BOUNDS)
 def test_sobol_falls_faster(case):
     """All pixels see the same point, so that nothing but the direction of the light is random."""
@@ -86,6 +87,7 @@ def test_sobol_falls_faster(case):
     assert slope(errors) < BOUNDS[case]
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", SCENES)
 def test_independent_samples_fall_as_the_root(name):
     """256 pixels: the logarithm of an error is known to 0.044, the slope to 0.01; five times."""
@@ -93,6 +95,7 @@ def test_independent_samples_fall_as_the_root(name):
     assert slope(errors) == pytest.approx(-0.5, abs=0.05)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", SCENES)
 def test_pixels_of_a_picture(name):
     """Of a view of the floor, over eight seeds.  What depends on the place in the pixel and on the
