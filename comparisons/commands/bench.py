@@ -32,10 +32,10 @@ def bench(
     """Measure the renderer's speed against Mitsuba's; takes about half an hour."""
     with compare_extra():
         from comparisons.experiments.bench import table
-        from comparisons.experiments.bench.display import Display
         from comparisons.experiments.bench.groups import chosen
         from comparisons.experiments.bench.run import run
         from comparisons.experiments.bench.setting import Setting
+        from comparisons.experiments.bench.table import Display
         from comparisons.report import marker_block, terminal
 
     groups = chosen(only or ())

@@ -13,7 +13,7 @@ from reference_rt.cli.guarded import guarded
 from reference_rt.util.errors import UsageError
 
 if TYPE_CHECKING:
-    from comparisons.suites.work import Changes
+    from comparisons.suites.suite import Changes
 
 
 @guarded
@@ -60,7 +60,7 @@ def compare(
         from comparisons.results.verdict import exit_code
         from comparisons.suites.display import summarise
         from comparisons.suites.run import Options, Run, run_cases
-        from comparisons.suites.work import Changes, plan_of_files
+        from comparisons.suites.suite import Changes, plan_of_files
 
     changes = Changes(
         spp=spp, size=size, seed=seed, defaults=by_name(define), allow_missing=allow_missing

@@ -70,14 +70,18 @@ def converge(
         from comparisons.experiments.convergence.curves import Curves
         from comparisons.experiments.convergence.data import Settings
         from comparisons.experiments.convergence.methods import chosen
-        from comparisons.experiments.convergence.one_scene import INVALID, curves_of
-        from comparisons.experiments.convergence.outputs import write_results, write_table
+        from comparisons.experiments.convergence.outputs import (
+            again,
+            lines_of,
+            write_results,
+            write_table,
+        )
         from comparisons.experiments.convergence.page import write_page
-        from comparisons.experiments.convergence.summary import again, lines_of
+        from comparisons.experiments.convergence.run import INVALID, curves_of
         from comparisons.results.case import INTERRUPTED
         from comparisons.runs.elsewhere import run_elsewhere
         from comparisons.runs.provenance import provenance
-        from comparisons.suites.work import Changes, folder_name
+        from comparisons.suites.suite import Changes, folder_name
     from reference_rt.cli.where import Where
     from reference_rt.util.console import ProgressLine
     from reference_rt.util.files import check_writable

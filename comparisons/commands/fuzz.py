@@ -97,7 +97,7 @@ def fuzz(
     """
     with compare_extra("fuzzing"):
         from comparisons.experiments.fuzz import summary
-        from comparisons.experiments.fuzz.effort import RUNGS, Effort, Grammar
+        from comparisons.experiments.fuzz.finding import RUNGS, Effort, Grammar
         from comparisons.experiments.fuzz.page import write_page
         from comparisons.experiments.fuzz.progress import Display
         from comparisons.experiments.fuzz.run import Plan, run

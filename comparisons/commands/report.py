@@ -26,7 +26,7 @@ def report(
     with compare_extra():
         from comparisons.report import write_report, write_results
         from comparisons.results.case import how_many
-        from comparisons.suites.stored_results import check_stored_results, read_stored_results
+        from comparisons.suites.run import check_stored_results, read_stored_results
     from reference_rt.util.files import check_writable
 
     page = out or folder / "report.html"

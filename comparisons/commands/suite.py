@@ -65,8 +65,7 @@ def suite(
         from comparisons.results.verdict import exit_code
         from comparisons.suites.display import summarise
         from comparisons.suites.run import Options, Run, run_suite
-        from comparisons.suites.suite import load_suite, plan
-        from comparisons.suites.work import Changes
+        from comparisons.suites.suite import Changes, load_suite, plan
     from reference_rt.cli.where import Where
     from reference_rt.util.files import check_writable
     from reference_rt.util.workers import Threads

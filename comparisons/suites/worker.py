@@ -23,7 +23,7 @@ from comparisons.compare.budget import Budget
 from comparisons.results.case import WARNING, Case
 from comparisons.results.stored_case import write_case
 from comparisons.runs.processes.protocol import carry_out, private_stdout, send
-from comparisons.suites.work import Changes
+from comparisons.suites.suite import Changes
 from reference_rt.cli.guarded import scene_warnings
 from reference_rt.rendering.scene import Scene
 

@@ -1,8 +1,8 @@
 """Rows of a benchmark with made-up times, for its tests."""
 
 from comparisons.experiments.bench import table
-from comparisons.experiments.bench.machine import machine
 from comparisons.experiments.bench.row import Row, against
+from comparisons.experiments.bench.run import machine
 
 FIELDS = {"name", "ours", "peer", "peer_name", "ratio", "goal", "spread", "unit", "better", "met"}
 

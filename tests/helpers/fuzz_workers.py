@@ -7,8 +7,7 @@ import sys
 import time
 
 from comparisons.experiments.fuzz import stored
-from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced
-from comparisons.experiments.fuzz.request import Request
+from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced, Request
 from comparisons.runs.processes.protocol import carry_out, private_stdout
 
 FOUND = Finding(rung="geometry", cause="ours wrong: t", detail="1 of 9 rays")

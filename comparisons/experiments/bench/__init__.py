@@ -5,5 +5,5 @@ and quartiles of rounds in which both take turns (`timing.alternate`).  Rows tha
 together are a group; `run` measures the groups that are not stored yet, `table` shows them.
 
 To add a row, write a function `measure(setting) -> list[Row]` in a file of its own and list it in
-`groups`.  `spheres_only` is the renderer specialised by hand, the peer of the row `unused`.
+`groups`.
 """

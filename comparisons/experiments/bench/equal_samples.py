@@ -7,6 +7,7 @@ from reference_rt.cameras.film import BoxFilter, Film
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Sobol
+from reference_rt.util.errors import ReferenceUnavailableError
 
 SCENE, SIZE, SPP = "cornell_box", 256, 64
 
@@ -57,3 +58,35 @@ def _row(name: str, setting: Setting) -> Row:
         goal,
         details={"seconds": times, "threads": setting.threads, "sampler": "sobol / independent"},
     )
+
+
+# The speed-up by a second thread.
+
+
+def measure_threads(setting: Setting) -> list[Row]:
+    """Samples per second of two threads against one.
+
+    Raises ReferenceUnavailableError on a machine with one core.
+    """
+    if setting.threads < 2:
+        raise ReferenceUnavailableError("two threads need two cores")
+    scene = cornell_box(setting)
+    samples = scene.film.width * scene.film.height * SPP / 1e6
+
+    def rate(threads: int) -> float:
+        return samples / seconds(lambda: render(scene, tables=scene.tables, threads=threads))
+
+    render(scene, tables=scene.tables, specialised=True)  # compile
+    rates = alternate({"2 threads": lambda: rate(2), "1 thread": lambda: rate(1)}, say=setting.say)
+    return [
+        against(
+            "threads",
+            f"{SCENE}: samples per second of two threads / of one",
+            rates["2 threads"],
+            ("one thread", rates["1 thread"]),
+            1.9,
+            unit="Msamples/s",
+            better="higher",
+            details={"rates": rates},
+        )
+    ]

@@ -7,17 +7,7 @@ from collections.abc import Callable, Sequence
 from fnmatch import fnmatchcase
 from typing import NamedTuple
 
-from comparisons.experiments.bench import (
-    equal_error,
-    equal_samples,
-    first_renders,
-    mesh_rays,
-    million,
-    program,
-    smoke,
-    threads,
-    unused,
-)
+from comparisons.experiments.bench import equal_error, equal_samples, mesh_rays, program
 from comparisons.experiments.bench.row import Row
 from comparisons.experiments.bench.setting import Setting
 from reference_rt.util.errors import UsageError
@@ -41,14 +31,12 @@ GROUPS = (
     Group(
         "mesh_rays", (*(f"rays_{kind}" for kind in mesh_rays.GOALS), "any_hit"), mesh_rays.measure
     ),
-    Group("threads", ("threads",), threads.measure),
-    Group("cold", ("cold", "cold_median"), first_renders.measure_ever),
-    Group("new_kind", ("new_kind", "new_kind_median"), first_renders.measure_new),
-    Group("warm_up", ("warm_up", "after_warm_up"), first_renders.measure_warmed),
-    Group("smoke", ("smoke",), smoke.measure),
+    Group("threads", ("threads",), equal_samples.measure_threads),
+    Group("cold", ("cold", "cold_median"), program.measure_ever),
+    Group("new_kind", ("new_kind", "new_kind_median"), program.measure_new),
+    Group("warm_up", ("warm_up", "after_warm_up"), program.measure_warmed),
+    Group("smoke", ("smoke",), program.measure_smoke),
     Group("warm", ("warm",), program.measure_warm),
-    Group("unused", ("unused",), unused.measure),
-    Group("million", ("million_build", "million_memory"), million.measure),
 )
 
 

@@ -3,10 +3,12 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rich.console import RenderableType
+from rich.console import Console, RenderableType
+from rich.progress import TimeElapsedColumn
 
 from comparisons.experiments.bench.row import LIMIT, Row
 from comparisons.report.terminal import fitted
+from reference_rt.util.console import Bar
 
 _COLUMNS = ("what", "ours", "against", "ratio", "quartiles", "goal", "met")
 
@@ -63,3 +65,37 @@ def _cells(row: Row) -> list[str]:
 def amount(value: float, unit: str) -> str:
     """A number with three significant digits, and its unit."""
     return f"{value:.0f} {unit}" if value >= 1000.0 else f"{value:.3g} {unit}"
+
+
+# Progress of a benchmark: one bar on a terminal, a line per step without one.
+
+
+class Display(Bar):
+    """Shows on standard error what is being measured, and the rows."""
+
+    def __init__(self, console: Console | None = None) -> None:
+        super().__init__(TimeElapsedColumn(), console=console)
+        self._task = self._bar.add_task("", total=1.0)
+        self._group = ""
+        self._shown: set[str] = set()
+
+    def begin(self, group: str) -> None:
+        """A group of rows begins."""
+        self._group, self._shown = group, set()
+        self._bar.reset(self._task, description=group)
+        if not self._console.is_terminal:
+            self.line(f"{group} ...")
+
+    def say(self, what: str, fraction: float) -> None:
+        """Show what is being measured, and the fraction of the group that is done."""
+        self._bar.update(self._task, description=f"{self._group}: {what}", completed=fraction)
+        if not self._console.is_terminal and what not in self._shown:
+            self._shown.add(what)
+            self.line(f"  {what}")
+
+    def done(self, rows: list[Row], note: str = "") -> None:
+        """Print measured rows."""
+        for row in rows:
+            goal = f"goal {row.goal:g}{'' if row.met else ', not met'}"
+            found = f"{row.name}: {amount(row.ours, row.unit)}, ratio {row.ratio:.3g} ({goal})"
+            self.line(found + (f", {note}" if note else ""))

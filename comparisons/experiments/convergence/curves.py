@@ -1,14 +1,144 @@
 """A scene's curves: all results of a run for it, as data."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
-from comparisons.experiments.convergence.crops import Crops
-from comparisons.experiments.convergence.data import Reference
-from comparisons.experiments.convergence.findings import Findings, Ratio, compared
-from comparisons.experiments.convergence.methods import Method
+import numpy as np
+
+from comparisons.experiments.convergence.data import Reference, Rung, weights
+from comparisons.experiments.convergence.estimates import errors, linear_time, time_to
+from comparisons.experiments.convergence.findings import Findings, Ratio, compared, points_of
+from comparisons.experiments.convergence.methods import Method, Renderer
+from comparisons.experiments.convergence.store import Store
 from reference_rt.core.arrays import FloatArray
+
+# Pictures by all methods at equal time and at equal error.
+
+
+SIDE = 4
+"""A crop is this fraction of the picture's width and height."""
+
+REPLICATE = 1 << 19
+"""Replicate number of the pictures shown, unused by the ladder and by trials."""
+
+Kind = Literal["time", "error"]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A picture (height, width, 3), its samples per pixel, seconds and relative error."""
+
+    picture: FloatArray
+    spp: int
+    seconds: float
+    error: float
+
+
+@dataclass(frozen=True)
+class Crops:
+    """Pictures by all methods, by name, at about the same time or error.
+
+    level: the intended seconds or relative error;  corner, size: left and upper edge, width and
+    height of the crop, where the errors are largest.
+    """
+
+    kind: Kind
+    level: float
+    shown: Mapping[str, Shown]
+    corner: tuple[int, int]
+    size: tuple[int, int]
+
+
+def crops_of(
+    rungs: Mapping[str, list[Rung]],
+    renderers: Mapping[str, Callable[[], Renderer]],
+    reference: Reference,
+    store: Store,
+) -> tuple[Crops, ...]:
+    """Crops at the longest time that all methods have rungs for, and at the least error that all
+    reach."""
+    if not rungs:
+        return ()
+    corner, size = worst_part(rungs, reference)
+    levels: dict[Kind, tuple[float, dict[str, int]]] = {
+        "time": _at_equal_time(rungs),
+        "error": _at_equal_error(rungs),
+    }
+    found = []
+    for kind, (level, samples) in levels.items():
+        shown = {
+            name: _shown(f"{kind}-{name}", spp, renderers[name], reference, store)
+            for name, spp in samples.items()
+        }
+        if shown:
+            found.append(Crops(kind, level, shown, corner, size))
+    return tuple(found)
+
+
+def _at_equal_time(rungs: Mapping[str, list[Rung]]) -> tuple[float, dict[str, int]]:
+    level = min(float(np.median(climbed[-1].warm)) for climbed in rungs.values())
+    samples = {}
+    for name, climbed in rungs.items():
+        spp = np.array([rung.spp for rung in climbed], dtype=np.float64)
+        seconds = np.array([np.median(rung.warm) for rung in climbed])
+        start, per_sample = linear_time(spp, seconds)
+        most = (level - start) / per_sample if per_sample > 0.0 else spp[-1]
+        samples[name] = max(1, round(min(most, spp[-1])))
+    return level, samples
+
+
+def _at_equal_error(rungs: Mapping[str, list[Rung]]) -> tuple[float, dict[str, int]]:
+    squared = max(float(climbed[-1].relmse.mean()) for climbed in rungs.values())
+    if not squared > 0.0:
+        return 0.0, {}
+    samples = {}
+    for name, climbed in rungs.items():
+        reached = time_to(points_of(climbed, "relmse"), squared)
+        if reached is not None:
+            samples[name] = max(1, round(min(reached.spp, climbed[-1].spp)))
+    return math.sqrt(squared), samples
+
+
+def _shown(
+    name: str, spp: int, renderer: Callable[[], Renderer], reference: Reference, store: Store
+) -> Shown:
+    """The stored picture, or a new one, rendered twice because the first render may compile."""
+    fact, picture = store.fact(name, spp), store.picture(name)
+    if fact is None or picture is None:
+        render = renderer()
+        render(spp, REPLICATE + 1)
+        shot = render(spp, REPLICATE)
+        picture, fact = shot.picture, [shot.spp, shot.seconds]
+        store.keep_picture(name, picture)
+        store.keep_fact(name, fact, spp)
+    picture = np.asarray(picture, np.float64)
+    relmse = errors(picture, reference)[1]
+    return Shown(picture, int(fact[0]), float(fact[1]), math.sqrt(max(relmse, 0.0)))
+
+
+def worst_part(
+    rungs: Mapping[str, list[Rung]], reference: Reference
+) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Left and upper edge, width and height of the crop in which the relative variance of the last
+    rungs is largest, summed over methods, each normalised by its mean."""
+    weight = weights(reference.mean)
+    height, width = reference.mean.shape[:2]
+    total = np.zeros((height, width))
+    for climbed in rungs.values():
+        noise = (weight * climbed[-1].variance).mean(axis=-1)
+        total += noise / (noise.mean() or 1.0)
+    size = max(1, width // SIDE), max(1, height // SIDE)
+    sums = np.pad(total, ((1, 0), (1, 0))).cumsum(axis=0).cumsum(axis=1)
+    w, h = size
+    boxes = sums[h:, w:] - sums[:-h, w:] - sums[h:, :-w] + sums[:-h, :-w]
+    y, x = divmod(int(boxes.argmax()), boxes.shape[1])
+    return (x, y), size
+
+
+# ----
+
 
 Starts = Mapping[str, Mapping[str, Mapping[str, float]]]
 """Seconds by side, "cold" or "warm", and stage: see `starts`."""

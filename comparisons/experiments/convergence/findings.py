@@ -11,12 +11,17 @@ from comparisons.experiments.convergence.data import Reference, Rung, weights
 from comparisons.experiments.convergence.estimates import (
     Bias,
     Estimate,
+    How,
+    Line,
+    Points,
+    band,
     bias_of,
     common_error,
+    log_line,
     mean_of,
     standard_error,
+    time_to,
 )
-from comparisons.experiments.convergence.fits import How, Line, Points, band, log_line, time_to
 from reference_rt.core.arrays import FloatArray
 
 MEDIAN_ERROR = math.sqrt(math.pi / 2.0)

@@ -8,12 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from markupsafe import Markup
 
-from comparisons.experiments.convergence.crops import Crops
-from comparisons.experiments.convergence.curves import Curves
+from comparisons.experiments.convergence.curves import Crops, Curves
 from comparisons.experiments.convergence.data import Settings
-from comparisons.experiments.convergence.estimates import Bias
+from comparisons.experiments.convergence.estimates import Bias, Line
 from comparisons.experiments.convergence.findings import Ratio, Target
-from comparisons.experiments.convergence.fits import Line
 from comparisons.experiments.convergence.starts import STAGES
 from comparisons.report.plots import Curve, log_log
 from comparisons.report.templates import template, write

@@ -1,11 +1,50 @@
 """What the fuzzer finds, and what is known of one scene, as data."""
 
 import re
-from typing import Any
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from comparisons.experiments.fuzz.data import Data
+
+# What scenes are made of, and how much work each is worth.
+
+
+DETERMINISTIC = ("film", "geometry", "direct", "whitted", "layers")
+"""Rungs without noise."""
+
+RUNGS = ("render", "identities", *DETERMINISTIC, "statistics")
+"""What a scene is put through, in this order."""
+
+
+@dataclass(frozen=True)
+class Grammar:
+    """features: names of types and of GROUPS, of each of which every scene has one at least;
+    extreme: also far, tiny and thin ones."""
+
+    features: tuple[str, ...] = ()
+    extreme: bool = False
+
+
+class Effort(BaseModel):
+    """rungs: some of RUNGS;  pixels: camera rays of geometry and Whitted;  light_pixels: of direct
+    light;  spp, replicates: of statistics;  identity_rays: that each identity traces;  every: the
+    statistics of each so many-th scene only."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    rungs: tuple[str, ...] = RUNGS
+    pixels: int = 48
+    light_pixels: int = 24
+    spp: int = 16
+    replicates: int = 8
+    identity_rays: int = 240
+    every: int = 2
+
+
+# ----
 
 
 class Finding(BaseModel):
@@ -69,3 +108,34 @@ _NUMBER = re.compile(r"0x[0-9a-f]+|[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|\bnan\b
 def without_numbers(text: str, longest: int = 160) -> str:
     """A message with '#' in place of each number, for comparison with those of other scenes."""
     return " ".join(_NUMBER.sub("#", text).split())[:longest]
+
+
+# What a worker of the fuzzer is asked for.
+
+
+class Request(BaseModel):
+    """task: "scene" generates and checks the scene `number`; "reduce" makes the scene of a finding
+    smaller;  out: folder of the results;  files: of the files that scenes name;  seed, features,
+    extreme: of the generator;  scene: data, in place of a generated one;  command: of another
+    renderer (`renderer.py`);  seconds: of a reduction."""
+
+    model_config = ConfigDict(extra="forbid")
+    output: ClassVar[str] = "out"
+
+    task: Literal["scene", "reduce"] = "scene"
+    number: int
+    out: Path
+    files: Path
+    seed: int = 0
+    features: tuple[str, ...] = ()
+    extreme: bool = False
+    effort: Effort = Effort()
+    scene: Data | None = None
+    finding: Finding | None = None
+    command: str = ""
+    seconds: float = 120.0
+
+    @property
+    def grammar(self) -> Grammar:
+        """What scenes are made of."""
+        return Grammar(self.features, self.extreme)

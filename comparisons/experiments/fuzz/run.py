@@ -9,11 +9,17 @@ from pathlib import Path
 
 from comparisons.experiments.fuzz import assets, stored
 from comparisons.experiments.fuzz.data import Data
-from comparisons.experiments.fuzz.effort import Effort, Grammar
-from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced, without_numbers
+from comparisons.experiments.fuzz.finding import (
+    Checked,
+    Effort,
+    Finding,
+    Grammar,
+    Reduced,
+    Request,
+    without_numbers,
+)
 from comparisons.experiments.fuzz.generate import generate
 from comparisons.experiments.fuzz.reduce import reduce
-from comparisons.experiments.fuzz.request import Request
 from comparisons.experiments.fuzz.types import types_in
 from comparisons.runs.processes import pool
 from reference_rt.util.errors import UsageError

@@ -2,26 +2,171 @@
 
 It follows `comparisons.runs.processes.protocol`: it reads `Request`s and stores results in their
 folders.  Mitsuba runs in its scalar variant: for a few hundred rays of a scene that is seen once, a
-variant that compiles takes several times as long (measured: 2 s against 9 s a scene).
-"""
+variant that compiles takes several times as long (measured: 2 s against 9 s a scene)."""
 
 import faulthandler
 import os
 import sys
+import tempfile
+import time
+import warnings
+from pathlib import Path
 
+import numpy as np
+
+from comparisons.compare.pictures import mitsuba_cast
 from comparisons.experiments.fuzz import assets, stored
-from comparisons.experiments.fuzz.check import check
-from comparisons.experiments.fuzz.data import Data
-from comparisons.experiments.fuzz.effort import Effort
-from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced
-from comparisons.experiments.fuzz.generate import generate
-from comparisons.experiments.fuzz.pictures import pictures_of
+from comparisons.experiments.fuzz.check import FAILED, check, of_rung
+from comparisons.experiments.fuzz.data import Data, text_of
+from comparisons.experiments.fuzz.finding import (
+    Checked,
+    Effort,
+    Finding,
+    Reduced,
+    Request,
+    without_numbers,
+)
+from comparisons.experiments.fuzz.generate import generate, parse
 from comparisons.experiments.fuzz.reduce import reduce
-from comparisons.experiments.fuzz.renderer import check_renderer
-from comparisons.experiments.fuzz.request import Request
 from comparisons.experiments.fuzz.types import types_in
+from comparisons.gate.driver import Command, Driver
+from comparisons.gate.errors import RendererError
+from comparisons.gate.reference import is_noise_free
+from comparisons.gate.request import Request as GateRequest
+from comparisons.gate.rounds import Rounds, gated_renderer
+from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.mitsuba.backend import FORCE, SCALAR
+from comparisons.mitsuba.translate import load
+from comparisons.report.thumbnails import png_url
+from comparisons.results.case import Case, RungResult
 from comparisons.runs.processes.protocol import carry_out, private_stdout
+from comparisons.statistics.metrics import encode, white_level
+from reference_rt.core.arrays import FloatArray
+from reference_rt.integrators import RayCast, Whitted
+from reference_rt.rendering.image import display
+from reference_rt.rendering.render import render
+from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import Grid
+from reference_rt.util.errors import ImageError, SceneError
+
+# Pictures of a reduced scene for the page: ours and Mitsuba's.
+
+
+SIZE = 64
+"""Pixels of the longer side."""
+
+SPP = 16
+
+
+def pictures_of(data: Data, folder: Path) -> dict[str, str]:
+    """PNGs as data: URLs by whose they are; fewer where a side cannot make one."""
+    found: dict[str, str] = {}
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        try:
+            scene = _sized(parse(data, "picture", folder))
+            found["ours"] = _png(ours(scene))
+            found["Mitsuba's"] = _png(theirs(scene))
+        except Exception:  # a finding may be that there is no picture
+            return found
+    return found
+
+
+def _sized(scene: Scene) -> Scene:
+    film = scene.film
+    factor = SIZE / max(film.width, film.height)
+    size = {
+        "width": max(1, round(factor * film.width)),
+        "height": max(1, round(factor * film.height)),
+    }
+    scene = scene.changed(film=film.model_copy(update={**size, "layers": ()}))
+    if scene.integrator.deterministic:
+        return scene
+    return scene.changed(sampler=scene.resolved_sampler.model_copy(update={"spp": SPP}))
+
+
+def ours(scene: Scene) -> FloatArray:
+    """Our picture, as radiance or as displayed values."""
+    picture = render(scene, threads=1)
+    return display(picture) if isinstance(scene.integrator, RayCast) else picture.colour
+
+
+def theirs(scene: Scene) -> FloatArray:
+    """Mitsuba's; for Whitted ray tracing, what is hit: our plugin is slow in scalar variants."""
+    counterpart = load(scene)
+    if isinstance(scene.integrator, RayCast | Whitted) or counterpart.no_pictures_reason:
+        cast = scene.changed(integrator=RayCast(show="normal"), sampler=Grid())
+        return mitsuba_cast(cast, counterpart, render(cast, threads=1))[0]
+    return mitsuba_scene.picture(counterpart.mi_scene, SPP, 1)
+
+
+def _png(picture: FloatArray) -> str:
+    good = np.isfinite(picture).all(axis=-1, keepdims=True)
+    shown = np.where(good, picture, 0.0)
+    return png_url(255.0 * encode(shown, white_level(shown)))
+
+
+# Another renderer in Mitsuba's place: its pictures of random scenes against ours.
+
+
+SECONDS = 60.0
+"""Time limit of one picture by the renderer."""
+
+LIMIT = 0.05
+"""The smallest relative bias that must be detectable: many scenes, each looked at briefly."""
+
+
+def check_renderer(data: Data, request: Request, effort: Effort) -> Checked:
+    """What another renderer makes of a scene: `request.command` with {scene}, {output}, and if it
+    uses random numbers {seed} and {spp}.
+
+    A difference counts if pictures with other random numbers show it too.  The scene's file lies
+    beside the files that it names.
+    """
+    start = time.perf_counter()
+    types = sorted(f"{kind}:{name}" for kind, name in types_in(data))
+    found = Checked(number=request.number, types=types)
+    path = request.files / f"scene-{request.number}.yaml"
+    path.write_text(text_of(data), encoding="utf-8")
+    try:
+        scene = Scene.load(path)
+        results = _failures(scene, path, request, effort, 1)
+        if results and not is_noise_free(scene):
+            results = _failures(scene, path, request, effort, 1001)
+        found.rungs["renderer"] = "differ" if results else "agree"
+        found.lit = True
+        found.findings += [of_rung(result) for result in results[:1]]
+    except SceneError as error:
+        found.findings.append(Finding(rung="scene", cause="invalid", detail=str(error)))
+    except (RendererError, ImageError) as error:
+        cause = without_numbers(str(error).partition(";")[0])
+        found.findings.append(Finding(rung="run", cause=cause, detail=str(error)))
+    finally:
+        path.unlink(missing_ok=True)
+    found.seconds = time.perf_counter() - start
+    return found
+
+
+def _failures(
+    scene: Scene, path: Path, request: Request, effort: Effort, seed: int
+) -> list[RungResult]:
+    noise_free = is_noise_free(scene)
+    sampler = scene.resolved_sampler
+    if not noise_free:
+        scene = scene.changed(sampler=sampler.model_copy(update={"spp": effort.spp}))
+    size = scene.film.width, scene.film.height
+    command = Command(request.command, path, getattr(scene.resolved_sampler, "spp", 1), ".exr",
+                      SECONDS, size)  # fmt: skip
+    rounds = Rounds(seed, 1 if noise_free else effort.replicates, None)
+    with tempfile.TemporaryDirectory(prefix="fuzz-renderer-") as kept:
+        driver = Driver(command, Path(kept))
+        gate = GateRequest(scene=scene, limit=LIMIT, threads=1, name=str(request.number))
+        case: Case = gated_renderer(gate, driver, rounds)
+    return [rung for rung in case.rungs if rung.status in FAILED]
+
+
+# ----
+
 
 MORE = 3
 """Times as many rays as the scene's check are traced while a finding is reduced: it must not

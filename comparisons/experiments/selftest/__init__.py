@@ -11,20 +11,13 @@ with many seeds, and false alarms are counted.
 To add a fault, add it to FAULTS of its file; a source fault's old text must occur exactly once.
 """
 
-from comparisons.experiments.selftest import (
-    of_kernels,
-    of_materials,
-    of_pictures,
-    of_scenes,
-    of_shapes,
-    of_sources,
-)
+from comparisons.experiments.selftest import of_pictures, of_scenes, of_sources
 from comparisons.experiments.selftest.fault import Fault, PictureFault, SceneFault, SourceFault
 
 FAULTS: tuple[Fault, ...] = (
     *of_pictures.FAULTS,
-    *(*of_scenes.FAULTS, *of_materials.FAULTS, *of_shapes.FAULTS),
-    *(*of_sources.FAULTS, *of_kernels.FAULTS),
+    *(*of_scenes.FAULTS, *of_scenes.OF_MATERIALS, *of_scenes.OF_SHAPES),
+    *(*of_sources.FAULTS, *of_sources.OF_KERNELS),
 )
 
 __all__ = ["FAULTS", "Fault", "PictureFault", "SceneFault", "SourceFault"]

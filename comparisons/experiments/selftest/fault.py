@@ -1,10 +1,38 @@
 """Planted faults: a small change of a picture, of a scene, or of the renderer's source."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
-from comparisons.results.case import FloatArray
+from comparisons.compare.budget import Budget
+from comparisons.compare.compare import Subject, gather
+from comparisons.compare.judge import judge
+from comparisons.results.case import COMPARED, RUNGS, Case, FloatArray
 from reference_rt.rendering.scene import Scene
+
+# The comparison of a faulty renderer: `compare_scene` without work after the first difference.
+
+
+OF_PICTURES = ("statistics", "images")
+"""Rungs that need pictures, which take most of the time."""
+
+
+def compared(subject: Subject, budget: Budget, threads: int | None = None) -> Case:
+    """The case; where a rung without pictures finds a difference, without pictures.  Raises as
+    `compare_scene` does."""
+    others = tuple(name for name in COMPARED if name not in OF_PICTURES)
+    evidence = gather(subject, budget, _silent, threads, others)
+    if all(rung.status not in ("differ", "not-comparable") for rung in evidence.rungs):
+        of_pictures = gather(subject, budget, _silent, threads, OF_PICTURES)
+        evidence = replace(of_pictures, rungs=(*evidence.rungs, *of_pictures.rungs))
+    return judge(evidence, budget.limit)
+
+
+def _silent(step: str) -> None:
+    pass
+
+
+# ----
 
 
 @dataclass(frozen=True)
@@ -38,3 +66,65 @@ class SourceFault:
 
 
 Fault = PictureFault | SceneFault | SourceFault
+
+
+# The result of a suite for a planted fault.
+
+
+CAUGHT = ("differ", "invalid")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """caught: whether the case fails with `differ` or `invalid`, not only with too much noise;
+    rung: the first that broke;  strength: how clearly, in that rung's numbers;  cause: the
+    diagnosis, or ""."""
+
+    fault: str
+    kind: str
+    scene: str
+    suite: str
+    verdict: str
+    caught: bool
+    rung: str
+    strength: str
+    cause: str
+
+    def as_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def finding(fault: Fault, suite: str, case: Case) -> Finding:
+    """The finding from the case with the fault."""
+    gravest = "invalid" if case.verdict == "invalid" else "differ"
+    by_name = {result.name: result for result in case.rungs}
+    rung = next((n for n in RUNGS if n in by_name and by_name[n].status == gravest), "")
+    strength = _strength(rung, by_name[rung].numbers, by_name[rung].reason) if rung else case.reason
+    kind = {PictureFault: "picture", SceneFault: "scene"}.get(type(fault), "source")
+    return Finding(
+        fault.name,
+        kind,
+        fault.scene,
+        suite,
+        case.verdict,
+        case.verdict in CAUGHT,
+        rung,
+        strength,
+        case.cause.name if case.cause else "",
+    )
+
+
+LONGEST = 90
+"""Characters of a reason in the table."""
+
+
+def _strength(rung: str, numbers: dict[str, Any], reason: str) -> str:
+    if rung == "direct" and numbers.get("rays"):
+        return f"{numbers['unexplained']:,} of {numbers['rays']:,} values"
+    if rung == "whitted" and numbers.get("pixels"):
+        return f"{numbers['unexplained']:,} of {numbers['pixels']:,} pixels"
+    if rung == "film":
+        return f"{numbers['max_error_over_bound']:,.0f} times the bound"
+    for what_follows in (", beyond", ", though", "; "):
+        reason = reason.partition(what_follows)[0]
+    return reason if len(reason) <= LONGEST else reason[: LONGEST - 1] + "…"

@@ -11,9 +11,15 @@ import numpy as np
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, gather
 from comparisons.compare.judge import Evidence, judge, of_replicates
-from comparisons.experiments.selftest.compared import compared
-from comparisons.experiments.selftest.fault import Fault, PictureFault, SceneFault, SourceFault
-from comparisons.experiments.selftest.finding import Finding, finding
+from comparisons.experiments.selftest.fault import (
+    Fault,
+    Finding,
+    PictureFault,
+    SceneFault,
+    SourceFault,
+    compared,
+    finding,
+)
 from comparisons.experiments.selftest.patched import PACKAGE, run_patched
 from comparisons.results.case import Case
 from comparisons.runs.elsewhere import run_elsewhere

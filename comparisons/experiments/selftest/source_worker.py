@@ -9,9 +9,7 @@ from pathlib import Path
 
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject
-from comparisons.experiments.selftest.compared import compared
-from comparisons.experiments.selftest.fault import SourceFault
-from comparisons.experiments.selftest.finding import finding
+from comparisons.experiments.selftest.fault import SourceFault, compared, finding
 from reference_rt.rendering.scene import Scene
 
 

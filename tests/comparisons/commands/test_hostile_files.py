@@ -20,7 +20,7 @@ from comparisons.gate.pictures_in import read_candidate, variance_of
 from comparisons.report.marker_block import around
 from comparisons.results.stored_case import CASE, read_stored_case
 from comparisons.suites.keys import files_digest
-from comparisons.suites.stored_results import read_stored_results
+from comparisons.suites.run import read_stored_results
 from comparisons.suites.suite import load_suite
 from reference_rt.cli.main import app
 from reference_rt.core.exr import read_exr

@@ -18,7 +18,7 @@ from comparisons.mitsuba.translate.textures import UntranslatableError
 from comparisons.results.case import Case
 from comparisons.rungs.rays.camera import camera_rays
 from comparisons.suites.keys import case_key
-from comparisons.suites.work import Changes
+from comparisons.suites.suite import Changes
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneWarning
 

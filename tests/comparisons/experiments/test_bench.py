@@ -9,8 +9,8 @@ import pytest
 from bench_rows import FIELDS, a_table, made_up
 
 from comparisons.experiments.bench import equal_error
-from comparisons.experiments.bench.machine import machine
 from comparisons.experiments.bench.row import LIMIT, against, row_from, within
+from comparisons.experiments.bench.run import machine
 from comparisons.experiments.bench.setting import Setting
 from comparisons.experiments.bench.timing import alternate, ratios, seconds, spread
 

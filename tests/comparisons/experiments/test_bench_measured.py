@@ -1,7 +1,5 @@
-"""What the benchmark measures: the kernels pruned by hand, meshes, rays and the machine."""
+"""What the benchmark measures: meshes, rays and the machine."""
 
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -9,57 +7,24 @@ import numpy as np
 import pytest
 
 from comparisons.experiments.bench import mesh_rays, program
-from comparisons.experiments.bench.machine import machine, vector_bits
-from comparisons.experiments.bench.meshes import blob, write_obj, write_ply
-from comparisons.experiments.bench.million_worker import peak, scene_of
-from comparisons.experiments.bench.spheres_only import world_of
-from comparisons.experiments.bench.unused import render_pruned, spheres, with_everything
-from reference_rt.cameras.film import BoxFilter, Film, TentFilter
+from comparisons.experiments.bench.mesh_rays import blob, write_ply
+from comparisons.experiments.bench.run import machine, vector_bits
 from reference_rt.rendering import query
-from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
+from reference_rt.shapes import Mesh
 from reference_rt.shapes.meshes.files import read_mesh
 
 SCENES = Path(__file__).parents[3] / "scenes"
 
 
-def small(scene: Scene) -> Scene:
-    film = Film(width=24, height=16, filter=BoxFilter())
-    return scene.changed(film=film, sampler=scene.resolved_sampler.model_copy(update={"spp": 8}))
-
-
-def test_kernels_pruned_by_hand_give_the_same_bits() -> None:
-    scene = small(spheres())
-    ours, pruned = render(scene).colour, render_pruned(scene).colour
-    assert np.array_equal(ours, pruned)
-    assert 0.2 < ours.mean() < 1.0
-
-
-@pytest.mark.slow
-def test_with_everything_left_in_the_picture_is_the_same() -> None:
-    scene = small(spheres())
-    assert np.array_equal(render(with_everything(scene)).colour, render(scene).colour)
-
-
-def test_kernels_pruned_by_hand_refuse_other_scenes() -> None:
-    scene = spheres()
-    with pytest.raises(ValueError, match="expected diffuse spheres"):
-        world_of(scene.changed(film=Film(filter=TentFilter())))
-    with pytest.raises(ValueError, match="expected diffuse spheres"):
-        world_of(with_everything(scene))
-    with pytest.raises(ValueError, match="few enough"):
-        world_of(scene.changed(hierarchy="sah"))
-
-
-@pytest.mark.parametrize("write", [write_ply, write_obj])
-def test_a_blob_is_closed_and_survives_its_file(tmp_path: Path, write: Any) -> None:
+def test_a_blob_is_closed_and_survives_its_file(tmp_path: Path) -> None:
     mesh = blob(1000)
     assert 1000 <= len(mesh.faces) < 1300
     corners = mesh.vertices[mesh.faces]
     volumes = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
     assert np.all(volumes > 0.0)  # counter-clockwise everywhere: seen from inside nothing is
-    path = tmp_path / f"blob.{write.__name__.removeprefix('write_')}"
-    write(path, mesh)
+    path = tmp_path / "blob.ply"
+    write_ply(path, mesh)
     read = read_mesh(path)
     expected = mesh.vertices.astype("f4")[mesh.faces]
     assert np.array_equal(read.vertices[read.faces].astype("f4"), expected)
@@ -90,7 +55,7 @@ def test_coherent_rays_see_the_mesh_and_incoherent_ones_cross_it() -> None:
 def test_closest_is_what_intersect_finds_on_any_number_of_threads(tmp_path: Path) -> None:
     path = tmp_path / "blob.ply"
     write_ply(path, blob(300))
-    tables = scene_of(path).tables
+    tables = Scene(shapes=(Mesh(file=str(path)),)).tables
     rays = mesh_rays.incoherent(blob(300).vertices, 40_000)  # three blocks
     one, two = (query.closest_primitives(tables, *rays, threads=n) for n in (1, 2))
     full = query.intersect(tables, *rays)
@@ -119,25 +84,3 @@ def test_the_machine_is_described() -> None:
     assert facts["cores"] >= 1
     assert vector_bits() in (128, 256, 512, None)
     assert {"machine", "system", "python", "numba", "memory_gib", "date"} <= set(facts)
-
-
-def test_peak_memory_is_in_megabytes() -> None:
-    before = peak()
-    block = np.ones(40_000_000)  # 320 MB
-    assert peak() >= before
-    assert peak() > block.nbytes / 1e6
-
-
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="what Linux tells")
-def test_peak_memory_is_not_that_of_who_started_the_process() -> None:
-    block = np.ones(60_000_000)
-    told = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            "from comparisons.experiments.bench.million_worker import peak; print(peak())",
-        ],
-        capture_output=True,
-        check=True,
-    )
-    assert 0.0 < float(told.stdout) < block.nbytes / 1e6 < peak()

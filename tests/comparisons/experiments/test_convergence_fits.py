@@ -8,10 +8,22 @@ import numpy as np
 import pytest
 
 from comparisons.experiments.convergence.data import Settings
+from comparisons.experiments.convergence.estimates import (
+    DRAWS,
+    Points,
+    linear_time,
+    log_line,
+    time_to,
+)
 from comparisons.experiments.convergence.findings import Target, ratio
-from comparisons.experiments.convergence.fits import DRAWS, Points, linear_time, log_line, time_to
+from comparisons.experiments.convergence.ladder import (
+    Cost,
+    affordable,
+    estimate,
+    rungs,
+    why_left_out,
+)
 from comparisons.experiments.convergence.methods import Shot
-from comparisons.experiments.convergence.plan import Cost, affordable, estimate, rungs, why_left_out
 
 
 def points(spp, seconds, squared, log_error=0.02, freedom=7):

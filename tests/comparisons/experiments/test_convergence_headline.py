@@ -13,17 +13,16 @@ from typer.testing import CliRunner
 
 import comparisons.commands.register
 from comparisons.experiments.bench import equal_error
-from comparisons.experiments.convergence import one_scene, run
+from comparisons.experiments.convergence import run
 from comparisons.experiments.convergence.curves import Curves
 from comparisons.experiments.convergence.data import Settings
 from comparisons.experiments.convergence.estimates import Estimate
 from comparisons.experiments.convergence.findings import Ratio, Target, compared, findings_of
 from comparisons.experiments.convergence.ladder import Climb, climb
 from comparisons.experiments.convergence.methods import METHODS, AbsentError, Shot, failing
-from comparisons.experiments.convergence.outputs import write_results
+from comparisons.experiments.convergence.outputs import lines_of, write_results
 from comparisons.experiments.convergence.page import write_page
 from comparisons.experiments.convergence.store import Store
-from comparisons.experiments.convergence.summary import lines_of
 from reference_rt.cli.main import app
 from reference_rt.rendering.scene import Scene
 
@@ -255,7 +254,7 @@ def test_an_invalid_scene_does_not_cost_the_others(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return curves_of(scene.name, ours=1.0)
 
-    monkeypatch.setattr(one_scene, "converge", fake)
+    monkeypatch.setattr(run, "converge", fake)
     sphere = "shapes: [{type: sphere}]\n"
     for name in ("ball", "box"):
         (tmp_path / f"{name}.yaml").write_text(sphere)

@@ -27,9 +27,8 @@ from comparisons.experiments.convergence.methods import (
 )
 from comparisons.experiments.convergence.outputs import COLUMNS, write_results, write_table
 from comparisons.experiments.convergence.page import write_page
-from comparisons.experiments.convergence.reference import COUNT, reference_of
 from comparisons.experiments.convergence.run import converge, prepared
-from comparisons.experiments.convergence.store import Store, run_key
+from comparisons.experiments.convergence.store import COUNT, Store, reference_of, run_key
 from comparisons.mitsuba.translate import to_mitsuba
 from reference_rt.cameras.film import Film
 from reference_rt.cameras.filters import BoxFilter

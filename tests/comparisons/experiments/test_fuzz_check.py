@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from comparisons.experiments.fuzz import assets, check
-from comparisons.experiments.fuzz.effort import DETERMINISTIC, Effort
-from comparisons.experiments.fuzz.finding import Finding, without_numbers
+from comparisons.experiments.fuzz.finding import DETERMINISTIC, Effort, Finding, without_numbers
 from comparisons.experiments.fuzz.generate import parse
 from comparisons.experiments.fuzz.identities import rays
 from comparisons.experiments.fuzz.worker import alike, effort_for

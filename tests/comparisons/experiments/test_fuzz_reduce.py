@@ -3,13 +3,11 @@
 import pytest
 
 from comparisons.experiments.fuzz import assets
+from comparisons.experiments.fuzz.check import without_textures
 from comparisons.experiments.fuzz.data import shapes_of, text_of
-from comparisons.experiments.fuzz.effort import Grammar
+from comparisons.experiments.fuzz.finding import Grammar
 from comparisons.experiments.fuzz.generate import generate, parse
-from comparisons.experiments.fuzz.plain import without_textures
-from comparisons.experiments.fuzz.reduce import reduce
-from comparisons.experiments.fuzz.reduce.edits import without_unused
-from comparisons.experiments.fuzz.reduce.numbers import simpler
+from comparisons.experiments.fuzz.reduce import reduce, simpler, without_unused
 from comparisons.experiments.fuzz.types import types_in
 from reference_rt.util.errors import SceneError
 

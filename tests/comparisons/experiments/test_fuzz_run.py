@@ -14,8 +14,7 @@ from typer.testing import CliRunner
 from comparisons.commands.fuzz import fuzz
 from comparisons.experiments.fuzz import run as running
 from comparisons.experiments.fuzz import stored, summary
-from comparisons.experiments.fuzz.effort import Effort
-from comparisons.experiments.fuzz.finding import Checked
+from comparisons.experiments.fuzz.finding import Checked, Effort
 from comparisons.experiments.fuzz.page import write_page
 from comparisons.experiments.fuzz.planted import Planted, feature_of, source_faults
 from comparisons.experiments.fuzz.planted import summary as planted_summary
@@ -162,6 +161,7 @@ picture.save(output)
 """
 
 
+@pytest.mark.slow  # each picture is a process of another program
 @pytest.mark.parametrize("wrong", ["no", "yes"])
 def test_another_renderer_is_compared_with_ours(tmp_path, wrong):
     program = tmp_path / "renderer.py"
@@ -203,6 +203,7 @@ def test_a_run_of_two_minutes_finds_nothing(tmp_path):
 REGRESSIONS = sorted((SCENES / "regressions").glob("*.yaml"))
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("path", REGRESSIONS, ids=lambda path: path.stem)
 def test_what_was_found_before_is_mended(path, monkeypatch):
     from comparisons.commands.fuzz import _data

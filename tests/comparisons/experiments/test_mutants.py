@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from comparisons.experiments.selftest.mutants import functions_of, mutants
 from comparisons.experiments.selftest.mutation import (
     FEW_RAYS,
     PLAIN,
@@ -14,6 +13,8 @@ from comparisons.experiments.selftest.mutation import (
     WORKER,
     Fate,
     by_few_rays,
+    functions_of,
+    mutants,
     summary,
     write,
 )

@@ -7,7 +7,7 @@ import pytest
 
 import reference_rt
 from comparisons.experiments.selftest import FAULTS, PictureFault, SceneFault, SourceFault
-from comparisons.experiments.selftest.finding import Finding, finding
+from comparisons.experiments.selftest.fault import Finding, finding
 from comparisons.experiments.selftest.run import Outcome, markdown
 from comparisons.experiments.selftest.sensitivity import StaleFaultError, patched_text
 from comparisons.experiments.selftest.specificity import Alarms

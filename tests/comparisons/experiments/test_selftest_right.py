@@ -5,10 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from comparisons.experiments.selftest.calibration import Calibration, calibration, of_pools
 from comparisons.experiments.selftest.pools import Pools
-from comparisons.experiments.selftest.right import CASES, KINDS, OF_KINDS, RightCase
-from comparisons.experiments.selftest.specificity import Alarms, alarms_of, verdict
+from comparisons.experiments.selftest.power import Calibration, calibration, of_pools
+from comparisons.experiments.selftest.specificity import (
+    CASES,
+    KINDS,
+    OF_KINDS,
+    Alarms,
+    RightCase,
+    alarms_of,
+    verdict,
+)
 
 SCENES = Path(__file__).parents[3] / "scenes"
 

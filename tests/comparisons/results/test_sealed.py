@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from test_stored_case import case
 
-from comparisons.experiments.convergence import reference as convergence_reference
+from comparisons.experiments.convergence import store as convergence_reference
 from comparisons.experiments.convergence.data import Rung
 from comparisons.experiments.convergence.store import Store
 from comparisons.gate import reference as gate_reference

@@ -10,8 +10,7 @@ from comparisons.mitsuba.backend import Backend
 from comparisons.results.stored_case import read_case
 from comparisons.results.verdict import exit_code
 from comparisons.suites.keys import case_key, files_digest
-from comparisons.suites.suite import BUILT_IN, load_suite, parse_suite, plan
-from comparisons.suites.work import Changes
+from comparisons.suites.suite import BUILT_IN, Changes, load_suite, parse_suite, plan
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneError, UsageError
 

@@ -14,7 +14,7 @@ from comparisons.results.stored_case import read_case, read_stored_case
 from comparisons.results.verdict import exit_code
 from comparisons.runs.processes import child, pool
 from comparisons.suites import run
-from comparisons.suites.stored_results import read_stored_results
+from comparisons.suites.run import read_stored_results
 from comparisons.suites.worker import Request
 from reference_rt.util.errors import ReferenceUnavailableError
 from reference_rt.util.workers import Threads
