@@ -98,10 +98,9 @@ def fuzz(
     with compare_extra("fuzzing"):
         from comparisons.experiments.fuzz import summary
         from comparisons.experiments.fuzz.finding import RUNGS, Effort, Grammar
-        from comparisons.experiments.fuzz.page import write_page
-        from comparisons.experiments.fuzz.progress import Display
         from comparisons.experiments.fuzz.run import Plan, run
         from comparisons.experiments.fuzz.stored import remove
+        from comparisons.experiments.fuzz.summary import Display, write_page
         from comparisons.experiments.fuzz.types import features as known
         from comparisons.runs.provenance import provenance
     from reference_rt.cli.where import Where
@@ -143,7 +142,7 @@ def fuzz(
         with Display(len(plan.scenes) or plan.count) as display:
             found = run(plan, display.done, display.line)
     facts = provenance()
-    summary.write(plan, found, facts, junit)
+    summary.write_results(plan, found, facts, junit)
     write_page(page, plan, found, facts)
     for line in summary.words(found):
         say(line)

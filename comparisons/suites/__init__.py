@@ -1,9 +1,9 @@
 """Suites: all scenes of a folder, each with a budget, compared in worker processes.
 
 A suite is a YAML file (`suite`): defaults and budgets by scene name (`comparisons.compare.budget`).
-`work` makes the list of cases, `run` executes them, each by a `worker` process, and stores every
-finished case with a `keys.case_key`: it is not run again until its scene, budget, sources or
-versions change.  `archive` reads an output folder again; `display` shows progress on stderr.
+`suite` makes the list of cases too; `run` executes them, each by a `worker` process, and stores
+every finished case with a `keys.case_key`: it is not run again until its scene, budget, sources or
+versions change.  `run` reads an output folder again, too; `display` shows progress on stderr.
 
 `results.json` is whole after each case.  A scene without a budget of its own gets the defaults, so
 that a new scene is in every suite.  An invalid scene or a crashed worker is a case with that

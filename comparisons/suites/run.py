@@ -33,7 +33,7 @@ from reference_rt.util.errors import ImageError, SceneError
 from reference_rt.util.files import check_writable, delete_unfinished, read_text
 from reference_rt.util.workers import Threads, Workers
 
-# Reads the output folder of `suite` or `compare` again.
+# ---- an output folder, read again ---------------------------------------------------------------
 
 
 class StoredResults(NamedTuple):
@@ -84,7 +84,7 @@ def _no_case(folder: Path) -> StoredCaseError:
     )
 
 
-# ----
+# ---- the run ------------------------------------------------------------------------------------
 
 
 LOG = "stderr.txt"

@@ -1,4 +1,5 @@
-"""Suites: YAML files with the budgets of the scenes in a folder."""
+"""Suites: YAML files with the budgets of the scenes in a folder, and the cases that a run makes of
+them."""
 
 import re
 import warnings
@@ -19,7 +20,7 @@ from reference_rt.scene.yaml_text import line_of
 from reference_rt.util.errors import SceneError, SceneWarning, UsageError, printable
 from reference_rt.util.files import read_text
 
-# The requested cases of a run: scenes, changes to them, and budgets.
+# ---- cases: scenes, changes to them, budgets ----------------------------------------------------
 
 
 class Changes(BaseModel):
@@ -103,7 +104,7 @@ def folder_name(case: str) -> str:
     return re.sub(r" \((\w+)\)$", r".\1", case)
 
 
-# ----
+# ---- suites -------------------------------------------------------------------------------------
 
 
 _Scenes = dict[str, tuple[Path, Scene | SceneError]]

@@ -1,4 +1,5 @@
-"""Render times of the Cornell box at an equal number of samples: ours against Mitsuba."""
+"""Render times of the Cornell box at an equal number of samples: ours against Mitsuba, and two
+threads against one."""
 
 from comparisons.experiments.bench.row import Row, against
 from comparisons.experiments.bench.setting import Setting
@@ -60,7 +61,7 @@ def _row(name: str, setting: Setting) -> Row:
     )
 
 
-# The speed-up by a second thread.
+# ---- a second thread ----------------------------------------------------------------------------
 
 
 def measure_threads(setting: Setting) -> list[Row]:

@@ -24,7 +24,7 @@ from reference_rt.shapes import Mesh
 from reference_rt.util.errors import UsageError
 from reference_rt.util.files import replacing
 
-# A generated mesh of any number of triangles, and the writer of its file.
+# ---- a generated mesh ---------------------------------------------------------------------------
 
 
 BUNNY = 69_451
@@ -78,7 +78,7 @@ def write_ply(path: Path, mesh: Blob) -> None:
         )
 
 
-# ----
+# ---- rays and rates -----------------------------------------------------------------------------
 
 
 WIDTH = 1024

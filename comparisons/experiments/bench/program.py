@@ -1,4 +1,5 @@
-"""Wall-clock time of the whole process `reference-rt render`."""
+"""Wall-clock time of whole processes: `reference-rt render` warm, first renders with kernels still
+to be compiled, `warm-up`, and the suite `smoke`."""
 
 import os
 import re
@@ -18,7 +19,7 @@ from comparisons.experiments.bench.timing import ROUNDS
 from reference_rt.util.child_processes import tied
 from reference_rt.util.errors import ReferenceRtError
 
-# Seconds that compiling adds to the suite `smoke`.
+# ---- the suite smoke ----------------------------------------------------------------------------
 
 
 SUITE, JOBS = "smoke", 2
@@ -60,7 +61,7 @@ def _suite(folder: Path, state: str, scenes: Path) -> float:
     return time.perf_counter() - start
 
 
-# ----
+# ---- the program in separate processes ----------------------------------------------------------
 
 
 SIZE, SPP = "64x64", 16
@@ -154,7 +155,7 @@ def measure_warm(setting: Setting) -> list[Row]:
     return [within("warm", title, walls[worst], WARM_SECONDS, details=details)]
 
 
-# Seconds of first renders: with no kernel compiled, of a new kind of scene, after `warm-up`.
+# ---- first renders ------------------------------------------------------------------------------
 
 
 WORST_EVER, MEDIAN_EVER = 8.0, 5.0

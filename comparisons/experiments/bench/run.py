@@ -1,4 +1,4 @@
-"""Measures the groups of rows one after another, or reads them if they are stored."""
+"""Measures the groups of rows one after another on this machine, or reads them if stored."""
 
 import datetime
 import hashlib
@@ -22,7 +22,7 @@ from comparisons.runs.provenance import ours
 from reference_rt.util.errors import ReferenceUnavailableError
 from reference_rt.util.files import check_writable, read_text, replacing
 
-# Properties of the machine that affect speed.
+# ---- the machine --------------------------------------------------------------------------------
 
 
 _WIDTHS = (("avx512f", 512), ("avx2", 256), ("avx", 256), ("sse2", 128), ("neon", 128))
@@ -67,7 +67,7 @@ def _version(package: str) -> str | None:
         return None
 
 
-# ----
+# ---- groups, one after another ------------------------------------------------------------------
 
 
 SCHEMA = 1

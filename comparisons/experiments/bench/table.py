@@ -1,4 +1,4 @@
-"""Tables of the rows, for a terminal and as Markdown."""
+"""The rows for people: tables for a terminal and as Markdown, and progress on standard error."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -67,7 +67,7 @@ def amount(value: float, unit: str) -> str:
     return f"{value:.0f} {unit}" if value >= 1000.0 else f"{value:.3g} {unit}"
 
 
-# Progress of a benchmark: one bar on a terminal, a line per step without one.
+# ---- progress -----------------------------------------------------------------------------------
 
 
 class Display(Bar):

@@ -1,4 +1,4 @@
-"""A scene's curves: all results of a run for it, as data."""
+"""A scene's curves: all results of a run for it, as data, with pictures at equal time and error."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -14,7 +14,7 @@ from comparisons.experiments.convergence.methods import Method, Renderer
 from comparisons.experiments.convergence.store import Store
 from reference_rt.core.arrays import FloatArray
 
-# Pictures by all methods at equal time and at equal error.
+# ---- pictures at equal time and at equal error --------------------------------------------------
 
 
 SIDE = 4
@@ -137,7 +137,7 @@ def worst_part(
     return (x, y), size
 
 
-# ----
+# ---- a scene's curves ---------------------------------------------------------------------------
 
 
 Starts = Mapping[str, Mapping[str, Mapping[str, float]]]

@@ -176,7 +176,7 @@ class Accumulator:
         return Rung(self.asked, self.spp, seconds, mse, relmse, mean, squares, known)
 
 
-# Straight lines through logarithms, and the time at which a curve reaches an error.
+# ---- lines through logarithms -------------------------------------------------------------------
 
 
 DRAWS = 1000

@@ -1,4 +1,5 @@
-"""The ladder: renders and stores the replicates of each rung; the methods take turns."""
+"""The ladder: plans the rungs of each method, renders and stores the replicates of each; the
+methods take turns."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -28,7 +29,7 @@ from comparisons.experiments.convergence.store import Store
 from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
 
-# Plans the rungs of each method within the time limit, from the times of a few pictures.
+# ---- the plan -----------------------------------------------------------------------------------
 
 
 TRIALS = (FIRST, 4 * FIRST)
@@ -114,7 +115,7 @@ def why_left_out(
     )
 
 
-# Finds Mitsuba's best sampler for a scene: the one with the least variance times time.
+# ---- Mitsuba's best sampler ---------------------------------------------------------------------
 
 
 CANDIDATES = ("independent", "multijitter", "ldsampler", "orthogonal")
@@ -153,7 +154,7 @@ def merits(scene: Scene, method: Method) -> dict[str, float]:
     }
 
 
-# ----
+# ---- the ladder ---------------------------------------------------------------------------------
 
 
 PATIENCE = 1.5

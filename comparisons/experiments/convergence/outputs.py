@@ -1,4 +1,4 @@
-"""`results.json` and `results.csv` of `reference-rt converge`."""
+"""`results.json` and `results.csv` of `reference-rt converge`, and its lines on a terminal."""
 
 import csv
 import json
@@ -18,7 +18,7 @@ from comparisons.results.files import csv_file
 from comparisons.results.json_values import plain
 from reference_rt.util.files import replacing
 
-# Curves in a few lines for a terminal, and the command that repeats them.
+# ---- for a terminal -----------------------------------------------------------------------------
 
 
 def lines_of(curves: Curves) -> list[str]:
@@ -85,7 +85,7 @@ def again(path: Path, out: Path, settings: Settings) -> str:
     return shlex.join(command if settings.starts else [*command, "--no-starts"])
 
 
-# ----
+# ---- results.json and results.csv ---------------------------------------------------------------
 
 
 SCHEMA = 1

@@ -1,4 +1,4 @@
-"""The convergence of one scene, from the scene to its curves."""
+"""The convergence of one scene, with chance or without, from the scene to its curves."""
 
 import time
 from dataclasses import asdict, dataclass, replace
@@ -50,7 +50,7 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
 from reference_rt.util.errors import SceneError
 
-# Deterministic scenes: errors of sample grids against the finest one, and Mitsuba against ours.
+# ---- scenes without chance ----------------------------------------------------------------------
 
 
 REPEATS = 3
@@ -173,7 +173,7 @@ def _mitsubas(scene: Scene) -> GridPoint:
     return GridPoint(backend().variant, int(getattr(sampler, "spp", 1)), warm, mse, relmse)
 
 
-# ----
+# ---- scenes with chance -------------------------------------------------------------------------
 
 
 NOWHERE = Store(None, "")
@@ -363,7 +363,7 @@ def _reference_spp(cost: Cost, share: float, max_spp: int) -> int:
     return spp
 
 
-# The convergence of a scene's file, with a store: a task for workers.
+# ---- a task for workers -------------------------------------------------------------------------
 
 
 INVALID = "invalid: "

@@ -1,4 +1,5 @@
-"""Stores finished rungs in a folder, so that they are not rendered again."""
+"""Stores finished rungs in a folder, and references in the user's cache, so that they are not
+rendered again."""
 
 import hashlib
 import json
@@ -26,7 +27,7 @@ from reference_rt.sampling import Sobol
 from reference_rt.util.errors import ImageError
 from reference_rt.util.files import delete_unfinished, read_text, replacing
 
-# The reference of errors: our own rendering of the scene, kept in the user's cache.
+# ---- the reference ------------------------------------------------------------------------------
 
 
 COUNT = 16
@@ -82,7 +83,7 @@ def _save(path: Path, pictures: FloatArray, spp: int, rounds: int) -> None:
         write_arrays(path, pictures=pictures, spp=spp, rounds=rounds)
 
 
-# ----
+# ---- stored rungs -------------------------------------------------------------------------------
 
 
 SCHEMA = 3

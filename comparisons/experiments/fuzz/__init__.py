@@ -1,14 +1,13 @@
 """Differential fuzzing: random scenes through both renderers, and cases reduced to a few lines.
 
 - `types.py`: the types of the scene schema, and which of them occur in a scene;
-- `fields.py`, `meshes.py`, `assets.py`: random values of fields, meshes, and files;
-- `parts.py`, `assemble.py`, `generate.py`: random parts, and the scene that is made of them;
-- `effort.py`: what scenes are made of, and how much work each is worth;
+- `fields.py`, `assets.py`: random values of fields, meshes, and files;
+- `parts.py`, `generate.py`: random parts, and the scene that is made of them;
 - `check.py`: one scene through the rungs, `identities/` through changes that must not matter;
-- `reduce/`: a failing scene made small while it fails in the same way;
+- `finding.py`: what is asked for, with how much effort, and what is found;
+- `reduce.py`: a failing scene made small while it fails in the same way;
 - `worker.py`, `run.py`, `stored.py`: processes that may crash, and results that a run resumes;
-- `renderer.py`: another renderer in Mitsuba's place, compared with ours;
-- `coverage.py`, `summary.py`, `page.py`: what was covered and found, for people and programs;
+- `summary.py`: what was covered and found, for people and programs;
 - `planted.py`: how soon faults that are planted in the source are found.
 
 A scene is a function of the run's seed and its number, so a number repeats it.  It is generated as

@@ -1,4 +1,4 @@
-"""Small images, environment maps and mesh files that random scenes name."""
+"""Small images, environment maps, and meshes whole and damaged, that random scenes hold or name."""
 
 import shutil
 from collections.abc import Callable, Iterator
@@ -16,7 +16,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.exr import write_exr
 from reference_rt.util.files import replacing
 
-# Meshes of few triangles, whole and damaged: arrays, as scene files hold them.
+# ---- meshes -------------------------------------------------------------------------------------
 
 
 Surface = tuple[FloatArray, IntArray]
@@ -168,7 +168,7 @@ DAMAGES: tuple[Callable[[Draw, FloatArray, IntArray], Surface], ...] = (
 )
 
 
-# ----
+# ---- files that scenes name ---------------------------------------------------------------------
 
 
 IMAGES = ("square.png", "wide.png", "grey.png")

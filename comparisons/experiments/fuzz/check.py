@@ -45,7 +45,7 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Cone, Quadric, Torus
 from reference_rt.util.errors import ReferenceUnavailableError, SceneError, SceneWarning
 
-# A scene without what Mitsuba lacks, so that the rest of it can be compared nevertheless.
+# ---- without what Mitsuba lacks -----------------------------------------------------------------
 
 
 GREY = 0.5
@@ -80,7 +80,7 @@ def without_textures(scene: Data) -> Data:
     return without_unused(found)
 
 
-# ----
+# ---- the scene as a whole -----------------------------------------------------------------------
 
 
 FAILED = ("differ", "invalid")

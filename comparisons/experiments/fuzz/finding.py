@@ -1,4 +1,4 @@
-"""What the fuzzer finds, and what is known of one scene, as data."""
+"""What a worker of the fuzzer is asked for, with how much effort, and what it finds, as data."""
 
 import re
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from comparisons.experiments.fuzz.data import Data
 
-# What scenes are made of, and how much work each is worth.
+# ---- effort -------------------------------------------------------------------------------------
 
 
 DETERMINISTIC = ("film", "geometry", "direct", "whitted", "layers")
@@ -44,7 +44,7 @@ class Effort(BaseModel):
     every: int = 2
 
 
-# ----
+# ---- findings -----------------------------------------------------------------------------------
 
 
 class Finding(BaseModel):
@@ -110,7 +110,7 @@ def without_numbers(text: str, longest: int = 160) -> str:
     return " ".join(_NUMBER.sub("#", text).split())[:longest]
 
 
-# What a worker of the fuzzer is asked for.
+# ---- requests -----------------------------------------------------------------------------------
 
 
 class Request(BaseModel):

@@ -19,7 +19,7 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.shapes.shape import Solid
 from reference_rt.util.errors import SceneWarning
 
-# The parts of a random scene, put together.
+# ---- parts put together -------------------------------------------------------------------------
 
 
 INTEGRATORS = {"path": 6.0, "direct": 2.0, "whitted": 1.5, "ray_cast": 0.7}
@@ -285,7 +285,7 @@ def _names_image(cls: Any) -> bool:
     )
 
 
-# ----
+# ---- the scene ----------------------------------------------------------------------------------
 
 
 def generate(seed: int, number: int, grammar: Grammar, folder: Path) -> Data:

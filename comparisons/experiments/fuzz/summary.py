@@ -1,20 +1,116 @@
-"""A run for people and programs: distinct findings, counts, JSON and JUnit."""
+"""A run for people and programs: progress, coverage, distinct findings, JSON, JUnit, the page."""
 
 import json
 import shlex
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 from junitparser import Failure, JUnitXml, TestCase, TestSuite
+from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 
-from comparisons.experiments.fuzz.coverage import coverage
 from comparisons.experiments.fuzz.data import text_of
-from comparisons.experiments.fuzz.finding import Finding, Reduced
+from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced
 from comparisons.experiments.fuzz.run import Plan, Run
+from comparisons.experiments.fuzz.types import all_types, possible_pairs
+from comparisons.report.templates import template, write
+from reference_rt.util.console import Bar
 from reference_rt.util.errors import printable
 from reference_rt.util.files import replacing
+
+# ---- coverage -----------------------------------------------------------------------------------
+
+
+Pair = tuple[str, str]
+
+
+def _word(one: tuple[str, str]) -> str:
+    return f"{one[0]}:{one[1]}"
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """scenes: how many;  types: in how many each type was, 0 included;  pairs, possible: how
+    many pairs of types some scene had, and how many one scene can have;  missing: the others."""
+
+    scenes: int
+    types: dict[str, int]
+    pairs: int
+    possible: int
+    missing: tuple[Pair, ...]
+
+    @property
+    def share(self) -> float:
+        """Of the possible pairs."""
+        return self.pairs / self.possible if self.possible else 0.0
+
+    def rows(self) -> list[tuple[str, int, float]]:
+        """(type, scenes, share of its possible pairs that occurred), the rarest first."""
+        partners = Counter(_word(one) for pair in possible_pairs() for one in pair)
+        lacking = Counter(name for pair in self.missing for name in pair)
+        return [
+            (name, count, 1.0 - lacking[name] / partners[name])
+            for name, count in sorted(self.types.items(), key=lambda item: item[1])
+        ]
+
+
+def coverage(scenes: Iterable[Iterable[str]]) -> Coverage:
+    """The coverage of scenes, given by the types "kind:name" of each."""
+    types = Counter({_word(one): 0 for one in all_types()})
+    seen: set[Pair] = set()
+    count = 0
+    for scene in scenes:
+        names = sorted(scene)
+        count += 1
+        types.update(names)
+        seen.update(combinations(names, 2))
+    possible = {(min(p), max(p)) for p in ((_word(a), _word(b)) for a, b in possible_pairs())}
+    missing = tuple(sorted(possible - seen))
+    return Coverage(count, dict(types), len(possible) - len(missing), len(possible), missing)
+
+
+def table(found: Coverage) -> str:
+    """Markdown: a row for each type."""
+    lines = [
+        f"{found.scenes:,} scenes have {sum(n > 0 for n in found.types.values())} of "
+        f"{len(found.types)} types and {found.pairs:,} of {found.possible:,} pairs of types "
+        f"({found.share:.1%})",
+        "",
+        "| type | scenes | of its pairs |",
+        "|---|---|---|",
+    ]
+    lines += [f"| {name} | {count:,} | {share:.0%} |" for name, count, share in found.rows()]
+    return "\n".join(lines) + "\n"
+
+
+# ---- progress -----------------------------------------------------------------------------------
+
+
+class Display(Bar):
+    """Counts scenes and findings.  scenes: how many are to come; None: until the time is up."""
+
+    def __init__(self, scenes: int | None) -> None:
+        super().__init__(MofNCompleteColumn(), TimeElapsedColumn())
+        self._task = self._bar.add_task("scenes", total=scenes)
+        self._done = 0
+        self._findings = 0
+
+    def done(self, checked: Checked) -> None:
+        """A scene has been checked."""
+        self._done += 1
+        for finding in checked.findings:
+            self._findings += 1
+            self.line(f"scene {checked.number}: {finding.rung}: {finding.cause}")
+        self._bar.update(self._task, advance=1, description=f"{self._findings} findings")
+        if not self.is_terminal and self._done % 100 == 0:
+            self.line(f"{self._done} scenes, {self._findings} findings")
+
+
+# ---- a run --------------------------------------------------------------------------------------
+
 
 SCHEMA = 1
 
@@ -61,7 +157,7 @@ def scene_file(out: Path, one: Reduced) -> Path:
     return out / "files" / f"finding-{one.number}.yaml"
 
 
-def write(plan: Plan, run: Run, provenance: Mapping[str, Any], junit: Path | None) -> None:
+def write_results(plan: Plan, run: Run, provenance: Mapping[str, Any], junit: Path | None) -> None:
     """Write fuzz.json, the scenes of findings, and JUnit XML if it is asked for."""
     found = distinct(run)
     for one, _ in found:
@@ -154,3 +250,31 @@ def words(run: Run) -> list[str]:
     found = distinct(run)
     lines.append(f"{len(found)} distinct findings in {len(run.findings)} scenes")
     return lines
+
+
+# ---- the page -----------------------------------------------------------------------------------
+
+
+def write_page(path: Path, plan: Plan, run: Run, provenance: Mapping[str, Any]) -> None:
+    """Write the page, whole or not at all; all text is escaped."""
+    rungs: dict[str, Counter[str]] = {}
+    for checked in run.scenes.values():
+        for name, status in checked.rungs.items():
+            rungs.setdefault(name, Counter())[status] += 1
+    findings = [
+        {
+            "reduced": one,
+            "count": count,
+            "text": text_of(one.scene) if one.scene else "",
+            "again": again(plan, one),
+        }
+        for one, count in distinct(run)
+    ]
+    page = template("fuzz.html.jinja", "experiments/fuzz").render(
+        lines=words(run),
+        findings=findings,
+        rungs={name: counts.most_common() for name, counts in rungs.items()},
+        coverage=coverage(checked.types for checked in run.scenes.values()),
+        provenance={**provenance, "seed": plan.seed},
+    )
+    write(path, page)

@@ -49,7 +49,7 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
 from reference_rt.util.errors import ImageError, SceneError
 
-# Pictures of a reduced scene for the page: ours and Mitsuba's.
+# ---- pictures for the page ----------------------------------------------------------------------
 
 
 SIZE = 64
@@ -106,7 +106,7 @@ def _png(picture: FloatArray) -> str:
     return png_url(255.0 * encode(shown, white_level(shown)))
 
 
-# Another renderer in Mitsuba's place: its pictures of random scenes against ours.
+# ---- another renderer in Mitsuba's place --------------------------------------------------------
 
 
 SECONDS = 60.0
@@ -165,7 +165,7 @@ def _failures(
     return [rung for rung in case.rungs if rung.status in FAILED]
 
 
-# ----
+# ---- the process --------------------------------------------------------------------------------
 
 
 MORE = 3

@@ -1,14 +1,13 @@
 """`reference-rt selftest`: does the harness fail if the renderer is wrong, and only then?
 
-Sensitivity: faults are planted in pictures (`of_pictures`), scenes (`of_scenes`, `of_materials`,
-`of_shapes`) and the renderer's source (`of_sources`, `of_kernels`), and compared with a suite's
-budgets; `finding` says whether a fault was caught, and at which rung.  `power`: the fraction of
-runs that catch a fault, by its size.  Mutation testing: random changes of the kernels (`mutants`),
-and what the rungs say to them (`mutation`).  `calibration`: how often the bias that a verdict
-states as detectable is detected.  Specificity: right renderers of twelve kinds (`right`) are judged
-with many seeds, and false alarms are counted.
+Sensitivity: faults are planted in pictures (`of_pictures`), scenes (`of_scenes`) and the renderer's
+source (`of_sources`), and compared with a suite's budgets; a `fault.Finding` says whether a fault
+was caught, and at which rung.  `power`: the fraction of runs that catch a fault, by its size, and
+how often the bias that a verdict states as detectable is detected.  `mutation`: random changes of
+the kernels, and what the rungs say to them.  `specificity`: right renderers of twelve kinds are
+judged with many seeds, and false alarms are counted.
 
-To add a fault, add it to FAULTS of its file; a source fault's old text must occur exactly once.
+To add a fault, add it to the tuple of its file; a source fault's old text must occur exactly once.
 """
 
 from comparisons.experiments.selftest import of_pictures, of_scenes, of_sources

@@ -1,4 +1,5 @@
-"""Planted faults: a small change of a picture, of a scene, or of the renderer's source."""
+"""Planted faults, a small change of a picture, of a scene, or of the renderer's source; and what
+a suite says to one."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
@@ -10,7 +11,7 @@ from comparisons.compare.judge import judge
 from comparisons.results.case import COMPARED, RUNGS, Case, FloatArray
 from reference_rt.rendering.scene import Scene
 
-# The comparison of a faulty renderer: `compare_scene` without work after the first difference.
+# ---- without work after the first difference ----------------------------------------------------
 
 
 OF_PICTURES = ("statistics", "images")
@@ -32,7 +33,7 @@ def _silent(step: str) -> None:
     pass
 
 
-# ----
+# ---- planted faults -----------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ class SourceFault:
 Fault = PictureFault | SceneFault | SourceFault
 
 
-# The result of a suite for a planted fault.
+# ---- findings -----------------------------------------------------------------------------------
 
 
 CAUGHT = ("differ", "invalid")

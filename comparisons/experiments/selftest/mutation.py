@@ -43,7 +43,7 @@ __all__ = [
 ]
 
 
-# Mutants of the renderer's kernels: one operator, constant or index changed, chosen by a seed.
+# ---- mutants ------------------------------------------------------------------------------------
 
 
 FOLDERS = (
@@ -196,7 +196,7 @@ def _apply(node: ast.AST, i: int) -> None:
             node.id = _NAMES[node.id]
 
 
-# ----
+# ---- the harness on mutants ---------------------------------------------------------------------
 
 
 SCENES = (

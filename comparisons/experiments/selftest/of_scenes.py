@@ -117,7 +117,7 @@ FAULTS = (
 )  # fmt: skip
 
 
-# Faults of scenes, of materials and textures: a parameter that is read or applied wrongly.
+# ---- materials and textures ---------------------------------------------------------------------
 
 
 def texture(name: str, **fields: Any) -> Callable[[Scene], Scene]:
@@ -190,7 +190,7 @@ OF_MATERIALS = (
 )  # fmt: skip
 
 
-# Faults of scenes, of shapes, instances, cameras and lights.
+# ---- shapes, instances, cameras, lights ---------------------------------------------------------
 
 
 def transformed(of: str, index: int, *steps: Any) -> Callable[[Scene], Scene]:

@@ -5,9 +5,7 @@ its file."""
 
 from comparisons.experiments.selftest.fault import SourceFault
 
-# Faults of the renderer's source: layers, filters, traversal, textures, cameras, lights.
-#
-# As `of_sources`: each old text occurs exactly once in its file.
+# ---- layers, filters, traversal, textures, cameras, lights --------------------------------------
 
 
 LAYERS, CAST, IMAGES = "layers", "display_modes", "texture_filters"
@@ -158,7 +156,7 @@ OF_KERNELS = (
 )  # fmt: skip
 
 
-# ----
+# ---- shapes, materials, integrators -------------------------------------------------------------
 
 
 BOX, KNOT, GLASS = "colour_bleeding", "mesh_knot", "caustic_glass"

@@ -1,4 +1,5 @@
-"""Statistical power: the fraction of runs that catch a fault, by its size."""
+"""Statistical power: the fraction of runs that catch a fault, by its size; and calibration: how
+often the bias that a verdict states as detectable is detected."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -25,8 +26,7 @@ from comparisons.rungs.images import images_rung
 from comparisons.statistics.metrics import image_metrics
 from reference_rt.rendering.scene import Scene
 
-# Calibration: how often the bias that a verdict states as detectable is detected, and half of it.
-#
+# ---- calibration: how often the stated bias is detected, and half of it -------------------------
 # The statistics state the smallest bias of the image mean that such a run detects with 99 % power.
 # Each run draws replicates of both sides, reads that bias, plants it in the channel where it is
 # largest, and judges the image mean again: single pixels without noise, such as those that see a
@@ -98,7 +98,7 @@ def of_pools(name: str, pools: Pools, runs: int, replicates: int) -> Calibration
     return Calibration(name, runs, float(np.median(stated)), whole, half)
 
 
-# ----
+# ---- power by size ------------------------------------------------------------------------------
 
 
 RUNS = 10

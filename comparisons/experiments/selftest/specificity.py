@@ -23,8 +23,7 @@ from comparisons.runs.elsewhere import run_elsewhere
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.workers import Workers
 
-# Right renderers of many kinds, whose pictures must not be called wrong.
-#
+# ---- right renderers of many kinds --------------------------------------------------------------
 # A case draws the pictures of both sides anew for each run. Rendered cases draw from pools of
 # replicates (`pools`); synthetic ones draw their noise with NumPy, where it has a simple law or no
 # renderer of ours makes it: noise that pixels share, and stored half floats.
@@ -317,7 +316,7 @@ OF_KINDS: Mapping[str, tuple[RightCase, ...]] = {
 }
 
 
-# ----
+# ---- rates of false alarms ----------------------------------------------------------------------
 
 
 ALLOWED = 1e-3

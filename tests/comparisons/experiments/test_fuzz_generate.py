@@ -8,11 +8,11 @@ from pydantic import Field
 
 from comparisons.experiments.fuzz import assets, fields, types
 from comparisons.experiments.fuzz.assets import CLOSED, DAMAGES, OPEN, mesh
-from comparisons.experiments.fuzz.coverage import coverage, table
 from comparisons.experiments.fuzz.data import shapes_of, text_of
 from comparisons.experiments.fuzz.fields import Draw, Names
 from comparisons.experiments.fuzz.finding import Grammar
 from comparisons.experiments.fuzz.generate import generate, parse
+from comparisons.experiments.fuzz.summary import coverage, table
 from comparisons.experiments.fuzz.types import GROUPS, all_types, possible_pairs, types_in
 from reference_rt.core.model import Positive
 from reference_rt.materials import Diffuse, Mirror

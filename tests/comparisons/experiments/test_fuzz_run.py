@@ -15,10 +15,10 @@ from comparisons.commands.fuzz import fuzz
 from comparisons.experiments.fuzz import run as running
 from comparisons.experiments.fuzz import stored, summary
 from comparisons.experiments.fuzz.finding import Checked, Effort
-from comparisons.experiments.fuzz.page import write_page
 from comparisons.experiments.fuzz.planted import Planted, feature_of, source_faults
 from comparisons.experiments.fuzz.planted import summary as planted_summary
 from comparisons.experiments.fuzz.run import Plan, run
+from comparisons.experiments.fuzz.summary import write_page
 from comparisons.experiments.fuzz.types import features as known
 from comparisons.experiments.selftest.sensitivity import patched_text
 from reference_rt.scene.model import SceneModel
@@ -83,7 +83,7 @@ def test_findings_of_one_cause_are_one(tmp_path, fake_workers):
     assert len(found.findings) == 2
     ((one, count),) = summary.distinct(found)
     assert (one.number, count, one.tried) == (4, 2, 7)
-    summary.write(plan, found, {"who": "a test"}, tmp_path / "junit.xml")
+    summary.write_results(plan, found, {"who": "a test"}, tmp_path / "junit.xml")
     document = json.loads((tmp_path / "fuzz.json").read_text())
     assert document["scenes"] == document["lit"] == document["valid"] == 3
     (listed,) = document["findings"]

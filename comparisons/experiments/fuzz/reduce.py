@@ -1,7 +1,6 @@
 """A failing scene made small while it fails in the same rung with the same cause.
 
-`edits.py` and `numbers.py` yield smaller scenes; `reducer.py` keeps one that still fails, and
-starts over until none does.  Reduction is by structure (shapes, lights, materials, wrappers, steps
+Edits yield smaller scenes; the loop keeps one that still fails, and starts over until none does.  Reduction is by structure (shapes, lights, materials, wrappers, steps
 of transforms, triangles), then numbers, then the picture, as in C-Reduce (Regehr et al. 2012)."""
 
 import math
@@ -14,7 +13,7 @@ from comparisons.experiments.fuzz.data import Data, copy_of, named_in, shapes_of
 __all__ = ["Found", "reduce"]
 
 
-# Smaller scenes out of a scene, by structure.  An edit may yield invalid scenes.
+# ---- structure: an edit may yield invalid scenes ------------------------------------------------
 
 
 Edit = Callable[[Data], Iterator[Data]]
@@ -231,7 +230,7 @@ EDITS: tuple[Edit, ...] = (
 """In the order in which they are tried: what removes most comes first."""
 
 
-# Simpler numbers, and smaller pictures.
+# ---- numbers and pictures -----------------------------------------------------------------------
 
 
 _FIXED = {"faces", "seed", "spp", "width", "height"}
@@ -296,7 +295,7 @@ def smaller_pictures(scene: Data) -> Iterator[Data]:
             yield smaller
 
 
-# The loop: a smaller scene is kept if it still fails.
+# ---- the loop -----------------------------------------------------------------------------------
 
 
 Fails = Callable[[Data], bool]
@@ -376,6 +375,3 @@ def _from(candidates: Iterator[Data], place: int) -> Iterator[Data]:
     for k, candidate in enumerate(candidates):
         if k >= place:
             yield candidate
-
-
-# ----
