@@ -1,7 +1,9 @@
 """A failing scene made small while it fails in the same rung with the same cause.
 
-Edits yield smaller scenes; the loop keeps one that still fails, and starts over until none does.  Reduction is by structure (shapes, lights, materials, wrappers, steps
-of transforms, triangles), then numbers, then the picture, as in C-Reduce (Regehr et al. 2012)."""
+Edits yield smaller scenes; the loop keeps one that still fails, and starts over until none does.
+Reduction is by structure (shapes, lights, materials, wrappers, steps of transforms, triangles),
+then numbers, then the picture, as in C-Reduce (Regehr et al. 2012).
+"""
 
 import math
 import time
@@ -9,9 +11,6 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 from comparisons.experiments.fuzz.data import Data, copy_of, named_in, shapes_of, text_of
-
-__all__ = ["Found", "reduce"]
-
 
 # ---- structure: an edit may yield invalid scenes ------------------------------------------------
 

@@ -290,6 +290,3 @@ def _outside(plan: Plan, request: Request) -> Reduced:
         tried=found.tried,
         types=_types(found.scene),
     )
-
-
-__all__ = ["Plan", "Run", "Tell", "run"]

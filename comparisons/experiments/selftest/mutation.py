@@ -27,22 +27,6 @@ from reference_rt.util.errors import ReferenceRtError
 from reference_rt.util.files import replacing
 from reference_rt.util.workers import Workers
 
-__all__ = [
-    "FEW_RAYS",
-    "FILES",
-    "Fate",
-    "Mutant",
-    "PLAIN",
-    "WORKER",
-    "by_few_rays",
-    "functions_of",
-    "mutants",
-    "mutation",
-    "summary",
-    "write",
-]
-
-
 # ---- mutants ------------------------------------------------------------------------------------
 
 

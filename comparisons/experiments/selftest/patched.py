@@ -60,6 +60,3 @@ def run_worker(
         lines = [line for line in run.stderr.splitlines() if line.strip()]
         raise ReferenceRtError(lines[-1] if lines else f"exit code {run.returncode}")
     return json.loads(run.stdout)
-
-
-__all__ = ["PACKAGE", "run_patched", "run_worker"]

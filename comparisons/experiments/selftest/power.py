@@ -30,9 +30,9 @@ from reference_rt.rendering.scene import Scene
 # The statistics state the smallest bias of the image mean that such a run detects with 99 % power.
 # Each run draws replicates of both sides, reads that bias, plants it in the channel where it is
 # largest, and judges the image mean again: single pixels without noise, such as those that see a
-# lamp, would show any bias. If more than 97 % are caught the power is not overstated; if half of the
-# stated bias is caught in less than 15 % it is not understated either: the stated bias is not twice
-# as large as it need be.
+# lamp, would show any bias.  If more than 97 % are caught the power is not overstated; if half of
+# the stated bias is caught in less than 15 % it is not understated either: the stated bias is not
+# twice as large as it need be.
 
 
 SCENES = ("colour_bleeding", "cornell_box", "soft_shadows", "light_shapes", "caustic_glass")

@@ -47,7 +47,7 @@ if not any(command.name == "converge" for command in app.registered_commands):
 @pytest.fixture
 def own_cache(tmp_path, monkeypatch):
     monkeypatch.setattr(
-        convergence.reference,
+        convergence.store,
         "cache_folder",
         lambda: tmp_path / "references",
     )
