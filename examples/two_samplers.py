@@ -5,8 +5,8 @@ import numpy as np
 from reference_rt import Independent, Scene, Sobol, render
 
 scene = Scene.load("scenes/cornell_box.yaml")
-size = (48, 48)
-exact = render(scene.changed(sampler=Sobol(spp=4096, seed=99)), size=size).colour
+size = (32, 32)
+exact = render(scene.changed(sampler=Sobol(spp=2048, seed=99)), size=size).colour
 
 print("samples   seconds: independent, Sobol'   error: independent, Sobol'")
 for spp in (16, 64, 256):

@@ -63,7 +63,8 @@ def read_candidates(path: Path, layer: str = "") -> tuple[Picture, ...]:
             array = map_npy(path)
             _check_shape(array.shape)
             return from_array(array, str(path))
-        image = open_image(path, layer)
+        # Writers of .hdr round down: as Radiance decodes it, a picture has no bias.
+        image = open_image(path, layer, radiance=True)
         return (_picture(image),)
     except FileNotFoundError:
         raise ImageError(f"{path}: there is no such file; expected an image") from None

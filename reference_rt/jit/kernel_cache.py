@@ -15,8 +15,10 @@ import hashlib
 import os
 import pickle
 import shutil
+import stat
 import sys
 import time
+import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -66,7 +68,7 @@ def cache_root() -> Path:
 
 def prepare_folder(compiler: str) -> str | None:
     """Create the folder for kernels of exactly these sources and versions; None if it cannot be
-    written.  Deletes folders that are no longer used.
+    written, or others could write machine code into it.  Deletes folders that are no longer used.
 
     compiler: the name of the compiler, part of the key.
     """
@@ -76,6 +78,16 @@ def prepare_folder(compiler: str) -> str | None:
         os.utime(folder)
         if not os.access(folder, os.W_OK):
             return None
+        if (stranger := _open_to_others(folder)) is not None:
+            warnings.warn_explicit(  # on one line, without one of source code
+                f"kernels are not cached: {stranger} belongs to another user or others may write"
+                " to it, and what it holds is run; expected a folder of your own, of mode 700"
+                " (REFERENCE_RT_CACHE)",
+                RuntimeWarning,
+                "reference_rt",
+                0,
+            )
+            return None
     except OSError:
         return None
     _delete_old(folder.parent, "*", _UNUSED_FOR)
@@ -83,9 +95,21 @@ def prepare_folder(compiler: str) -> str | None:
     return str(folder)
 
 
+def _open_to_others(folder: Path) -> Path | None:
+    """Of the folder of kernels and the two that hold it, the first that others may change."""
+    if not hasattr(os, "getuid"):  # Windows: a user's folders are the user's
+        return None
+    for path in (folder, folder.parent, folder.parent.parent):
+        found = path.stat()
+        if found.st_uid != os.getuid() or found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+            return path
+    return None
+
+
 def _make(folder: Path) -> None:
     with suppress(FileExistsError):
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        for path in (folder.parent.parent, folder.parent, folder):
+            path.mkdir(mode=0o700, parents=True, exist_ok=True)
         return
     folder.unlink()  # a file, or a link to nothing
     folder.mkdir(mode=0o700)

@@ -13,6 +13,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.model import Positive
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.jit.kernel import kernel
+from reference_rt.textures.image_file import Encoding
 from reference_rt.textures.texels import Bytes, Texels, joined, most_bytes, read_texels, room_of
 from reference_rt.textures.texture import Texture
 from reference_rt.util.memory import check_memory
@@ -28,15 +29,17 @@ class Bitmap(Texture):
 
     type: Literal["bitmap"] = "bitmap"
     file: str
-    """The image, relative to the scene file: .exr, .hdr, .pfm, .npy, .png, .jpg and other formats
-    that Pillow reads."""
+    """The image, relative to the scene file: .exr, .hdr, .pfm, .npy, .png, .jpg, .tif, .webp, .bmp,
+    .tga, .ppm or .gif."""
     filter: Literal["bilinear", "nearest"] = "bilinear"
     """The colour between texel centres: interpolated, or that of the nearest texel."""
     wrap: Literal["repeat", "clamp", "mirror"] = "repeat"
     """The colour outside of [0, 1]: the image repeated, its rim, or the image mirrored."""
-    encoding: Literal["auto", "srgb", "raw"] = "auto"
+    encoding: Encoding = "auto"
     """`srgb`: values are decoded to linear ones.  `raw`: values are used as they are.  `auto`:
-    `srgb` for files of integers, `raw` for files of floats."""
+    `srgb` for files of integers, `raw` for files of floats.  `radiance`: .hdr as Radiance itself
+    decodes it, half a step of a mantissa brighter, EXPOSURE and COLORCORR undone; other renderers
+    ignore these."""
     scale: Positive = 1.0
     """A factor of the linear values: radiance and heights may need values above 1."""
 

@@ -12,7 +12,8 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.image_files.image_file import Curve, ImageFile
 from reference_rt.util.memory import check_memory
 
-Encoding = Literal["auto", "srgb", "raw"]
+Encoding = Literal["auto", "srgb", "raw", "radiance"]
+"""How the values of a file become linear ones: see `Bitmap.encoding`."""
 
 READER = 8
 """The most bytes per pixel that reading an image takes beside its values."""
@@ -21,7 +22,7 @@ READER = 8
 def read_image(path: Path, encoding: Encoding, scale: float = 1.0) -> FloatArray:
     """(height, width, 3) linear sRGB times `scale`, row 0 on top, finite and at least 0.  Raises
     ValueError (what is wrong, what was expected)."""
-    with reading(path) as image:
+    with reading(path, encoding) as image:
         pixels = image.height * image.width
         check_memory((24 + READER) * pixels, f"{image.width} x {image.height} pixels")
         colours = np.empty((image.height, image.width, 3))
@@ -35,13 +36,16 @@ def read_image(path: Path, encoding: Encoding, scale: float = 1.0) -> FloatArray
 
 
 @contextmanager
-def reading(path: Path) -> Iterator[ImageFile]:
+def reading(path: Path, encoding: Encoding) -> Iterator[ImageFile]:
     """The image in a file, while it is read.  Raises ValueError (the file, what is wrong, what was
     expected) for all that goes wrong meanwhile."""
-    from reference_rt.core.image_files import open_image  # importing Pillow is slow
+    from reference_rt.core.image_files import HdrFile, open_image  # importing Pillow is slow
 
     try:
-        yield open_image(path)
+        image = open_image(path, radiance=encoding == "radiance")
+        if encoding == "radiance" and not isinstance(image, HdrFile):
+            raise ValueError("is no Radiance image, which `encoding: radiance` is for")
+        yield image
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {error.strerror}; expected an image") from None
     except MemoryError:

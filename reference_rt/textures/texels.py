@@ -55,7 +55,7 @@ def padded(size: int) -> int:
 def most_bytes(path: Path, encoding: Encoding) -> int:
     """The most bytes that the texels of a file can take, according to its header.  Raises
     ValueError (what is wrong, what was expected)."""
-    with reading(path) as image:
+    with reading(path, encoding) as image:
         pixels = image.height * image.width
         is_decoded = not image.is_integer and curve_of(image, encoding) is not None
         kind = np.dtype("float64" if is_decoded else image.kind)
@@ -70,7 +70,7 @@ def read_texels(path: Path, encoding: Encoding, scale: float, out: Bytes | None 
     from reference_rt.core.image_files.image_file import as_float64, decoding
 
     most_bytes(path, encoding)
-    with reading(path) as image, np.errstate(over="ignore", invalid="ignore"):
+    with reading(path, encoding) as image, np.errstate(over="ignore", invalid="ignore"):
         curve = curve_of(image, encoding)
         strips = image.stored()
         first = next(strips)

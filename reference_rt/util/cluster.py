@@ -4,8 +4,11 @@ Needs `distributed`, and `dask-jobqueue` for a batch system (the extra `cluster`
 """
 
 import asyncio
+import atexit
 import importlib
 import math
+import shutil
+import tempfile
 import time
 from collections.abc import Callable, Coroutine
 from concurrent.futures import CancelledError, Future
@@ -259,12 +262,38 @@ def batch_cluster(file: Path) -> Any:
         raise UsageError(f"{file}: jobs: expected the number of jobs, at least 1, got '{jobs}'")
     module = _module("dask_jobqueue")
     try:
-        cluster = getattr(module, _BATCH_SYSTEMS[kind])(**options)
+        cluster = getattr(module, _BATCH_SYSTEMS[kind])(**_guarded(options))
         cluster.scale(jobs=jobs)
     except (TypeError, ValueError, RuntimeError, OSError) as error:
         reason = " ".join(str(error).split())
         raise UsageError(f"{file}: {reason}; expected the options of dask-jobqueue") from None
     return cluster
+
+
+_NO_PAGES = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
+"""Dask serves pages of its state whether there is a dashboard or not: to this machine only."""
+
+
+def _guarded(options: dict[str, Any]) -> dict[str, Any]:
+    """The options of a batch system, so that no stranger reaches its scheduler and its workers,
+    which run whatever code a client sends: TLS with keys made for this run, one network interface,
+    no dashboard.  What the options say themselves is kept; `security: false` means none, for a
+    network of one's own."""
+    found = dict(options)
+    of_scheduler = _NO_PAGES | (found.get("scheduler_options") or {})
+    if "interface" not in found and not {"host", "interface"} & of_scheduler.keys():
+        of_scheduler["host"] = _module("distributed").utils.get_ip()
+    found["scheduler_options"] = of_scheduler
+    of_workers = ["--no-dashboard", "--dashboard-address", _NO_PAGES["dashboard_address"]]
+    found["worker_extra_args"] = [*of_workers, *(found.get("worker_extra_args") or ())]
+    if found.setdefault("security", True) is False:
+        del found["security"]
+    elif "shared_temp_directory" not in found:
+        # Jobs read the keys here: in the working folder, which they see as they see the scene.
+        keys = tempfile.mkdtemp(prefix=".reference_rt_keys_", dir=Path.cwd())
+        atexit.register(shutil.rmtree, keys, ignore_errors=True)
+        found["shared_temp_directory"] = keys
+    return found
 
 
 def _module(name: str) -> Any:

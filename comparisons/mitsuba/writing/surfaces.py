@@ -140,9 +140,7 @@ class Surfaces:
         one, two = texture.first, texture.second
         if max(*one, *two) > 1.0:  # Mitsuba's are reflectances; an image of four texels is the same
             texels = np.array([[two, one], [one, two]])
-            return self._image(
-                self._written("checker", texels), "nearest", "repeat", first, texture
-            )
+            return self._image(self.written("checker", texels), "nearest", "repeat", first, texture)
         if as_number:
             one, two = two, one  # see `translate.textures`
         values = {"color0": rgb(one), "color1": rgb(two)}
@@ -154,15 +152,16 @@ class Surfaces:
         suffix = path.suffix.lower()
         is_integer = suffix in (".png", ".jpg", ".jpeg", ".bmp", ".tga")
         is_plain = suffix in IMAGES and texture.scale == 1.0
-        if is_plain and not (texture.encoding == "srgb" and not is_integer):
+        if is_plain and (is_integer or texture.encoding not in ("srgb", "radiance")):
             file = self.files.copy(texture.file, "textures", name, "file")
             raw = texture.encoding == "raw" or not is_integer
         else:
-            file, raw = self._written(path.stem, texture.read(self.scene.folder).linear), True
+            file, raw = self.written(path.stem, texture.read(self.scene.folder).linear), True
             self.note(f"the image {texture.file} is written as linear float32 values")
         return self._image(file, texture.filter, texture.wrap, first, texture, raw)
 
-    def _written(self, stem: str, texels: FloatArray) -> str:
+    def written(self, stem: str, texels: FloatArray) -> str:
+        """The name of an image file of linear radiance."""
         planes = dict(zip("RGB", np.moveaxis(texels, -1, 0), strict=True))
         return self.files.write(f"{stem}.exr", lambda file: write_exr(file, planes, {}))
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from reference_rt.lights import (
 from reference_rt.materials import most_branches
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid, Sobol
+from reference_rt.textures.image_file import read_image
 
 AOVS = {
     "depth": "depth", "normal": "sh_normal", "albedo": "albedo", "position": "position",
@@ -142,8 +144,12 @@ def _light(light: Any, number: int, surfaces: Surfaces) -> Element:
         case Constant():
             values = {"radiance": Rgb(*light.radiance)}
         case EnvironmentMap():
-            file = surfaces.files.copy(light.file, "lights", number, "file")
-            values = {"filename": file, "scale": light.scale}
+            values = {"scale": light.scale}
+            if light.encoding == "radiance":
+                texels = read_image(surfaces.scene.folder / light.file, "radiance")
+                values["filename"] = surfaces.written(Path(light.file).stem, texels)
+            else:
+                values["filename"] = surfaces.files.copy(light.file, "lights", number, "file")
             if light.transform:
                 values["to_world"] = transform_steps(light.transform)
             return Element("emitter", "envmap", values)

@@ -13,29 +13,29 @@ in `_BEGINNINGS`; a test with files of it.
 from pathlib import Path
 
 from reference_rt.core.image_files.exr import open_exr
-from reference_rt.core.image_files.hdr import open_hdr
+from reference_rt.core.image_files.hdr import HdrFile, open_hdr
 from reference_rt.core.image_files.image_file import ImageFile, Strip
 from reference_rt.core.image_files.npy import open_npy
 from reference_rt.core.image_files.pfm import open_pfm
 from reference_rt.core.image_files.pillow import open_with_pillow
 from reference_rt.util.files import open_input
 
-__all__ = ["ImageFile", "Strip", "open_image"]
+__all__ = ["HdrFile", "ImageFile", "Strip", "open_image"]
 
 _BEGINNINGS = (
     (b"v/1\x01", open_exr),
     (b"PF", open_pfm),
     (b"Pf", open_pfm),
-    (b"#?", open_hdr),
     (b"\x93NUMPY", open_npy),
 )
 
 
-def open_image(path: Path, layer: str = "") -> ImageFile:
+def open_image(path: Path, layer: str = "", radiance: bool = False) -> ImageFile:
     """The image in a file, of which only the header has been read.
 
-    layer: the prefix of the channels' names of an EXR file.  Raises ValueError (what is wrong, what
-    was expected) and OSError.
+    layer: the prefix of the channels' names of an EXR file;  radiance: decode .hdr as Radiance
+    itself does, see `hdr.HdrFile`.  Raises ValueError (what is wrong, what was expected) and
+    OSError.
     """
     with open_input(path) as file:
         start = file.read(16)
@@ -45,6 +45,8 @@ def open_image(path: Path, layer: str = "") -> ImageFile:
         raise ValueError(f"has no layer '{layer}': only EXR has layers")
     if layer:
         return open_exr(path, layer)
+    if start.startswith(b"#?"):
+        return open_hdr(path, radiance)
     reader = next((open_ for beginning, open_ in _BEGINNINGS if start.startswith(beginning)), None)
     found = open_with_pillow(path) if reader is None else reader(path)
     if min(found.width, found.height) < 1:

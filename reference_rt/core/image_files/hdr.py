@@ -14,80 +14,95 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.image_files.image_file import ImageFile, StoredStrip, check_length
 from reference_rt.util.files import open_input
 
+Rgbe = npt.NDArray[np.uint8]
+
 _HEADER = 4096
 """The most bytes of a header: its end is searched for in these alone."""
 
-_SIZE = re.compile(rb"([-+])Y (\d{1,9}) ([-+])X (\d{1,9})\n")
+_SIZE = re.compile(rb"([-+])([XY]) (\d{1,9}) ([-+])([XY]) (\d{1,9})\n")
 
 
 @dataclass(frozen=True)
 class HdrFile(ImageFile):
-    """Values are radiance: EXPOSURE and COLORCORR of the header are undone.
+    """A mantissa m with exponent e means m 2^(e - 136), and EXPOSURE and COLORCORR of the header
+    are ignored, as by Mitsuba, stb_image and OpenCV: what other renderers show of the file.
 
-    A mantissa m is decoded as the middle of its interval, m + 1/2, as in Radiance itself, whose
-    writers round down; 0 is 0.  start: byte offset of the pixels;  exposure: (3,), the factors by
-    which the values were multiplied before they were written;  flips: whether rows run upwards, and
-    whether pixels run leftwards.
+    middle: m means (m + 1/2) 2^(e - 136) in its place, the middle of what Radiance's writers, which
+    round down, may have had; 0 is 0.  exposure: (3,), factors by which the values were multiplied
+    before they were written, and are divided.  start: byte offset of the pixels;  scanlines: their
+    number and length, in order: columns if `columns`, else rows;  flips: whether rows run upwards,
+    and whether pixels run leftwards.
     """
 
-    start: int = 0
+    middle: bool = False
     exposure: tuple[float, ...] = (1.0, 1.0, 1.0)
+    start: int = 0
+    scanlines: tuple[int, int] = (0, 0)
+    columns: bool = False
     flips: tuple[bool, bool] = (False, False)
 
     def stored(self, with_opacity: bool = False) -> Iterator[StoredStrip]:
         with open_input(self.path) as file:
             file.seek(self.start)
             data = file.read()
-        is_run_length = data[:2] == b"\x02\x02" and 8 <= self.width < 1 << 15
-        if not is_run_length:
-            check_length(len(data), self.width * self.height * 4)
-        at = 0
+        count, length = self.scanlines
+        if _is_new(data[:2], length):
+            rgbe = _runs(data, count, length)
+        else:
+            rgbe = _old_runs(data, count * length).reshape(count, length, 4)
+        if self.columns:
+            rgbe = rgbe.transpose(1, 0, 2)
+        upwards, leftwards = self.flips
+        rgbe = rgbe[:: -1 if upwards else 1, :: -1 if leftwards else 1]
         for rows in self.row_ranges():
-            count = rows.stop - rows.start
-            if is_run_length:
-                rgbe, at = _runs(data, at, self.width, rows.start, count)
-            else:
-                size = (count, self.width, 4)
-                rgbe = np.frombuffer(data, np.uint8, math.prod(size), at).reshape(size)
-                at += math.prod(size)
-                if self.width > 1 and (rgbe[..., :3] == 1).all(axis=-1).any():
-                    raise ValueError("has runs of the old kind; expected those since 1991, or none")
-            values = (_radiance(rgbe) / np.array(self.exposure)).astype(self.kind)
-            upwards, leftwards = self.flips
-            if upwards:
-                rows = slice(self.height - rows.stop, self.height - rows.start)
-            turned = values[:: -1 if upwards else 1, :: -1 if leftwards else 1]
-            yield StoredStrip(rows, turned, None)
-        if at != len(data):
-            raise ValueError(f"has {len(data) - at} bytes too many; expected {self.height} rows")
+            values = _radiance(rgbe[rows], 0.5 if self.middle else 0.0)
+            yield StoredStrip(rows, (values / np.array(self.exposure)).astype(self.kind), None)
 
 
-def open_hdr(path: Path) -> ImageFile:
-    """Raises ValueError (what is wrong, what was expected)."""
+def open_hdr(path: Path, radiance: bool = False) -> ImageFile:
+    """radiance: decode as Radiance itself does, see `HdrFile`.  Raises ValueError (what is wrong,
+    what was expected)."""
     with open_input(path) as file:
-        head = file.read(_HEADER)
+        head = file.read(_HEADER + 64)
         size = os.fstat(file.fileno()).st_size
-    end = head.find(b"\n\n")
+    end = head.find(b"\n\n", 0, _HEADER)
     match = _SIZE.match(head[end + 2 :])
-    if end < 0 or match is None:
+    if end < 0 or match is None or match[2] == match[5]:
         raise ValueError("has a malformed HDR header; expected its lines and -Y height +X width")
     exposure = _exposure(head[:end].decode("latin-1").splitlines())
-    height, width = int(match[2]), int(match[4])
+    count, length = int(match[3]), int(match[6])
     start = end + 2 + match.end()
-    # The shortest scanline: a mark, and of each channel runs of 127.
-    least = height * (4 + 8 * math.ceil(width / 127)) if 8 <= width < 1 << 15 else 0
-    if size - start < least:
-        raise ValueError("is truncated: too short for its size; expected whole scanlines")
-    flips = match[1] == b"+", match[3] == b"-"
-    # (m + 1/2) 2^e has nine bits, and its least exponent is a denormal float32's: it is exact.
-    kind = "float32" if exposure == (1.0, 1.0, 1.0) else "float64"
-    return HdrFile(path, width, height, kind, bits=8, start=start, exposure=exposure, flips=flips)
+    if _is_new(head[start : start + 2], length):
+        # The shortest scanline: a mark, and of each channel runs of 127.
+        if size - start < count * (4 + 8 * math.ceil(length / 127)):
+            raise ValueError("is truncated: too short for its size; expected whole scanlines")
+    columns = match[2] == b"X"
+    sign = {match[2]: match[1], match[5]: match[4]}
+    return HdrFile(
+        path,
+        count if columns else length,
+        length if columns else count,
+        # m + 1/2 has nine bits, and the least exponent is a denormal float32's: it is exact.
+        "float32" if not radiance or exposure == (1.0, 1.0, 1.0) else "float64",
+        bits=8,
+        middle=radiance,
+        exposure=exposure if radiance else (1.0, 1.0, 1.0),
+        start=start,
+        scanlines=(count, length),
+        columns=columns,
+        flips=(sign[b"Y"] == b"+", sign[b"X"] == b"-"),
+    )
 
 
-def _radiance(rgbe: npt.NDArray[np.uint8]) -> FloatArray:
+def _is_new(start: bytes, length: int) -> bool:
+    """Whether scanlines are run-length encoded channel by channel, as since 1991."""
+    return start == b"\x02\x02" and 8 <= length < 1 << 15
+
+
+def _radiance(rgbe: Rgbe, middle: float) -> FloatArray:
     """(rows, width, 3) radiance from mantissas and exponents (rows, width, 4)."""
     mantissa = rgbe[..., :3].astype(np.float64)
-    mantissa[mantissa > 0.0] += 0.5
+    mantissa[mantissa > 0.0] += middle
     power = np.ldexp(1.0, rgbe[..., 3:].astype(np.int64) - 136)
     return np.where(rgbe[..., 3:] > 0, mantissa * power, 0.0)
 
@@ -113,31 +128,52 @@ def _exposure(lines: list[str]) -> tuple[float, ...]:
     return tuple(found.tolist())
 
 
-def _runs(
-    data: bytes, at: int, width: int, first: int, count: int
-) -> tuple[npt.NDArray[np.uint8], int]:
-    """Decodes `count` scanlines, run-length encoded channel by channel: (count, width, 4), and the
-    offset of the next one.  `first`: the first one's row number, for errors."""
+def _old_runs(data: bytes, count: int) -> Rgbe:
+    """(count, 4) pixels as before 1991.  A pixel with the mantissas 1, 1, 1 repeats the one before
+    it as often as its exponent says; of several in a row each next one counts 256 times as much."""
+    if len(data) % 4:
+        check_length(len(data), 4 * count)
+    pixels = np.frombuffer(data, np.uint8).reshape(-1, 4)
+    is_run = (pixels[:, :3] == 1).all(axis=-1)
+    if not is_run.any():
+        check_length(len(data), 4 * count)
+        return pixels
+    place = np.arange(len(pixels))
+    source = np.maximum.accumulate(np.where(is_run, -1, place))  # the last pixel that is no run
+    power = place - source - 1
+    if source[0] < 0 or power.max() > 4:
+        raise ValueError("is malformed: expected runs of the old kind after a pixel")
+    repeats = np.where(is_run, pixels[:, 3].astype(np.int64) << 8 * np.maximum(power, 0), 1)
+    if (found := int(repeats.sum())) != count:
+        what = "is truncated" if found < count else "is malformed"
+        raise ValueError(f"{what}: has runs of {found} pixels in all; expected {count}")
+    return np.repeat(pixels[source], repeats, axis=0)
+
+
+def _runs(data: bytes, count: int, length: int) -> Rgbe:
+    """(count, length, 4): scanlines, run-length encoded channel by channel, as since 1991."""
     out = bytearray()
-    mark = b"\x02\x02" + width.to_bytes(2, "big")
-    for y in range(first, first + count):
+    mark = b"\x02\x02" + length.to_bytes(2, "big")
+    at = 0
+    for y in range(count):
         if data[at : at + 4] != mark:
             what = "is truncated" if at + 4 > len(data) else "is malformed"
-            raise ValueError(f"{what} at row {y}; expected a scanline of {width} pixels")
+            raise ValueError(f"{what} at row {y}; expected a scanline of {length} pixels")
         at += 4
         for _ in range(4):
-            left = width
+            left = length
             while left > 0:
                 if at + 1 >= len(data):
                     raise ValueError(f"is truncated at row {y}; expected whole scanlines")
-                length = data[at]
-                is_run = length > 128
-                length -= 128 if is_run else 0
-                end = at + 2 if is_run else at + 1 + length
-                if length == 0 or length > left or end > len(data):
+                run = data[at]
+                is_run = run > 128
+                run -= 128 if is_run else 0
+                end = at + 2 if is_run else at + 1 + run
+                if run == 0 or run > left or end > len(data):
                     what = "is truncated" if end > len(data) else "is malformed"
-                    raise ValueError(f"{what} at row {y}; expected runs of {width} pixels in all")
-                out += data[at + 1 : end] * length if is_run else data[at + 1 : end]
-                left, at = left - length, end
-    rows = np.frombuffer(out, np.uint8).reshape(count, 4, width)
-    return rows.transpose(0, 2, 1), at
+                    raise ValueError(f"{what} at row {y}; expected runs of {length} pixels in all")
+                out += data[at + 1 : end] * run if is_run else data[at + 1 : end]
+                left, at = left - run, end
+    if at != len(data):
+        raise ValueError(f"has {len(data) - at} bytes too many; expected {count} rows")
+    return np.frombuffer(out, np.uint8).reshape(count, 4, length).transpose(0, 2, 1)

@@ -1,4 +1,4 @@
-"""Images read by Pillow: PNG, JPEG, TIFF, WebP and many more; of several frames the first."""
+"""Images read by Pillow: PNG, JPEG, TIFF, WebP, BMP, TGA, PPM, GIF; of several frames the first."""
 
 import logging
 import struct
@@ -14,7 +14,13 @@ import numpy as np
 from reference_rt.core.image_files.image_file import ImageFile, StoredStrip
 from reference_rt.util.files import open_input
 
+_FORMATS = ("PNG", "JPEG", "TIFF", "WEBP", "BMP", "TGA", "PPM", "GIF")
+"""The formats that are read, by what a file holds.  Pillow knows some forty, of which EPS starts
+another program and many are read by code that few have tested."""
+
 _SILENT = logging.NullHandler()
+
+_KNOWN = f"EXR, HDR, PFM, NPY, {', '.join(_FORMATS)}"
 
 _GREY = ("1", "L", "LA", "F")
 """Modes with one value per pixel."""
@@ -131,10 +137,10 @@ def _opened(path: Path) -> Iterator[Any]:
         Image.MAX_IMAGE_PIXELS = None
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of odd metadata
-            with open_input(path) as file, Image.open(file) as image:
+            with open_input(path) as file, Image.open(file, formats=_FORMATS) as image:
                 yield image
     except UnidentifiedImageError:
-        raise ValueError("is not an image that can be read; expected one") from None
+        raise ValueError(f"is not an image that can be read; expected {_KNOWN}") from None
     except (ValueError, OSError) as error:
         if isinstance(error, OSError) and error.errno is not None:
             raise

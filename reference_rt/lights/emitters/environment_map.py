@@ -34,7 +34,10 @@ class EnvironmentMap(Description):
     type: Literal["environment_map"] = "environment_map"
     file: str
     """The image, relative to the scene file: .exr, .hdr, .pfm, .npy (linear radiance), or .png,
-    .jpg and other formats that Pillow reads (sRGB).  Usually twice as wide as high."""
+    .jpg, .tif, .webp, .bmp, .tga, .ppm, .gif (sRGB).  Usually twice as wide as high."""
+    encoding: Literal["auto", "radiance"] = "auto"
+    """`radiance`: .hdr as Radiance itself decodes it, half a step of a mantissa brighter, EXPOSURE
+    and COLORCORR undone; other renderers ignore these."""
     scale: Positive = 1.0
     """A factor of the image's values, which gives W sr^-1 m^-2, linear sRGB."""
     transform: Transform = ()
@@ -44,7 +47,7 @@ class EnvironmentMap(Description):
     def tabulate(self, folder: Path) -> "EnvironmentMaps":
         """One row.  Raises ValueError (what is wrong, what was expected)."""
         path = folder / self.file
-        texels = read_image(path, "auto", self.scale)
+        texels = read_image(path, self.encoding, self.scale)
         if len(texels) < 2:
             raise ValueError(f"{path}: has one row of pixels; expected two or more")
         with np.errstate(over="ignore", invalid="ignore"):

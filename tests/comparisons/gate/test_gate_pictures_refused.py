@@ -43,7 +43,7 @@ BAD = {
     "npy 2 channels": (npy(np.ones((4, 4, 2))), r"has the shape \(4, 4, 2\); expected"),
     "npy of no pixels": (npy(np.ones((0, 4, 3))), "has 4 x 0 pixels; expected at least one"),
     "hdr header": (b"#?RADIANCE\n", "malformed HDR header; expected its lines and -Y height"),
-    "hdr turned": (_HDR.replace(b"-Y 20 +X 30", b"+X 20 -Y 30"), "malformed HDR header"),
+    "hdr axes": (_HDR.replace(b"-Y 20 +X 30", b"+X 20 -X 30"), "malformed HDR header"),
     "hdr xyze": (_HDR.replace(b"rgbe", b"xyze") + bytes(2400), "format '32-bit_rle_xyze'; exp"),
     "hdr exposure": (b"#?\nEXPOSURE=0\n" + _HDR[11:] + bytes(2400), "'EXPOSURE=0'; expected posi"),
     "hdr truncated": (_HDR + bytes(2399), "is truncated: 2399 bytes of pixels; expected 2400"),
@@ -51,7 +51,7 @@ BAD = {
     "hdr short": (_HDR + b"\2\2\0\x1e", "is truncated: too short for its size"),
     "hdr runs": (_HDR + b"\2\2\0\x1e\xff\7" + bytes(400), "is malformed at row 0; expected runs"),
     "hdr row": (_HDR + b"\2\2\0\x1f" + bytes(400), "is malformed at row 0; expected a scanline"),
-    "hdr old runs": (_HDR + b"\1" * 2400, "has runs of the old kind"),
+    "hdr old runs": (_HDR + b"\1" * 2400, "is malformed: expected runs of the old kind after"),
     "hdr bomb": (_HDR.replace(b"30", b"99999999"), "declares 99999999 x 20 pixels of 3 channels"),
     "png header": (b"\x89PNG\r\n\x1a\n1234", "cannot be read as PNG: no header"),
 }

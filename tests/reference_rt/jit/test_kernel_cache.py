@@ -261,3 +261,27 @@ def test_what_stands_in_the_place_of_the_folder_is_replaced(what, kernels):
 def test_links_to_nothing_keep_nobody_from_the_cache(kernels):
     (kernels / "link").symlink_to("nowhere")
     assert kernel_cache.prepare_folder("one") is not None
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="no owners")
+@pytest.mark.parametrize("up", [0, 1, 2])
+@pytest.mark.parametrize("mode", [0o770, 0o707, None])
+def test_what_others_may_write_is_not_run(mode, up, kernels, monkeypatch):
+    """An entry with a right checksum is machine code of whoever wrote it.  mode: None of another
+    owner."""
+    folder = Path(kernel_cache.prepare_folder("one"))
+    stranger = (folder, *folder.parents)[up]
+    if mode is not None:
+        stranger.chmod(mode)
+    else:
+        of_path = Path.stat
+
+        def stat(path, **options):
+            found = list(of_path(path, **options))
+            found[4] += path == stranger  # st_uid
+            return os.stat_result(found)
+
+        monkeypatch.setattr(Path, "stat", stat)
+    with pytest.warns(RuntimeWarning, match=f"^kernels are not cached: {stranger} belongs") as said:
+        assert kernel_cache.prepare_folder("one") is None
+    assert "\n" not in str(said[0].message)
