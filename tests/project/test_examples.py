@@ -42,6 +42,7 @@ def test_furnace(run):
     assert lost[0] < 1 < lost[-1]
 
 
+@pytest.mark.slow
 def test_two_samplers(run):
     rows = [line.split() for line in run("two_samplers").splitlines()[1:]]
     assert [row[0] for row in rows] == ["16", "64", "256"]
@@ -81,6 +82,7 @@ def test_cluster(run, folder):
     assert sorted(path.name for path in (folder / "out").iterdir()) == ["a.exr", "b.exr"]
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(("power", "verdict"), [("0.5", "agree"), ("0.4", "differ")])
 def test_gate_a_renderer(run, power, verdict):
     assert run("gate_a_renderer", power).startswith(verdict)

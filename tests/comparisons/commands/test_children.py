@@ -135,6 +135,7 @@ def compiling(folder):
     return process, below(process.pid)
 
 
+@pytest.mark.cases(2)
 @linux
 @pytest.mark.parametrize(
     ("start", "number"),

@@ -218,6 +218,7 @@ COMMANDS = (
 )
 
 
+@pytest.mark.cases(46)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
 def test_every_command_and_every_name(tmp_path, monkeypatch, command, name):
@@ -233,6 +234,7 @@ def test_every_command_and_every_name(tmp_path, monkeypatch, command, name):
     assert "internal error" not in result.stderr
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", ["not UTF-8", "a terminal's code"])
 def test_a_picture_of_any_name(tmp_path, name):
     """It is written, and says which scene it is of."""

@@ -39,6 +39,7 @@ def compared_here(budget: Budget) -> Case:
     )
 
 
+@pytest.mark.slow
 def test_scenes_agree(tmp_path: Path) -> None:
     scenes = [str(SCENES / f"{name}.yaml") for name in ("spheres_whitted", "polygons_fill_rules")]
     result, found = compare(tmp_path, *scenes, "--size", "48x32")
@@ -56,6 +57,7 @@ def test_scenes_agree(tmp_path: Path) -> None:
     assert "spheres_whitted" in (tmp_path / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_path_tracing_is_compared_by_replicates(tmp_path: Path) -> None:
     scene = str(SCENES / "cornell_box.yaml")
     small = [scene, "--size", "32x32", "--spp", "16", "--replicates", "4"]
@@ -81,6 +83,7 @@ def test_path_tracing_is_compared_by_replicates(tmp_path: Path) -> None:
     assert "--fixed and --time-limit; expected one of them" in result.output
 
 
+@pytest.mark.slow
 def test_wrong_light_differs_at_its_rung(monkeypatch: pytest.MonkeyPatch) -> None:
     translate = comparisons.mitsuba.translate.translate_light
 
@@ -112,6 +115,7 @@ def test_type_without_translation_is_not_comparable(monkeypatch: pytest.MonkeyPa
     assert exit_code([case]) == 1
 
 
+@pytest.mark.slow
 def test_without_mitsuba_exit_code_4(tmp_path: Path) -> None:
     code = (
         "import sys; sys.modules['mitsuba'] = None; import importlib.metadata as m;"

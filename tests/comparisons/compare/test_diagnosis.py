@@ -93,6 +93,7 @@ PLANTED = {
 }
 
 
+@pytest.mark.cases(18)
 @pytest.mark.parametrize(
     "name",
     [

@@ -50,6 +50,7 @@ def images(candidate: FloatArray, reference: FloatArray) -> Images:
     return of_replicates(candidate, reference, {}).images
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("length", "name"),
     [
@@ -73,6 +74,7 @@ def test_a_wrong_length_is_named(
     assert f"rendered {other}" in cause.evidence
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", USUAL[:4])
 def test_a_limit_where_there_is_none(scene: Scene, length: int) -> None:
     endless = at_length(scene, None)
@@ -83,6 +85,7 @@ def test_a_limit_where_there_is_none(scene: Scene, length: int) -> None:
     assert cause.name == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", ["gain", "red", "shift", "none"])
 def test_other_causes_are_not_taken_for_it(scene: Scene, reference: FloatArray, fault: str) -> None:
     candidate = replicates(scene, 1)
@@ -108,6 +111,7 @@ def test_other_integrators_have_no_such_lengths(scene: Scene, integrator: object
     assert path_lengths(scene.changed(integrator=integrator, sampler=None)) is None
 
 
+@pytest.mark.slow
 def test_the_gate_names_it(scene: Scene, reference: FloatArray) -> None:
     wrong = replicates(at_length(scene, OWN - 1), 1)
     request = Request(scene=scene, references=tuple(Picture(p) for p in reference))

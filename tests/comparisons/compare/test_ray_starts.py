@@ -50,6 +50,7 @@ def judged(
     return case, {rung.name: rung for rung in case.rungs}, found
 
 
+@pytest.mark.slow
 def test_light_that_leaves_glass_too_soon_is_mitsubas(wide: None) -> None:
     case, rungs, said = judged(Scene.parse(GALLERY))
     assert rungs["geometry"].status == rungs["whitted"].status == "agree"
@@ -59,6 +60,7 @@ def test_light_that_leaves_glass_too_soon_is_mitsubas(wide: None) -> None:
     assert any("measuring whether" in line for line in said)
 
 
+@pytest.mark.slow
 def test_what_noise_hides_is_inconclusive(wide: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """A first pass alone, whose noise is too large for the limit."""
     monkeypatch.setattr(ray_starts, "RAYS", 1 << 10)
@@ -68,6 +70,7 @@ def test_what_noise_hides_is_inconclusive(wide: None, monkeypatch: pytest.Monkey
     assert rungs["statistics"].numbers["ray_epsilon"] < -0.5
 
 
+@pytest.mark.slow
 def test_a_fault_of_ours_is_not_explained_by_it(
     wide: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -87,6 +90,7 @@ def test_a_fault_of_ours_is_not_explained_by_it(
     assert "does not explain it" in rungs["statistics"].reason
 
 
+@pytest.mark.slow
 def test_a_small_effect_does_not_hide_a_fault_in_its_noise(
     wide: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -125,6 +129,7 @@ def test_starts_matter_at_long_paths_in_glass_alone(wide: None) -> None:
     assert ray_starts.may_matter(scene, load(scene))
 
 
+@pytest.mark.slow
 def test_rays_that_start_close_see_the_same_where_starts_do_not_matter(wide: None) -> None:
     """Sky, lamp, point light, cylinder and rough glass: pictures by the same random numbers."""
     scene = Scene.parse("""

@@ -68,12 +68,14 @@ def test_closest_is_what_intersect_finds_on_any_number_of_threads(tmp_path: Path
     assert np.array_equal(shadows, one.kind >= 0)
 
 
+@pytest.mark.slow
 def test_the_program_reports_its_times(tmp_path: Path) -> None:
     found = program.Program(tmp_path).render(SCENES / "whitted_classic.yaml")
     assert found["wall"] > found["render"] > 0.0
     assert set(found) == {"wall", "build", "compile", "render"}
 
 
+@pytest.mark.slow
 def test_a_program_that_fails_is_reported(tmp_path: Path) -> None:
     with pytest.raises(Exception, match=r"nowhere\.yaml"):
         program.Program(tmp_path).render(tmp_path / "nowhere.yaml")

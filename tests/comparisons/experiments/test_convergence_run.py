@@ -79,6 +79,7 @@ def program(*arguments: object):
 FAST = ("--size", "16x12", "--time-limit", "60", "--no-starts", "--max-spp", "16")
 
 
+@pytest.mark.slow
 def test_scenes_with_chance_and_without(tmp_path, own_cache):
     """A ladder for one, a grid for the other; JSON, CSV and page agree; a second run is quick."""
     scenes = [SCENES / f"{name}.yaml" for name in ("cornell_box", "whitted_classic")]
@@ -178,6 +179,7 @@ def counted_time(monkeypatch):
     monkeypatch.setattr(Stable, "ready", counted)
 
 
+@pytest.mark.slow
 def test_times_to_an_error(own_cache, counted_time):
     scene = Scene.load(SCENES / "cornell_box.yaml")
     scene = scene.changed(film=Film(width=16, height=12))

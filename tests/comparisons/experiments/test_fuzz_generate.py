@@ -47,6 +47,7 @@ def test_a_scene_is_a_function_of_its_seed_and_number(files):
     assert generate(6, 3, Grammar(), files) != first
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("extreme", [False, True])
 def test_scenes_are_valid_and_survive_their_text(files, extreme):
     for number in range(12):

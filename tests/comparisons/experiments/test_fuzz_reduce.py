@@ -27,6 +27,7 @@ def valid(data, files):
     return True
 
 
+@pytest.mark.cases(5)
 @pytest.mark.parametrize("wanted", ["torus", "mesh", "difference", "instance", "bump", "emissive"])
 def test_what_fails_by_a_type_is_reduced_to_that_type(files, wanted):
     def fails(data):

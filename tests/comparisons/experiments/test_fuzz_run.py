@@ -203,7 +203,7 @@ def test_a_run_of_two_minutes_finds_nothing(tmp_path):
 REGRESSIONS = sorted((SCENES / "regressions").glob("*.yaml"))
 
 
-@pytest.mark.cases(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("path", REGRESSIONS, ids=lambda path: path.stem)
 def test_what_was_found_before_is_mended(path, monkeypatch):
     from comparisons.commands.fuzz import _data

@@ -38,6 +38,7 @@ def test_kernels_of_the_package_are_found() -> None:
     assert not any(name == "tabulate" for _, name in found)
 
 
+@pytest.mark.slow
 def test_mutants_are_one_change_each_and_python() -> None:
     found = mutants(PACKAGE, functions_of(PACKAGE), 60, 3)
     assert len({(m.file, m.function, m.line, m.what) for m in found}) > 55
@@ -49,6 +50,7 @@ def test_mutants_are_one_change_each_and_python() -> None:
         assert sum(x != y for x, y in zip(a, b, strict=True)) == 1, mutant
 
 
+@pytest.mark.slow
 def test_the_seed_decides() -> None:
     places = functions_of(PACKAGE)
     one, same, other = (mutants(PACKAGE, places, 5, seed) for seed in (1, 1, 2))

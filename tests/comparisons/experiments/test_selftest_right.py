@@ -48,6 +48,7 @@ def test_synthetic_pictures_are_pictures_and_new_for_each_seed(case: RightCase):
     assert not np.array_equal(candidate, other)
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("case", of(case for case in CASES if not case.rendered))
 def test_right_synthetic_pictures_are_not_called_wrong(case: RightCase):
     """A few seeds; a thousand in the slow test."""

@@ -72,6 +72,7 @@ def test_the_page_can_be_read_by_everybody(fakes, tmp_path, check_page):
     check_page(tmp_path / "stability.html")
 
 
+@pytest.mark.slow
 def test_what_was_found_is_kept_and_the_same_again(fakes, tmp_path):
     stability(tmp_path, "--family", "T1")
     first = json.loads((tmp_path / "results.json").read_text())

@@ -23,6 +23,7 @@ def draw_of(folder, cases=300, seed=5):
     return Draw(np.random.default_rng(seed), cases, False, folder)
 
 
+@pytest.mark.slow
 def test_the_text_books_epsilon_fails_far_away_and_on_small_shapes(tmp_path):
     for name, x in (("sphere", 1e10), ("small", 1e8)):
         found = leaving.FAMILY.by_name[name].measure(draw_of(tmp_path, 3000), x)

@@ -135,6 +135,7 @@ def test_narrow_gaps_are_foretold_and_found() -> None:
     assert wide.foretold <= 0.01 * wide.hits
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["grazing", "nested_glass", "planet"])
 def test_what_is_foretold_is_what_is_found(name: str) -> None:
     of = scene(name)

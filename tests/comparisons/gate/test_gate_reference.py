@@ -45,6 +45,7 @@ class Renderings:
         return self._render(*arguments, **more)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_it_is_exact_enough_and_kept(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = Scene.parse(SCENE)
     calls = Renderings(monkeypatch)
@@ -92,6 +93,7 @@ def test_another_scene_is_another_reference(monkeypatch: pytest.MonkeyPatch) -> 
     assert calls.count > twice
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("damage", ["truncated", "rubbish", "empty", "shape"])
 def test_a_damaged_cache_is_not_believed(
     cache: Path, monkeypatch: pytest.MonkeyPatch, damage: str
@@ -117,6 +119,7 @@ def test_work_has_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "noisier than" in found.notes[1]
 
 
+@pytest.mark.slow
 def test_the_cache_forgets(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reference, "_KEPT", 1)
     for radius in ("1", "2"):
@@ -169,6 +172,7 @@ class CutOffError(BaseException):
     """In place of Ctrl-C."""
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("at", [5, reference.REPLICATES + 3])
 @pytest.mark.parametrize("how", ["interrupted", "killed"])
 def test_what_was_cut_off_continues(

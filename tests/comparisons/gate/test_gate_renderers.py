@@ -43,6 +43,7 @@ def drive(how: str, *more: str) -> tuple[Result, Any]:
     return run("--command", command, "--scene", "ball.yaml", "--suffix", ".npy", *more)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("how", "code", "verdict"), [("right", 0, "agree"), ("wrong", 1, "differ")]
 )

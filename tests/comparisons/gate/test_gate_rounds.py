@@ -64,6 +64,7 @@ def looks(case: Case) -> list[int]:
     return list(found.numbers["replicates_at_looks"])
 
 
+@pytest.mark.cases(6)
 @pytest.mark.parametrize("together", [False, True])
 @pytest.mark.parametrize(
     ("noise", "gain", "verdict", "counts"),
@@ -170,6 +171,7 @@ def test_a_reference_of_few_pictures_is_named_as_the_limit() -> None:
     assert "times the replicates of the reference" in case.reason
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize(("count", "exact"), [(4, 64), (8, 64), (8, 8), (16, 16)])
 def test_the_stated_number_of_replicates_decides(count: int, exact: int) -> None:
     """Within a factor of two and a bit: twice the number decides, a third of it does not."""

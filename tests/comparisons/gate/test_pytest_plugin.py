@@ -66,6 +66,7 @@ def run(project: pytest.Pytester, body: str, *options: str) -> pytest.RunResult:
     return project.runpytest_subprocess(*PLUGIN, "-p", "no:cacheprovider", *options)
 
 
+@pytest.mark.slow
 def test_right_pictures_pass_and_wrong_ones_say_why(project: pytest.Pytester) -> None:
     result = run(
         project,
@@ -110,6 +111,7 @@ def test_one_noisy_picture(image_gate):
     assert results["cases"][0]["scene"] == "test_it.py::test_gain"
 
 
+@pytest.mark.slow
 def test_references_files_and_errors(project: pytest.Pytester) -> None:
     picture = np.random.default_rng(1).uniform(0.2, 1.0, (32, 32, 3))
     np.save(project.path / "right.npy", picture)
@@ -167,6 +169,7 @@ def test_no_scene(image_gate):
         assert message in text, message
 
 
+@pytest.mark.slow
 def test_baselines(project: pytest.Pytester) -> None:
     body = """
 def test_ball(image_gate):
@@ -207,6 +210,7 @@ def test_ball(image_gate):
     assert "the baseline 'ball' is stale: the scene 'ball' has changed" in stale.stdout.str()
 
 
+@pytest.mark.slow
 def test_folders_are_unique_under_xdist(project: pytest.Pytester) -> None:
     project.makepyfile(
         test_many="""
@@ -293,6 +297,7 @@ def test_it(image_gate, how):
 """
 
 
+@pytest.mark.slow
 def test_no_failure_shows_frames_of_the_gate(project: pytest.Pytester) -> None:
     """Of whatever kind it is: what is shown is the line of the test, and the message."""
     rng = np.random.default_rng(1)

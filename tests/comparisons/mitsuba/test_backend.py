@@ -166,6 +166,7 @@ print(*{{line.split()[-1] for line in lines if "libLLVM" in line}})
 """
 
 
+@pytest.mark.cases(1)
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 @pytest.mark.parametrize("first", FIRST)
 def test_dr_jit_has_the_proven_llvm_whatever_comes_first(first: str, tmp_path: Path) -> None:
@@ -186,6 +187,7 @@ def test_dr_jit_has_the_proven_llvm_whatever_comes_first(first: str, tmp_path: P
     assert loaded == str(Path(proven).resolve())
 
 
+@pytest.mark.slow
 def test_only_the_backend_imports_mitsuba() -> None:
     """For the same reason.  Dr.Jit is imported in functions, which are called after that; a test
     file that imports it would change the library of all tests, since all files are read first."""

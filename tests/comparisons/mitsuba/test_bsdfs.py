@@ -109,6 +109,7 @@ def float32_bound(material: Material, wo: FloatArray, wi: FloatArray, ours: Floa
     return found + 1e-18
 
 
+@pytest.mark.cases(28)
 @pytest.mark.parametrize("material", MATERIALS, ids=lambda m: m.type)
 def test_the_same_is_scattered(material: Material) -> None:
     wo, wi = pairs(material)
@@ -196,6 +197,7 @@ SAMPLED: tuple[Material, ...] = (
 )
 
 
+@pytest.mark.cases(6)
 @pytest.mark.parametrize("material", SAMPLED, ids=lambda m: m.type)
 def test_counterparts_draw_what_they_say(material: Material) -> None:
     """The mean of the weights of those that are written here is the integral of what they give."""

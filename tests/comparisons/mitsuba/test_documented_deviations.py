@@ -121,6 +121,7 @@ def test_documented_smooth_coats():
     assert base_error(2.4)[0] == pytest.approx(0.028, abs=5e-4)
 
 
+@pytest.mark.cases(6)
 @pytest.mark.parametrize("distribution", ["ggx", "beckmann"])
 @pytest.mark.parametrize("cosine", [0.9, 0.4, -0.7, -0.9])
 def test_weights_of_rough_dielectrics(distribution, cosine):

@@ -72,6 +72,7 @@ def use(scene: Scene, counterpart: Counterpart) -> None:
         picture(counterpart.mi_scene, 1, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_counterparts(name: str, tmp_path: Path) -> None:
     scene = SCENES[name](tmp_path)
@@ -82,6 +83,7 @@ def test_counterparts(name: str, tmp_path: Path) -> None:
         assert objects(mi) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["a solid", "a mask", "a lamp of triangles"])
 def test_counterparts_in_the_fast_variant(name: str, tmp_path: Path) -> None:
     scene = SCENES[name](tmp_path)
@@ -91,6 +93,7 @@ def test_counterparts_in_the_fast_variant(name: str, tmp_path: Path) -> None:
     assert objects(mi) == before
 
 
+@pytest.mark.slow
 def test_files_of_users(tmp_path: Path) -> None:
     """As the reference of a comparison, which has our integrator for masks."""
     write_xml(SCENES["a mask"](tmp_path), tmp_path / "scene.xml")

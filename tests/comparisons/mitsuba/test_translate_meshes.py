@@ -45,6 +45,7 @@ def _scene(mesh: Mesh, where: str) -> Scene:
     return Scene(shapes=(mesh - Sphere(center=(0.0, 0.0, 1.0), radius=0.4),), **common)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(("where", "smooth"), [("alone", True), ("group", True), ("solid", False)])
 def test_numbers_of_triangles_agree(where: str, smooth: bool) -> None:
     """Where faces without area are left out, and a transform mirrors."""

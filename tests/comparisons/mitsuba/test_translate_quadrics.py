@@ -33,6 +33,7 @@ def quadric(seed: int) -> Quadric:
 FAST = 15
 
 
+@pytest.mark.cases(8)
 @pytest.mark.parametrize(
     "seed", [*range(FAST), *(pytest.param(k, marks=pytest.mark.slow) for k in range(FAST, 120))]
 )

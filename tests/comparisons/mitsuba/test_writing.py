@@ -140,6 +140,7 @@ def test_mitsuba_loads_them_and_hits_the_same(name, tmp_path):
     assert same.mean() > 0.97
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", ["whitted_classic", "spheres_whitted"])
 @pytest.mark.parametrize("set_variant", [scalar, nullcontext])
 def test_mitsuba_renders_whitted_scenes_with_our_plugin(name, set_variant, tmp_path):

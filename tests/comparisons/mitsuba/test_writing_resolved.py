@@ -64,6 +64,7 @@ def assert_same_surfaces(scene: Scene, folder: Path) -> None:
     assert (numbers[theirs.shape] == ours.shape)[met & near].mean() > 0.98
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("write", [every_shape, every_light], ids=lambda f: f.__name__)
 def test_every_shape(write, tmp_path):
     scene = Scene.load(write(tmp_path))
@@ -123,6 +124,7 @@ SOLID = (
 )
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("shape", SOLID, ids=lambda s: s.type)
 def test_what_encloses_space_is_closed(shape, tmp_path):
     """Our own set operations take them for operands."""

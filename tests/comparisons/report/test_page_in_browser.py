@@ -197,6 +197,7 @@ def test_a_single_view_says_what_a_case_lacks(show):
     assert page.get_by_text("This case has no picture of this kind").is_visible()
 
 
+@pytest.mark.slow
 def test_the_slider(show):
     page = show(case(Images(grey(0.25), grey(1.0))))
     page.keyboard.press("4")

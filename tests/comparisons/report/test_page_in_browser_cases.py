@@ -146,6 +146,7 @@ def test_without_a_script_tables_and_thumbnails_show(show):
     assert page.get_by_text("Without JavaScript there are only thumbnails").is_visible()
 
 
+@pytest.mark.slow
 def test_hostile_names_stay_text(show):
     nasty = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\u2028"
     images = Images(grey(0.25), grey(1.0), grey(0.1))
@@ -156,6 +157,7 @@ def test_hostile_names_stay_text(show):
     assert page.locator("#case-1 code").inner_text().strip() == nasty.strip()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [360, 1400])
 def test_nothing_runs_out_of_the_window(show, scheme, width):

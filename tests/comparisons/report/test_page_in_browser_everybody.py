@@ -75,6 +75,7 @@ def test_numbers_are_tables(show):
     ]
 
 
+@pytest.mark.slow
 def test_a_page_of_64_cases_is_light(show):
     """In what it does at the start: no picture is decoded that is far from the window, and no
     time is spent on collapsed cases."""

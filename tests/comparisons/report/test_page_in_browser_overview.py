@@ -161,6 +161,7 @@ def test_the_slider_is_dragged_in_the_picture(show):
         assert float(page.locator(".wipe input").input_value()) == value
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("mode", "12345")
 def test_the_name_of_a_picture_is_in_view(show, mode):
     page = show(case(PICTURES, sides=("theirs", "the baseline's")))
@@ -183,6 +184,7 @@ def test_the_name_of_a_picture_is_in_view(show, mode):
         assert page.locator("#case-1 .reference .tag").evaluate(style) == "right"
 
 
+@pytest.mark.slow
 def test_tone_mapping(show):
     """In units of white: Reinhard's curve maps 4 to white; both are monotonic and start at 0."""
     ramp = np.linspace(0.0, 8.0, 96).reshape(8, 12)[..., None] * np.ones(3)

@@ -37,6 +37,7 @@ def text_of(source: str) -> str:
     return source if "\n" in source else path.read_text(encoding="utf-8")
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", FAULTS)
 def test_faults_are_found(name: str) -> None:
     source, right, wrong = FAULTS[name]
@@ -77,6 +78,7 @@ LAMPS = {
 }
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("lamp", LAMPS)
 def test_edges_of_texels_on_lamps(lamp: str, tmp_path: Path) -> None:
     """float32 takes either texel; a shift by a tenth of a texel elsewhere is found."""
@@ -152,6 +154,7 @@ def test_surfaces_in_one_place(which: str) -> None:
     assert found.status in ("agree", "reference-limited"), found.reason
 
 
+@pytest.mark.cases(5)
 @pytest.mark.parametrize(
     "material",
     [

@@ -66,6 +66,7 @@ def gaussian(rng: np.random.Generator, picture: FloatArray, count: int) -> Float
     return picture * (1.0 + 0.1 * rng.normal(size=(count, *picture.shape)))
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("noise", [gaussian, skewed, shared])
 @pytest.mark.parametrize("counts", [(2, 2), (4, 4), (5, 16), (16, 16)])
 def test_noise_alone_agrees(picture, noise, counts) -> None:
@@ -85,6 +86,7 @@ def test_noise_alone_agrees_often(picture, noise, count) -> None:
         assert result.status == "agree", result.reason
 
 
+@pytest.mark.cases(5)
 @pytest.mark.parametrize("size", [48, 128])
 @pytest.mark.parametrize("met", [1, 2, 3, 4])
 @pytest.mark.parametrize("side", [0, 1])
@@ -134,6 +136,7 @@ def test_faults_are_seen(picture: FloatArray, fault: str) -> None:
     assert judged(candidate, reference).status == "differ"
 
 
+@pytest.mark.cases(5)
 @pytest.mark.parametrize("name", GATES)
 def test_each_metric_has_a_threshold_that_some_fault_passes(picture, name) -> None:
     clean, noisy = (

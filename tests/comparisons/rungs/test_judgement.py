@@ -51,6 +51,7 @@ def test_ours_and_exact_arithmetic_agree(scene: Scene) -> None:
         assert np.count_nonzero(ours.shape >= 0) > 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -142,6 +143,7 @@ shapes:
 """  # noqa: E501
 
 
+@pytest.mark.slow
 def test_parts_of_a_group_with_solids_have_one_number_each() -> None:
     """Shapes and operands count one by one; both renderers and exact arithmetic agree on them."""
     scene = Scene.parse(SOLIDS_IN_A_GROUP)
@@ -156,6 +158,7 @@ def test_parts_of_a_group_with_solids_have_one_number_each() -> None:
     assert found.status == "agree", found.reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_infinite_planes(seed: int) -> None:
     """Alone and in solids, however they lie: float32 turns the triangles of the mesh that stands in
@@ -205,6 +208,7 @@ ALIKE = {
 }  # fmt: skip
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", ALIKE)
 def test_faces_in_one_place(name: str, seed: int) -> None:

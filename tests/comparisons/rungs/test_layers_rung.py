@@ -60,6 +60,7 @@ def film_of(scene: Scene, names: tuple[str, ...], wide: bool = False) -> tuple[F
     return film, film
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("wide", [False, True])
 @pytest.mark.parametrize("sampler", [None, Sobol(spp=8)])
 def test_right_layers_agree(
@@ -118,6 +119,7 @@ FAULTS: dict[str, tuple[str, Callable[[Any], Any]]] = {
 }  # fmt: skip
 
 
+@pytest.mark.cases(12)
 @pytest.mark.parametrize("fault", FAULTS)
 def test_faults_are_found_and_named(
     scene: Scene, tables: Any, counterpart: Any, fault: str, monkeypatch: pytest.MonkeyPatch
@@ -153,6 +155,7 @@ def test_ray_casting(
     assert fault is None or CAST_FAULTS[fault][0] in found.reason
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", ["display_modes", "mesh_colours", "transforms", "csg_nested"])
 def test_scenes_of_ray_casting_agree(name: str) -> None:
     scene = Scene.load(SCENES / f"{name}.yaml")

@@ -109,6 +109,7 @@ MORE_FAULTS: tuple[tuple[Rung, str, str], ...] = (
 )  # fmt: skip
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     ("rung", "right", "wrong"),
     [*FAULTS, *(pytest.param(*fault, marks=pytest.mark.slow) for fault in MORE_FAULTS)],
@@ -121,6 +122,7 @@ def test_a_planted_fault_is_seen(
     assert result.reason
 
 
+@pytest.mark.slow
 def test_a_faint_scene_is_held_to_the_same_relative_bound(scene: Scene) -> None:
     text = SCENE
     for bright, faint in (

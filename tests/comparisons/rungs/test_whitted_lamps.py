@@ -34,6 +34,7 @@ CEILINGS = {
 }
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("light", ["point, position", "spot, cutoff_angle: 80, target: {}, origin"])
 @pytest.mark.parametrize("ceiling", CEILINGS)
 def test_lamps_on_a_ceiling(ceiling: str, light: str) -> None:
@@ -93,6 +94,7 @@ LAMPS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lamp", LAMPS)
 def test_edges_of_texels_in_the_middle_of_lamps(lamp: str, tmp_path: Path) -> None:
     """Mitsuba takes another texel at each surface, also at those that mirrors show; light that is a

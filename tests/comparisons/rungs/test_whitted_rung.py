@@ -51,6 +51,7 @@ def test_every_material_that_can_be_nested_is_there(scene: Scene) -> None:
     assert {*MATERIALS, "lamp"} == set(scene.materials)
 
 
+@pytest.mark.cases(17)
 @pytest.mark.parametrize("wrapper", ["mask", "blend"])
 @pytest.mark.parametrize("name", MATERIALS)
 def test_what_lies_behind_is_seen_through_it(scene: Scene, name: str, wrapper: str) -> None:
@@ -76,6 +77,7 @@ def test_what_lies_behind_is_seen_through_it(scene: Scene, name: str, wrapper: s
 OPAQUE = ("silver", "gold", "grey", "floor", "brushed", "cast", "coat", "dull", "dents", "tiles")
 
 
+@pytest.mark.cases(17)
 @pytest.mark.parametrize("back", OPAQUE)
 @pytest.mark.parametrize("front", ["silver", "floor", "dull", "mirrors"])
 def test_the_back_of_two_sides(scene: Scene, front: str, back: str) -> None:
@@ -164,6 +166,7 @@ lights: [{{type: point, position: [1, -3, 4], intensity: 3}}]
 """
 
 
+@pytest.mark.cases(8)
 @pytest.mark.parametrize("how", MAPS)
 @pytest.mark.parametrize("lamp", LAMPS)
 def test_lamps_of_every_shape(lamp: str, how: str) -> None:
@@ -240,6 +243,7 @@ shapes:
 """
 
 
+@pytest.mark.slow
 def test_rays_with_just_the_least_contribution() -> None:
     """0.01 times 0.01, which float32 rounds to less: each of such pixels is explained."""
     scene = Scene.parse(VEILS)

@@ -79,6 +79,7 @@ def test_too_little_to_tell() -> None:
 ALL = {**LAWS, **RENDERERS}
 
 
+@pytest.mark.cases(7)
 @pytest.mark.parametrize("name", ALL)
 def test_no_right_replicate_is_odd(name: str) -> None:
     """Heavy tails, and noise that pixels share."""

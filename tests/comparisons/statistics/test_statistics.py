@@ -26,6 +26,7 @@ from comparisons.statistics.decide import _decide, findings
 # The decision: specificity and equivalence
 
 
+@pytest.mark.slow
 def test_equal_distributions_agree():
     statuses = [judged(scene(), seed).status for seed in range(60)]
     assert statuses.count("agree") >= 57
@@ -109,6 +110,7 @@ def test_a_bias_within_the_margin_is_permitted():
 # The decision: sensitivity
 
 
+@pytest.mark.cases(11)
 @pytest.mark.parametrize("fault", FAULTS)
 def test_faults_are_found_and_named(fault):
     changed, words = FAULTS[fault]

@@ -92,6 +92,7 @@ def alarms_of(law, counts, cases, side=32):
     return alarms
 
 
+@pytest.mark.cases(9)
 @pytest.mark.parametrize("counts", [(4, 4), (8, 8), (16, 16), (4, 16), (16, 8)])
 @pytest.mark.parametrize("law", LAWS)
 def test_false_alarms(law, counts):
@@ -169,6 +170,7 @@ def alarms_against_a_precise_reference(law, counts, cases):
     return alarms
 
 
+@pytest.mark.cases(18)
 @pytest.mark.parametrize("counts", PRECISE)
 @pytest.mark.parametrize("law", LAWS)
 def test_false_alarms_against_a_precise_reference(law, counts):

@@ -48,6 +48,7 @@ def verdict(candidate, reference):
     return judge(evidence, 0.005)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("counts", [(16, 16), (8, 8), (8, 16), (32, 16)])
 @pytest.mark.parametrize("event", EVENTS)
 def test_a_lamp_found_by_scattered_rays_alone_does_not_differ(event, counts):

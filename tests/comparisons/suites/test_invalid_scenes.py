@@ -104,6 +104,7 @@ def check(cases, folder, more):
     assert (verdicts["a"], verdicts["differ"], verdicts["z"]) == ("agree", "differ", "agree")
 
 
+@pytest.mark.slow
 def test_a_suite_runs_the_other_scenes(tmp_path, folder, program):
     (folder / "z.json").write_text("{}")  # the name of z.yaml, which comes after it
     mine, out, junit = tmp_path / "mine.yaml", tmp_path / "out", tmp_path / "junit.xml"
@@ -149,6 +150,7 @@ def test_so_does_compare(tmp_path, folder, program):
     assert again == f"reference-rt compare {tmp_path}/other/a.yaml --fresh"
 
 
+@pytest.mark.slow
 def test_the_command_line_changes_each_scene(tmp_path, program):
     """Samples, size and seed are part of what a case is made with."""
     folder, out = scenes(tmp_path / "scenes", "a", text="integrator: {type: path}\n"), "out"

@@ -129,6 +129,7 @@ def interrupted(number, out, *arguments):
 NUMBERS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -9}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "command"),
     [(signal.SIGINT, "compare"), (signal.SIGTERM, "suite"), (signal.SIGKILL, "compare")],

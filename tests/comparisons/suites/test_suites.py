@@ -172,6 +172,7 @@ def test_controls_are_of_pictures_only(tmp_path):
 # ---- what is not run again ----------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_what_is_done_is_not_done_again(tmp_path):
     folder, out = scenes(tmp_path / "scenes", "a", "differ"), tmp_path / "out"
     first = run_in(out, folder)

@@ -22,6 +22,7 @@ from reference_rt.util.workers import Threads
 pytestmark = pytest.mark.usefixtures("fake_runners")
 
 
+@pytest.mark.slow
 def test_what_fails_is_reported_and_the_others_go_on(tmp_path):
     names = ("a", "crash", "exit", "print", "raise", "scene_error", "z")
     folder, out = scenes(tmp_path / "scenes", *names), tmp_path / "out"
@@ -58,6 +59,7 @@ def test_a_process_that_hangs_is_ended(tmp_path):
     assert found.cases[1].reason.startswith("run: took longer than 20 s")
 
 
+@pytest.mark.slow
 def test_processes_are_shared_out(tmp_path, monkeypatch):
     monkeypatch.setattr(child, "MOST_CASES", 2)
     names = [f"slow{k}" for k in range(2)] + [f"z{k}" for k in range(3)]
@@ -94,6 +96,7 @@ run.run_suite(source, planned, run.Options(Path(sys.argv[2]), runner="suite_runn
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interruption_keeps_what_is_done(tmp_path, number):
     folder, out = scenes(tmp_path / "scenes", "a", "hang"), tmp_path / "out"

@@ -88,6 +88,7 @@ def check_killed(times, cases, most, tmp_path):
     assert len(results(out)[1]) == cases
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("fake_runners")
 def test_killed_at_three_moments(tmp_path):
     check_killed(3, 60, 1.5, tmp_path)
@@ -112,6 +113,7 @@ def machines(tmp_path):
     found.end()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # those of distributed are not ours
 @pytest.mark.usefixtures("fake_runners")
 def test_a_cluster_writes_the_same_files(machines, tmp_path):

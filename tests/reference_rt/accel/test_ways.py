@@ -213,6 +213,7 @@ def test_scenes(name):
     assert 0.1 < found.hit.mean() < 0.99
 
 
+@pytest.mark.slow
 def test_instances():
     """Without a hierarchy there are none."""
     group = mesh(icosphere(2)), rt.Sphere(radius=0.3)

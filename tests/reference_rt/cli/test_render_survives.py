@@ -68,6 +68,7 @@ def check_killed(times, size, most, tmp_path):
     assert out.read_bytes() == expected.read_bytes()
 
 
+@pytest.mark.slow
 def test_killed_at_three_moments(tmp_path):
     check_killed(3, "256x256", 40, tmp_path)
 
@@ -77,6 +78,7 @@ def test_killed_at_fifty_moments(tmp_path):
     check_killed(50, "512x512", 25, tmp_path)
 
 
+@pytest.mark.slow
 def test_interrupted_and_resumed(tmp_path):
     """Ctrl-C stores what there is; --resume needs it."""
     out, expected, stored = tmp_path / "out.exr", tmp_path / "expected.exr", tmp_path / "stored"
@@ -112,6 +114,7 @@ def test_more_spp(tmp_path):
     assert out.read_bytes() == expected.read_bytes()
 
 
+@pytest.mark.slow
 def test_limits_and_previews(tmp_path):
     out, preview = tmp_path / "out.exr", tmp_path / "preview.png"
     options = ("--size", "32x32", "--spp", 100000)

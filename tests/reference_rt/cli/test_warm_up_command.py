@@ -60,6 +60,7 @@ def counts(done):
     return folder, int(compiled), int(cached)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", ["1", "2"])
 def test_what_is_compiled_is_kept(threads, tmp_path):
     done = warm_up(tmp_path, "--threads", threads)
@@ -82,6 +83,7 @@ film: {width: 4, height: 4}
 """
 
 
+@pytest.mark.slow
 def test_specialised_kernels_of_a_scene(tmp_path):
     """After that `explain` says so, and a render compiles nothing."""
     scene, folder = tmp_path / "scene.yaml", tmp_path / "cache"
@@ -136,6 +138,7 @@ def test_without_a_compiler(tmp_path):
     assert done.stderr.startswith("error: NUMBA_DISABLE_JIT is set")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is one process")
 def test_ctrl_c_keeps_what_is_compiled(tmp_path):
     command, env = program(tmp_path, "warm-up", "--threads", "2")

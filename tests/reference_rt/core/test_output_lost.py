@@ -33,6 +33,7 @@ def test_a_full_disk(arguments):
     assert done.returncode == 3
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("arguments", [EXPLAIN, ["schema"], ["--help"]], ids=" ".join)
 def test_a_reader_that_has_gone(arguments):
     """As `| head` goes: nothing is said."""
@@ -46,6 +47,7 @@ def test_a_reader_that_has_gone(arguments):
     assert done.returncode == 1
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("arguments", "code"),
     [(["explain", "no.yaml"], 3), (["render", "no.yaml", "-o", "a.txt"], 2), (EXPLAIN, 3)],

@@ -172,6 +172,7 @@ BUDGETS = [
 """How many times that, and the difference of the means that it would show."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("times", "power"), BUDGETS)
 @pytest.mark.parametrize("name", NAMES)
 def test_path_tracers(name, times, power, tmp_path):
@@ -189,6 +190,7 @@ def test_path_tracers(name, times, power, tmp_path):
         assert_agree(reference, found, what, power)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("times", "power"), BUDGETS)
 @pytest.mark.parametrize("name", NAMES)
 def test_direct_light(name, times, power, tmp_path):

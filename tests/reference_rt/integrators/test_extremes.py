@@ -20,6 +20,7 @@ def whitted(scene):
     return query.radiance_without_noise(scene.tables, rt.Whitted().setup(), *DOWN)[0]
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("factor", [2.0**-100, 1e-30, 1e-15, 1e15, 1e30, 2.0**100])
 def test_brightness_is_a_factor(factor):
     """Twice the light is twice the picture, for each sample; exactly where factors are powers of

@@ -32,6 +32,7 @@ def closed(albedo, **parts):
 
 
 # Paths are some 1 / (1 - a) long with roulette.  F10 of the stability suites goes on to 0.999.
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("albedo", "rr_depth", "spp", "power"),
     [((0.95, 0.5, 0.9), 1, 64, 5e-3), ((0.99, 0.0, 0.9), 5, 16, 1e-2)],
@@ -41,6 +42,7 @@ def test_closed_furnace_with_roulette(albedo, rr_depth, spp, power):
     assert_mean(scene, 1 / (1 - np.array(albedo)), power)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("sampling", SAMPLING)
 @pytest.mark.parametrize("albedo", [0.5, pytest.param(0.9, marks=pytest.mark.slow)])
 def test_closed_furnace_by_each_way_of_sampling(albedo, sampling):
@@ -163,6 +165,7 @@ ROUGH = {
 }
 
 
+@pytest.mark.cases(5)
 @pytest.mark.parametrize("name", ROUGH)
 @pytest.mark.parametrize("roulette", [1, 4096])
 def test_rough_bodies_never_shine(name, roulette, sky):

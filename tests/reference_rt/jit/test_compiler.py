@@ -144,6 +144,7 @@ def same_pictures(one, other):
     return a.keys() == b.keys() and all(np.array_equal(a[k], b[k], equal_nan=True) for k in a)
 
 
+@pytest.mark.slow
 @needs_jit
 def test_a_renamed_part_leaves_the_same_bits(tmp_path):
     scene = tmp_path / "ball.yaml"

@@ -40,6 +40,7 @@ def test_a_kernel_is_called_at_its_address():
     assert out.tolist() == [-3.5, -4.0, -5.0]
 
 
+@pytest.mark.slow
 def test_paths_are_the_same_with_their_tracer_apart(monkeypatch):
     """Enough spheres for a hierarchy, one in the other's light."""
     rng = np.random.default_rng(7)

@@ -46,6 +46,7 @@ def copy(tmp_path_factory):
     return parent
 
 
+@pytest.mark.slow
 def test_an_edit_of_a_callee_is_seen(copy, tmp_path):
     """Numba's own cache would return the old result: the entry's file did not change."""
     cold = first_hit(copy, tmp_path)
@@ -79,11 +80,13 @@ def test_bounds_checking_has_its_own_folder(copy, tmp_path):
     assert len(folders) == 2
 
 
+@pytest.mark.slow
 def test_no_cache_can_be_written(copy, tmp_path):
     (tmp_path / "file").write_text("")
     assert first_hit(copy, tmp_path / "file" / "cache") == ("None", 2.0, 0)
 
 
+@pytest.mark.slow
 def test_damaged_files_are_compiled_again(copy, tmp_path):
     """Without a word; the process after the next finds them whole."""
     cold = first_hit(copy, tmp_path)

@@ -71,6 +71,7 @@ def _done(process):
     return process.returncode, out.strip()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="nothing kills so")
 def test_a_writer_that_is_killed_leaves_nothing_that_is_read(start, tmp_path):
     assert _done(start(_KILLED + "run()")) == (-signal.SIGKILL, "")
@@ -101,6 +102,7 @@ for _ in range(100):
 """
 
 
+@pytest.mark.slow
 def test_processes_write_and_read_at_the_same_time(start):
     """Each finds a whole file whenever it looks."""
     together = [start(code) for code in (_WRITES, _READS, _WRITES)]

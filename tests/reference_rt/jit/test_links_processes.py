@@ -62,6 +62,7 @@ def process_that_calls(case, **environment):
     )
 
 
+@pytest.mark.cases(2)
 @pytest.mark.skipif(sys.platform == "win32", reason="no signals")
 @pytest.mark.parametrize("case", ["one of several tables", "one table", "not resolved"])
 def test_an_operation_that_is_not_linked_stops_the_process(case):
@@ -76,6 +77,7 @@ def test_a_type_without_the_kernel_needs_no_link():
     assert (done.returncode, done.stdout) == (0, "before\nafter\n")
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("compiler", [INLINING, STOCK])
 def test_errors_come_back_through_links(compiler):
     """Kernels raise none, except with Numba's check of indices."""
@@ -136,6 +138,7 @@ def main(*codes):
 """
 
 
+@pytest.mark.slow
 def test_operations_come_from_the_cache_each_as_itself(tmp_path):
     """All code of a process has one table of symbols.  Two processes number the functions that they
     compile from 1 on, so that the kernels of both types had the same symbol: a third process then

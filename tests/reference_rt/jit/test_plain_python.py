@@ -79,6 +79,7 @@ def test_same_bits(both):
     assert different == []
 
 
+@pytest.mark.slow
 def test_the_pictures_show_something(both):
     for name, pixels in both[0].items():
         assert len(np.unique(pixels)) > 3, name

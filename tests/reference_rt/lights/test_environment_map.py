@@ -87,6 +87,7 @@ def test_where_texels_stand():
     )
 
 
+@pytest.mark.slow
 def test_density_is_that_of_the_samples():
     """Chi-square; the density integrates to 1, and is luminance over its integral."""
     rng = np.random.default_rng(422)

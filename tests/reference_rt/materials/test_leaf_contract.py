@@ -15,6 +15,7 @@ FEW_AND_MANY = (
 )
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("materials", "seed", "cases"),
     [

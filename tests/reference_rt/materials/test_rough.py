@@ -49,6 +49,7 @@ def random_cases(n, seed, least=0.01):
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cases", [20, pytest.param(300, marks=pytest.mark.slow)])
 def test_samples_have_their_density_and_the_weights_their_mean(cases):
     rng = np.random.default_rng(31)
@@ -131,6 +132,7 @@ def albedo(table, wo, eta=1.0, seed=37):
 COSINES = (1.0, 0.4, 1e-3)
 
 
+@pytest.mark.cases(5)
 @pytest.mark.parametrize("distribution", ["ggx", "beckmann"])
 @pytest.mark.parametrize("alpha", [1e-3, 0.4, 10.0, (0.05, 0.8)])
 def test_no_energy_is_created(distribution, alpha):
@@ -210,6 +212,7 @@ def everything():
             yield RoughDielectric(reflectance=0, transmittance=0, **rough)
 
 
+@pytest.mark.slow
 def test_never_nan_and_the_same_bits_as_plain_python():
     rng = np.random.default_rng(39)
     ends = [towards(z, phi) for z in (0.0, 1e-300, 1e-150, 1e-9, 0.5, 1.0) for phi in (0.0, 2.0)]

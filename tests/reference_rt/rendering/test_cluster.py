@@ -105,7 +105,7 @@ def error_of(future):
         return error
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
 @pytest.mark.parametrize("is_forgotten", [False, True])
 def test_what_a_scheduler_took_along_ends(machines, cluster, number, is_forgotten):

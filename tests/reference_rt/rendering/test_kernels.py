@@ -77,6 +77,7 @@ def render_linked(*names):
     print("done")
 
 
+@pytest.mark.slow
 @needs_jit
 @pytest.mark.parametrize(
     "names",
@@ -105,6 +106,7 @@ def test_linking_asks_for_all_that_is_called(names):
 # ---- the same bits ------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @needs_jit
 @pytest.mark.parametrize("name", ALL)
 def test_linked_and_specialised_kernels_give_the_same_bits(name):
@@ -115,6 +117,7 @@ def test_linked_and_specialised_kernels_give_the_same_bits(name):
     assert len(np.unique(linked.layers[linked.shown])) > 3
 
 
+@pytest.mark.cases(1)
 @needs_jit
 @pytest.mark.parametrize("integrator", [rt.Path(), rt.Direct(), rt.Whitted()], ids=lambda i: i.type)
 def test_given_rays_have_the_same_bits(integrator, monkeypatch):
@@ -139,6 +142,7 @@ def pictures(folder, file):
     )
 
 
+@pytest.mark.slow
 def test_plain_python_knows_no_difference(tmp_path):
     arrays = same_in_plain_python(pictures, tmp_path)
     for name in ("colour", *LAYERS):

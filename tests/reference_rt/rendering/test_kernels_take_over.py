@@ -184,6 +184,7 @@ np.savez(sys.argv[1], **picture.layers)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 @pytest.mark.parametrize("fault", ["unwritable", pytest.param("full", marks=pytest.mark.slow)])
 def test_it_renders_without_a_cache(fault, scene, tmp_path):

@@ -86,6 +86,7 @@ def write_traced(folder, file):
     np.savez(file, **arrays_of(found))
 
 
+@pytest.mark.slow
 def test_rays_find_what_they_find_in_plain_python(tmp_path):
     compiled = same_in_plain_python(write_traced, tmp_path)
     for number in range(4):

@@ -114,6 +114,7 @@ def test_damaged_files_are_computed_again(box, whole, tmp_path):
     assert same(rt.render(box, checkpoint=tmp_path), whole)
 
 
+@pytest.mark.slow
 def test_a_partial_picture_says_so(box, tmp_path):
     with Session(box.changed(sampler=rt.Sobol(spp=10**6)), limits=Limits(1e9)) as session:
         with pytest.raises(Ended):
@@ -136,6 +137,7 @@ def test_a_partial_picture_says_so(box, tmp_path):
 # ---- memory -------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_bands_on_disk_change_no_bit(tmp_path, monkeypatch):
     """Three bands of which two are in memory; all layers; written some rows at a time."""
     scene = sized(small("cornell_box"), width=600, height=600, layers=LAYERS)
@@ -194,6 +196,7 @@ def test_killed_processes_are_replaced(box, monkeypatch):
     assert len(set(killed)) == 2
 
 
+@pytest.mark.slow
 def test_processes_that_cannot_live_end_the_render(box, monkeypatch):
     monkeypatch.setattr("reference_rt.rendering.executor.compute_remotely", die)
     monkeypatch.setattr("reference_rt.util.workers._MOST_DEATHS", 1)

@@ -47,6 +47,7 @@ def rays(forms):
     return o, (aims - o) * rng.uniform(0.02, 3.0, (len(aims), 1))
 
 
+@pytest.mark.slow
 def test_every_shape_is_crossed_where_its_closed_form_says(forms, rays):
     scene, known = forms
     o, d = rays

@@ -88,6 +88,7 @@ def test_laws_of_sets():
         assert sum(np.isfinite(h.t).sum() for h in hits) > N / 2
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("depth", [4, 16, 64])
 def test_deep_trees(depth):
     """A box out of which spheres in a row are taken, one difference in the other: as many as
@@ -246,6 +247,7 @@ def test_materials_of_operands_or_of_the_whole():
     assert (rt.render(wide).colour == (1, 0, 0)).all()
 
 
+@pytest.mark.slow
 def test_leaving_where_faces_coincide():
     """Rays that leave outwards from faces that operands share, or nearly: convex seen from there,
     so that nothing is met; under maps that round the operands' faces apart."""

@@ -87,6 +87,7 @@ FLAT = {
 }
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", FLAT)
 def test_leaving_the_stretched(name):
     """Sheared, mirrored, up to 1e6 times as long as wide, and 1e12 away; a plane is left as far

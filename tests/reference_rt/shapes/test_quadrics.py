@@ -49,6 +49,7 @@ def hits_of(name, distance, n):
     assert hits > least_hits(name, n)
 
 
+@pytest.mark.cases(11)
 @BY_NAME
 @pytest.mark.parametrize("distance", [(-2.0, 1.0), (3.0, 7.0)])
 def test_hits(name, distance):
@@ -163,6 +164,7 @@ RIMS = [
 ]
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize(("shape", "rim"), RIMS)
 def test_rims(shape, rim):
     """A rim belongs to the surface, also where t, the third of an integer, is rounded."""
@@ -226,6 +228,7 @@ def leave_of(name, spread, n):
     assert hits > least_hits(name, n)
 
 
+@pytest.mark.cases(17)
 @pytest.mark.parametrize("name", WELL_CONDITIONED)
 @pytest.mark.parametrize("spread", [0.3, 3.0])
 def test_leaving(name, spread):

@@ -58,6 +58,7 @@ def test_kinds_are_all():
     assert all(hasattr(module, "pdf") for _, _, _, module in TABLES if hasattr(module, "sample"))
 
 
+@pytest.mark.slow
 def test_no_convex_lamp_lights_itself(tmp_path):
     """What a ray meets of a lamp, as a receiver of that lamp: of a mesh, of each of its triangles.
 

@@ -183,6 +183,7 @@ def test_every_shape(tmp_path):
     assert compared == set(range(len(placed)))
 
 
+@pytest.mark.slow
 def test_in_instances_and_solids(tmp_path):
     """Through groups in groups, and of what a difference leaves, outside and in the cut."""
     rng = np.random.default_rng(2)

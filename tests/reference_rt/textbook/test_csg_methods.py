@@ -204,6 +204,7 @@ def check_random_trees(depth, seeds, mesh):
     return hits / len(seeds)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("depth", range(1, 7))
 def test_random_trees(depth, mesh):
     assert check_random_trees(depth, range(4), mesh) > 0.05 * N
@@ -249,6 +250,7 @@ def test_nothing_is_left_of_a_solid_without_itself(way, mesh):
             assert np.isinf(textbook.intersect(way, textbook.CsgParameters(empty), o, d)).all()
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("way", WAYS)
 def test_de_morgan(way, mesh):
     rng = np.random.default_rng(3)

@@ -42,6 +42,7 @@ def rays(n):
     return rng.uniform(-6, 6, (n, 3)), d
 
 
+@pytest.mark.slow
 def test_all_find_the_same(scene):
     o, d = rays(5000)
     expected = scene.intersect(o, d).t
