@@ -145,6 +145,12 @@ def mesh(reading: Reading, node: Node, material: str | None) -> Mesh:
     else:
         data = _data(reading, node, path)
         upside_down = node.flag("flip_tex_coords", node.plugin == "obj")
+    if data.doubtful:
+        reading.note(
+            node,
+            f"{path.name} has {' and '.join(data.doubtful)}: Mitsuba cuts polygons into fans about "
+            "their first corner, and has no values of its own where the file has none",
+        )
     if data.normals is not None and not flat and flattens(m):
         raise node.error(
             "'to_world' flattens a mesh with normals, which Mitsuba refuses, too; expected a map "

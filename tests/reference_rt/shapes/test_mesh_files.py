@@ -29,6 +29,7 @@ from mesh_writers import (
 from reference_rt.rendering.image import srgb
 from reference_rt.shapes.meshes.files import other, read_mesh
 from reference_rt.shapes.meshes.files.data import linear
+from reference_rt.shapes.meshes.files.polygons import triangulated
 
 
 def decoded(x):
@@ -56,16 +57,6 @@ def test_obj_corners_have_uv_and_normals_of_their_own(tmp_path):
     up, aslant = [0, 0, 1], [0, 0.6, 0.8]
     assert mesh.normals[mesh.faces].tolist() == [[up] * 3, [aslant, up, aslant]]
     assert len(mesh.vertices) == 5  # 3/3/1 is one vertex of both faces
-
-
-def test_obj_attributes_that_some_corners_lack_are_left_out(tmp_path):
-    text = V + "vt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\n"
-    assert read(tmp_path, text).uv is not None
-    assert read(tmp_path, text).normals is not None
-    assert read(tmp_path, text + "f 1//1 2//1 3//1\n").uv is None
-    assert read(tmp_path, text + "f 1//1 2//1 3//1\n").normals is not None
-    assert read(tmp_path, text + "f 1/1 2/1 3/1\n").normals is None
-    assert read(tmp_path, text + "f 1 2 3\n").uv is None
 
 
 def test_obj_colours_are_encoded(tmp_path):
@@ -143,7 +134,7 @@ def test_ply_of_any_polygons(tmp_path_factory, form, types, faces, beside):
         ("nothing", [], []),
     )
     mesh = read(tmp_path_factory.getbasetemp(), content, "mesh.ply")
-    expected = [(f[0], f[k], f[k + 1]) for f in faces for k in range(1, len(f) - 1)]
+    expected = triangulated(points, np.concatenate(faces), np.array([len(f) for f in faces]))[0]
     assert np.array_equal(mesh.faces, expected)
     assert np.array_equal(mesh.vertices, points)
 

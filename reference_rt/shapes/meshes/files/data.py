@@ -16,8 +16,7 @@ class MeshData:
 
     Triangles are numbered in the order of the file, those of a polygon one after the other; those
     without area are included.  A vertex whose normal, uv or colour differs between faces is several
-    vertices.  Polygons become fans about their first corner: exact for convex ones; the fan of a
-    concave one may cover area outside of it.
+    vertices.  Polygons are cut into triangles by `polygons.triangulated`.
     """
 
     vertices: FloatArray
@@ -32,6 +31,8 @@ class MeshData:
     """(n, 3) linear sRGB, finite, not negative."""
     ignored: tuple[str, ...] = ()
     """Names of ignored parts of the file, as the format calls them."""
+    doubtful: tuple[str, ...] = ()
+    """What other programs read otherwise: concave polygons, attributes of some corners."""
 
 
 class RawMesh(NamedTuple):
@@ -43,6 +44,7 @@ class RawMesh(NamedTuple):
     uv: npt.NDArray[Any] | None = None
     colours: npt.NDArray[Any] | None = None
     ignored: tuple[str, ...] = ()
+    doubtful: tuple[str, ...] = ()
 
 
 def checked(mesh: RawMesh) -> MeshData:
@@ -78,7 +80,7 @@ def checked(mesh: RawMesh) -> MeshData:
             np.where(colours < 0.0, np.nan, colours),
             "the colour of vertex {} is negative or not finite; expected numbers of at least 0",
         )
-    return MeshData(vertices, faces, _unit(mesh.normals), uv, colours, mesh.ignored)
+    return MeshData(vertices, faces, _unit(mesh.normals), uv, colours, mesh.ignored, mesh.doubtful)
 
 
 def _expect_finite(field: str, rows: FloatArray, message: str) -> None:
@@ -101,27 +103,6 @@ def _unit(normals: npt.NDArray[Any] | None) -> FloatArray | None:
         )
     n = n / largest[:, None]  # squares of extreme lengths overflow
     return np.ascontiguousarray(n / np.linalg.norm(n, axis=1, keepdims=True))
-
-
-def fans(corners: npt.NDArray[Any], counts: IntArray) -> npt.NDArray[Any]:
-    """Triangles (m, 3) of polygons: a fan about the first corner of each.
-
-    `corners`: the indices of all polygons, one after the other; `counts`: the number of corners of
-    each.
-    """
-    if len(counts) and counts.min() < 3:
-        bad = int(np.argmin(counts >= 3))
-        raise ValueError(f"face {bad} has {counts[bad]} corners; expected at least three")
-    if len(corners) == 3 * len(counts):
-        return corners.reshape(-1, 3)
-    first = np.repeat(np.cumsum(counts) - counts, counts - 2)
-    second = first + 1 + ramps(counts - 2)
-    return np.stack([corners[first], corners[second], corners[second + 1]], axis=1)
-
-
-def ramps(counts: IntArray) -> IntArray:
-    """0, 1, ..., count - 1 for each count, one after the other."""
-    return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def linear(encoded: FloatArray) -> FloatArray:

@@ -17,8 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from reference_rt.core import transform
-from reference_rt.shapes.meshes.files.data import RawMesh, fans
+from reference_rt.shapes.meshes.files.data import RawMesh
 from reference_rt.shapes.meshes.files.join import joined
+from reference_rt.shapes.meshes.files.polygons import fans
 from reference_rt.util.files import read_input
 
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}

@@ -13,8 +13,9 @@ from itertools import chain
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.shapes.meshes.files.data import RawMesh, fans, linear
+from reference_rt.shapes.meshes.files.data import RawMesh, linear
 from reference_rt.shapes.meshes.files.obj_scanner import NONE, Scanned, scan
+from reference_rt.shapes.meshes.files.polygons import doubt, triangulated
 
 Triple = tuple[int, int, int]
 
@@ -69,8 +70,9 @@ class _Corners(dict[bytes, int]):
 def read(content: bytes) -> RawMesh:
     """Vertices are numbered in the order of their first use; unused ones are left out.
 
-    An index may only refer to lines before it.  Normals and uv that not all corners have, and
-    colours that not all vertices have, are ignored.
+    An index may only refer to lines before it.  Triangles without normals or uv at a corner have
+    those of meshes without: their own normal, barycentrics.  Colours that not all vertices have are
+    ignored.
     """
     found = scan(content) if len(content) >= LARGE else None
     return read_lines(content) if found is None else _of_scanned(found)
@@ -154,21 +156,53 @@ def _mesh(
     others: dict[str, None],
 ) -> RawMesh:
     """The mesh of a file's tables;  others: what is ignored besides incomplete tables."""
+    faces, concave = triangulated(positions[triples[:, 0]], corners, counts)
     v, vt, vn = triples.T
-    of_all = {"vn": bool((vn != NONE).all()), "vt": bool((vt != NONE).all())}
-    if len(normals) and of_all["vn"]:
+    doubtful = doubt(concave)
+    has: dict[str, IntArray] = {"vn": vn[faces] != NONE, "vt": vt[faces] != NONE}
+    if has["vn"].any():
         others.pop("s (smoothing groups)", None)  # the normals contain them
+    lack = {name: ~of.all(axis=1) for name, of in has.items() if of.any()}
+    doubtful += tuple(f"{name} of some corners" for name, of in lack.items() if of.any())
+    own = np.logical_or.reduce([np.zeros(len(faces), np.bool_), *lack.values()])
+    if own.any():
+        # These triangles have vertices of their own.
+        more = faces[own].ravel()
+        faces = faces.copy()
+        faces[own] = len(v) + np.arange(len(more)).reshape(-1, 3)
+        v, vt, vn = (np.concatenate([x, x[more]]) for x in (v, vt, vn))
+    points = positions[v]
+    of_vertices = {}
     for name, table in (("vn", normals), ("vt", uv)):
-        if len(table) and not of_all[name]:
-            others[f"{name} of some corners"] = None
+        if name in lack:
+            index = vn if name == "vn" else vt
+            of_vertices[name] = table[index]
+            of_vertices[name][index == NONE] = 1.0  # of no triangle any more
+            at = faces[lack[name]]
+            of_vertices[name][at] = _own_normals(points[at]) if name == "vn" else _BARYCENTRICS
     return RawMesh(
-        positions[v],
-        fans(corners, counts),
-        normals[vn] if of_all["vn"] else None,
-        uv[vt] if of_all["vt"] else None,
+        points,
+        faces,
+        of_vertices.get("vn"),
+        of_vertices.get("vt"),
         None if colours is None else linear(colours[v]),
         tuple(others),
+        doubtful,
     )
+
+
+_BARYCENTRICS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+"""uv at the corners of a triangle without them."""
+
+
+def _own_normals(p: FloatArray) -> FloatArray:
+    """Normals (m, 1, 3) of triangles (m, 3, 3), of any length; any for those without area, which
+    nothing hits."""
+    edges = p[:, 1:] - p[:, :1]
+    edges /= np.maximum(np.abs(edges).max(axis=(1, 2), keepdims=True), np.finfo(float).tiny)
+    n = np.cross(edges[:, 0], edges[:, 1])
+    n[~n.any(axis=1)] = (0.0, 0.0, 1.0)
+    return n[:, None]
 
 
 def _note(kind: bytes, words: list[bytes], others: dict[str, None]) -> None:

@@ -8,7 +8,8 @@ from itertools import islice
 
 import numpy as np
 
-from reference_rt.shapes.meshes.files.data import RawMesh, fans
+from reference_rt.shapes.meshes.files.data import RawMesh
+from reference_rt.shapes.meshes.files.polygons import doubt, triangulated
 
 
 def read(content: bytes) -> RawMesh:
@@ -56,11 +57,11 @@ def read(content: bytes) -> RawMesh:
         raise ValueError(f"it ends within its {n_vertices} vertices and {n_faces} faces")
     if (left := next(lines, None)) is not None:
         raise ValueError(f"line {left[0]}: something is left after the last face")
-    return RawMesh(
-        np.frombuffer(points, np.float64).reshape(-1, 3),
-        fans(np.frombuffer(corners, np.int64), np.frombuffer(counts, np.int64)),
-        ignored=tuple(ignored),
+    vertices = np.frombuffer(points, np.float64).reshape(-1, 3)
+    faces, concave = triangulated(
+        vertices, np.frombuffer(corners, np.int64), np.frombuffer(counts, np.int64)
     )
+    return RawMesh(vertices, faces, ignored=tuple(ignored), doubtful=doubt(concave))
 
 
 def _kind(word: bytes) -> str:

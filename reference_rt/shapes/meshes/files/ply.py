@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.shapes.meshes.files.data import RawMesh, fans, linear
+from reference_rt.shapes.meshes.files.data import RawMesh, linear
 from reference_rt.shapes.meshes.files.ply_body import (
     Array,
     Element,
@@ -24,6 +24,7 @@ from reference_rt.shapes.meshes.files.ply_body import (
     lists,
     numbers,
 )
+from reference_rt.shapes.meshes.files.polygons import doubt, triangulated
 
 # Both sets of names are in use.
 _TYPES = {
@@ -65,6 +66,7 @@ def read(content: bytes) -> RawMesh:
         body = memoryview(numbers(bytes(body)).tobytes())
     mesh, position = RawMesh(np.zeros((0, 3)), np.zeros((0, 3), np.int64)), 0
     ignored: list[str] = []
+    polygons = None
     for element in header.elements:
         if element.name == "vertex":
             table, position = columns(body, position, element)
@@ -88,7 +90,7 @@ def read(content: bytes) -> RawMesh:
             corners, counts, position = lists(body, position, element, _indices(element))
             if not np.all(np.isfinite(corners) & (corners == np.trunc(corners))):
                 raise ValueError("it has an index that is no integer")
-            mesh = mesh._replace(faces=fans(corners.astype(np.int64), counts))
+            polygons = corners.astype(np.int64), counts
             used = _indices(element).name
             ignored += [f"face {p.name}" for p in element.properties if p.name != used]
         else:
@@ -99,6 +101,9 @@ def read(content: bytes) -> RawMesh:
         left = (len(body) - position) // (8 if ascii_ else 1)
         what = "numbers" if ascii_ else "bytes"
         raise ValueError(f"{left} {what} are left after all that its header promises")
+    if polygons is not None:
+        faces, concave = triangulated(mesh.vertices, *polygons)
+        mesh = mesh._replace(faces=faces, doubtful=doubt(concave))
     return mesh._replace(ignored=tuple(ignored))
 
 

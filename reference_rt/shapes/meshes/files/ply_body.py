@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.shapes.meshes.files.data import ramps
+from reference_rt.shapes.meshes.files.polygons import ramps
 
 Array = npt.NDArray[Any]
 
