@@ -30,6 +30,7 @@ def fans(corners: npt.NDArray[Any], counts: IntArray) -> npt.NDArray[Any]:
     return np.stack([corners[first], corners[second], corners[second + 1]], axis=1)
 
 
+@np.errstate(all="ignore")  # polygons without area, numbers that overflow
 def triangulated(
     points: npt.NDArray[Any], corners: npt.NDArray[Any], counts: IntArray
 ) -> tuple[npt.NDArray[Any], int]:
@@ -42,8 +43,7 @@ def triangulated(
     triangles = fans(corners, counts)
     if len(triangles) == len(counts):
         return triangles, 0
-    with np.errstate(all="ignore"):  # polygons without area, numbers that overflow
-        concave = _concave(np.asarray(points, np.float64), corners, counts)
+    concave = _concave(np.asarray(points, np.float64), corners, counts)
     if len(concave) == 0:
         return triangles, 0
     firsts, starts = np.cumsum(counts) - counts, np.cumsum(counts - 2) - (counts - 2)
