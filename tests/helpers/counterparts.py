@@ -22,12 +22,6 @@ def coarse_meshes(*cells: int) -> Iterator[None]:
         yield
 
 
-def faulty_counterpart(text: str, right: str, wrong: str, folder: Path | None = None) -> Any:
-    """The counterpart of a scene, with one thing in it replaced."""
-    assert text.count(right) == 1
-    return load(Scene.parse(text.replace(right, wrong), folder=folder))
-
-
 EVERY_MATERIAL = """
 camera: {type: perspective, eye: [0.3, 1.5, 9], target: [0, 0.5, 0], fov: 40}
 film: {width: 24, height: 16}
@@ -134,3 +128,51 @@ def every_material(folder: Path) -> Scene:
 def counterpart_of(scene: Scene) -> Any:
     """Standing where the scene does."""
     return load(scene, OURS)
+
+
+COLOURED = """
+camera: {type: perspective, eye: [0.4, 1.5, 3], target: [0, 0, 0], fov: 45}
+film: {width: 24, height: 18}
+integrator: {type: path, max_depth: 3}
+textures:
+  c: {type: vertex_colours, scale: 0.9}
+  im: {type: bitmap, file: colours.png}
+  h: {type: bitmap, file: heights.png, encoding: raw}
+  n: {type: bitmap, file: normals.png, encoding: raw}
+materials:
+  grey: {type: diffuse, reflectance: 0.5}
+  coat: COAT
+  m: AROUND
+shapes:
+  - type: mesh
+    vertices: [[-1, 0, -1], [1, 0, -1], [1, 0.1, 1], [-1, 0, 1]]
+    faces: [[0, 2, 1], [0, 3, 2]]
+    uv: [[0, 0], [1, 0], [1, 1], [0, 1]]
+    colours: [[0.9, 0.1, 0], [0, 0.8, 0.2], [0.1, 0, 1], [0.7, 0.7, 0.1]]
+    material: m
+lights: LIGHTS
+"""
+COATS = {
+    "base": "{type: plastic, reflectance: c}",
+    "nonlinear base": "{type: plastic, reflectance: c, nonlinear: true, interior_ior: 1.9}",
+    "coat": "{type: plastic, reflectance: im, specular: c}",
+    "both": "{type: plastic, reflectance: c, specular: c}",
+    "rough base": "{type: rough_plastic, reflectance: c, alpha: 0.2}",
+    "rough coat": "{type: rough_plastic, specular: c, alpha: 0.3, distribution: beckmann}",
+    "rough both": "{type: rough_plastic, reflectance: c, specular: c, alpha: 0.4, nonlinear: true}",
+    "no coat": "{type: rough_plastic, reflectance: c, specular: c, interior_ior: 1}",
+}
+WRAPPERS = {
+    "two-sided": "{type: two_sided, base: coat}",
+    "mask": "{type: mask, base: coat, opacity: 0.6}",
+    "blend": "{type: blend, first: coat, second: grey, weight: 0.3}",
+    "bump": "{type: bump, base: coat, height: h, scale: 0.05}",
+    "normal map": "{type: normal_map, base: coat, normals: n}",
+}
+LAMPS = "[{type: point, position: [1, 2, -1], intensity: 9}, {type: constant, radiance: 0.7}]"
+
+
+def coated(coat: str, around: str = "two-sided", lights: str = LAMPS) -> str:
+    """A square with one of COATS, which have colours of vertices, inside one of WRAPPERS."""
+    text = COLOURED.replace("COAT", COATS[coat]).replace("AROUND", WRAPPERS[around])
+    return text.replace("LIGHTS", lights)
