@@ -239,7 +239,7 @@ def test_it(request):
     assert not heavy & set(sys.modules)
 """
     )
-    result = project.runpytest_subprocess(*PLUGIN, "-p", "no:hypothesispytest")
+    result = project.runpytest_subprocess(*PLUGIN, "-p", "no:hypothesispytest", "-p", "no:randomly")
     result.assert_outcomes(passed=1)
 
 

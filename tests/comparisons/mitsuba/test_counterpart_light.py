@@ -227,6 +227,7 @@ def test_uv_are_ours(name: str, placed: str, image_folder: Path) -> None:
     assert (off > 2e-3).any(axis=1).mean() < 0.005
 
 
+@pytest.mark.slow
 def test_how_far_uv_slip_between_vertices_is_measured() -> None:
     scene = Scene.load(SCENES / "textured_curves.yaml")
     scene = scene.changed(film=scene.film.model_copy(update={"width": 32, "height": 24}))
@@ -454,6 +455,7 @@ def whole(image_folder: Path) -> dict[str, Scene]:
     return {name: Scene.parse(text, folder=image_folder) for name, text in WHOLE.items()}
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", WHOLE)
 def test_light_in_whole_scenes(name: str, whole: dict[str, Scene]) -> None:
     scene = whole[name]

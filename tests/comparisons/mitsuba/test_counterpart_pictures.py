@@ -266,7 +266,7 @@ def lit(operation: str, material: str) -> Scene:
 # ---- means --------------------------------------------------------------------------------------
 
 
-@pytest.mark.cases(8)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", LAMPS)
 def test_lamps(name: str) -> None:
     """Direct light value by value and Whitted ray tracing pixel by pixel, too."""
@@ -280,7 +280,7 @@ def test_lamps(name: str) -> None:
     assert agree(by_ours(scene), theirs, 0.03)
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("integrator", ["path", "direct"])
 @pytest.mark.parametrize("lamp", HIDDEN)
 def test_hidden_lamps(lamp: str, integrator: str) -> None:
@@ -306,7 +306,7 @@ def test_masks_that_are_partly_opaque(opacity: float | str, light: str) -> None:
     assert agree(by_ours(scene), by_mitsuba(counterpart.mi_scene, scene), 0.01)
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("operation", "material"),
     [("difference", "coat"), ("intersection", "glass"), ("union", "glow")],

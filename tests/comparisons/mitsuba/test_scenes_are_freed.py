@@ -62,7 +62,7 @@ SCENES: dict[str, Callable[[Path], Scene]] = {
 def objects(mi: Any) -> int:
     """The objects of Mitsuba that Python knows: a scene has none that do not belong to plugins."""
     gc.collect()
-    return sum(isinstance(one, mi.Object) for one in gc.get_objects())
+    return sum(issubclass(type(one), mi.Object) for one in gc.get_objects())
 
 
 def use(scene: Scene, counterpart: Counterpart) -> None:
