@@ -110,6 +110,7 @@ def cells_run(code):
             yield None
 
 
+@pytest.mark.slow
 def test_tour(monkeypatch):
     monkeypatch.chdir(ROOT)
     _, picture, fields, (t, shape, _), case = cells_run(CODE)

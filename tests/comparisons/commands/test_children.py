@@ -135,7 +135,7 @@ def compiling(folder):
     return process, below(process.pid)
 
 
-@pytest.mark.cases(2)
+@pytest.mark.slow
 @linux
 @pytest.mark.parametrize(
     ("start", "number"),

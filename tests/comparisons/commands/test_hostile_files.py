@@ -135,6 +135,7 @@ def _soon():
     signal.signal(signal.SIGALRM, before)
 
 
+@pytest.mark.cases(271)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", READERS)
 def test_every_reader_of_everything(tmp_path, name, kind):
@@ -218,7 +219,7 @@ COMMANDS = (
 )
 
 
-@pytest.mark.cases(46)
+@pytest.mark.cases(26)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
 def test_every_command_and_every_name(tmp_path, monkeypatch, command, name):
@@ -234,7 +235,7 @@ def test_every_command_and_every_name(tmp_path, monkeypatch, command, name):
     assert "internal error" not in result.stderr
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["not UTF-8", "a terminal's code"])
 def test_a_picture_of_any_name(tmp_path, name):
     """It is written, and says which scene it is of."""

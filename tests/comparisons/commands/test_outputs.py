@@ -143,7 +143,7 @@ CASES = [
 ]
 
 
-@pytest.mark.cases(48)
+@pytest.mark.cases(24)
 @pytest.mark.parametrize(("command", "option", "file", "how"), CASES)
 @pytest.mark.usefixtures("fake_runners", "idle")
 def test_an_output_that_cannot_be_written_is_refused_before_work_begins(
@@ -197,6 +197,7 @@ def test_a_baseline_is_not_written_over_a_file(tmp_path):
     assert (tmp_path / "baselines" / "room").read_text() == "mine"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("fake_runners")
 def test_the_page_of_a_former_run_does_not_outlive_it(tmp_path):
     """A run that is killed leaves no page that says what an earlier run found."""

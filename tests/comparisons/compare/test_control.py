@@ -39,6 +39,7 @@ def silent(step: str) -> None:
     pass
 
 
+@pytest.mark.slow
 def test_mitsuba_agrees_with_itself(scene: Scene) -> None:
     budget = Budget(control=True, spp=512, replicates=8, limit=0.05)
     case = compare_scene(Subject(scene), budget, silent)

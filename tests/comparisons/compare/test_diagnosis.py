@@ -93,7 +93,7 @@ PLANTED = {
 }
 
 
-@pytest.mark.cases(18)
+@pytest.mark.cases(10)
 @pytest.mark.parametrize(
     "name",
     [

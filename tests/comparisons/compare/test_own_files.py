@@ -71,6 +71,7 @@ def test_a_scene_agrees_with_its_own_file(tmp_path):
     assert any("own.xml itself, loaded by Mitsuba" in note for note in case.notes)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*its moments are left out")
 def test_a_wrong_reading_differs_from_the_file(tmp_path):
     scene = scene_of(tmp_path)
@@ -209,6 +210,7 @@ SUMMED = """<scene version="3.0.0">
 """
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     "samples",
     [
@@ -225,6 +227,7 @@ def test_light_samples_that_mitsuba_adds_up_are_foretold(tmp_path, samples):
     assert any("adds up its samples" in note and "with 3" in note for note in case.notes)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*its moments are left out")
 def test_clipping_planes_are_those_of_the_file(tmp_path):
     """And a file without has Mitsuba's: what is farther than 10,000 is cut."""

@@ -58,6 +58,7 @@ def check_killed(times, tmp_path):
     assert pictures(out) == pictures(whole)
 
 
+@pytest.mark.slow
 def test_killed_at_three_moments(tmp_path):
     check_killed(3, tmp_path)
 

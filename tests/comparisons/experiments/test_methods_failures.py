@@ -38,6 +38,7 @@ def test_the_robust_sphere_errs_at_the_rim_on_the_fence_alone(x):
     assert surely_wrong(measured("sphere", "rim", x)["robust"]) == 0
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", ["edges", "vertices"])
 @pytest.mark.parametrize("x", [1.0, 1e4])
 def test_only_the_watertight_triangle_has_no_gaps(name, x):

@@ -113,6 +113,7 @@ def test_centred_pools_have_one_mean():
     assert len(np.unique(one[:, 0, 0, 0])) == 4
 
 
+@pytest.mark.slow
 def test_the_stated_bias_is_caught_and_half_of_it_seldom():
     found = of_pools("gamma", pools_of(0.1).centred(), 60, 16)
     assert 0.005 < found.stated < 0.015
@@ -120,6 +121,7 @@ def test_the_stated_bias_is_caught_and_half_of_it_seldom():
     assert found.half_caught <= 0.2
 
 
+@pytest.mark.slow
 def test_a_bias_that_is_there_already_spoils_the_calibration():
     """It is measured, not presumed."""
     found = of_pools("gamma", pools_of(0.1, 1.002), 60, 16)

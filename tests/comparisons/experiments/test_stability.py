@@ -129,6 +129,7 @@ def test_usage(fakes, tmp_path, options, said):
     assert said in told
 
 
+@pytest.mark.slow
 def test_an_end_of_the_run_keeps_what_was_found(fakes, tmp_path):
     """SIGTERM in the midst: the first setting is kept, and no process stays behind."""
     script = (

@@ -212,6 +212,7 @@ def test_a_missing_triangle_is_seen_in_pictures(series, x, tmp_path, monkeypatch
     assert 0 < found.failures <= 2 * light.FEW * 48 * 36
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("series", "x"), LIGHT_SERIES)
 def test_a_few_pixels_are_seen(series, x, tmp_path, monkeypatch):
     """Twelve pixels of each picture 1e-6 brighter: no scene that is moved by itself shows that."""

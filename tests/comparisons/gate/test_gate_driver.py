@@ -73,6 +73,7 @@ def test_each_seed_has_its_picture(renderer: str, tmp_path: Path) -> None:
     assert said == [f"candidate {k + 1}, seed {5 + k}" for k in range(3)]
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize(
     ("how", "message"),
     [

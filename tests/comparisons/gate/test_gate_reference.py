@@ -81,6 +81,7 @@ def test_it_is_exact_enough_and_kept(cache: Path, monkeypatch: pytest.MonkeyPatc
     np.testing.assert_allclose(of_scene(scene, LIMIT / 2).pictures, closer.pictures, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_another_scene_is_another_reference(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = Renderings(monkeypatch)
     of_scene(Scene.parse(SCENE), LIMIT)
@@ -93,7 +94,7 @@ def test_another_scene_is_another_reference(monkeypatch: pytest.MonkeyPatch) -> 
     assert calls.count > twice
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", ["truncated", "rubbish", "empty", "shape"])
 def test_a_damaged_cache_is_not_believed(
     cache: Path, monkeypatch: pytest.MonkeyPatch, damage: str
@@ -172,7 +173,7 @@ class CutOffError(BaseException):
     """In place of Ctrl-C."""
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("at", [5, reference.REPLICATES + 3])
 @pytest.mark.parametrize("how", ["interrupted", "killed"])
 def test_what_was_cut_off_continues(

@@ -57,6 +57,7 @@ def test_a_renderer_is_driven(right: FloatArray, how: str, code: int, verdict: s
     assert found["provenance"]["command"].endswith("{output} {seed} {scene} {spp}")
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize(
     ("how", "message"),
     [

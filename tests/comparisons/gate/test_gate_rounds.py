@@ -64,7 +64,7 @@ def looks(case: Case) -> list[int]:
     return list(found.numbers["replicates_at_looks"])
 
 
-@pytest.mark.cases(6)
+@pytest.mark.cases(5)
 @pytest.mark.parametrize("together", [False, True])
 @pytest.mark.parametrize(
     ("noise", "gain", "verdict", "counts"),
@@ -171,7 +171,7 @@ def test_a_reference_of_few_pictures_is_named_as_the_limit() -> None:
     assert "times the replicates of the reference" in case.reason
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(("count", "exact"), [(4, 64), (8, 64), (8, 8), (16, 16)])
 def test_the_stated_number_of_replicates_decides(count: int, exact: int) -> None:
     """Within a factor of two and a bit: twice the number decides, a third of it does not."""
@@ -221,6 +221,7 @@ def many(size: str, *more: str) -> tuple[Any, Any]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("gate_folder")
 def test_one_start_makes_all_seeds_at_the_size_that_was_asked_for() -> None:
     result, found = many("24x16")

@@ -166,7 +166,7 @@ print(*{{line.split()[-1] for line in lines if "libLLVM" in line}})
 """
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 @pytest.mark.parametrize("first", FIRST)
 def test_dr_jit_has_the_proven_llvm_whatever_comes_first(first: str, tmp_path: Path) -> None:

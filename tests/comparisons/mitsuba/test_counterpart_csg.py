@@ -118,6 +118,7 @@ MIXED = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_solids_beside_shapes() -> None:
     scene = scene_of(*MIXED)
@@ -206,6 +207,7 @@ def mapped(shape: str, mirrored: bool) -> str:
     return f"{shape[:-1]}, transform: [{steps}]}}"
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize(
     ("operand", "mirrored"),
     [(MESH, k) for k in range(16)]

@@ -147,7 +147,7 @@ def agrees(scene: Scene, rays: int = 80) -> list[float]:
 # ---- shapes, maps, materials --------------------------------------------------------------------
 
 
-@pytest.mark.cases(9)
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("placed", MAPS)
 @pytest.mark.parametrize("shape", SHAPES)
 def test_light_on_shapes_under_maps(shape: str, placed: str, image_folder: Path) -> None:
@@ -455,7 +455,7 @@ def whole(image_folder: Path) -> dict[str, Scene]:
     return {name: Scene.parse(text, folder=image_folder) for name, text in WHOLE.items()}
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", WHOLE)
 def test_light_in_whole_scenes(name: str, whole: dict[str, Scene]) -> None:
     scene = whole[name]
@@ -501,7 +501,7 @@ FAULTS: tuple[tuple[str, Any, str, str], ...] = (
 )
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(("name", "rung", "right", "wrong"), FAULTS)
 def test_a_planted_fault_is_seen(
     name: str, rung: Any, right: str, wrong: str, whole: dict[str, Scene], image_folder: Path
@@ -613,7 +613,7 @@ def test_bumps_that_mitsuba_gets_wrong(
     assert uv or "Mitsuba's [0. 0. 0.]" in own.reason
 
 
-@pytest.mark.cases(8)
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("around", WRAPPERS)
 @pytest.mark.parametrize("coat", COATS)
 def test_plastics_with_colours_of_vertices(coat: str, around: str, image_folder: Path) -> None:

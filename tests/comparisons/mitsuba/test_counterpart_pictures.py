@@ -266,7 +266,7 @@ def lit(operation: str, material: str) -> Scene:
 # ---- means --------------------------------------------------------------------------------------
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", LAMPS)
 def test_lamps(name: str) -> None:
     """Direct light value by value and Whitted ray tracing pixel by pixel, too."""
@@ -280,7 +280,7 @@ def test_lamps(name: str) -> None:
     assert agree(by_ours(scene), theirs, 0.03)
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("integrator", ["path", "direct"])
 @pytest.mark.parametrize("lamp", HIDDEN)
 def test_hidden_lamps(lamp: str, integrator: str) -> None:
@@ -441,6 +441,7 @@ def test_light_on_solids(operation: str, material: str) -> None:
             assert found.status == "agree" or "no material" in found.reason, found.reason
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [

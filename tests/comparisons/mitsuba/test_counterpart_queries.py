@@ -89,6 +89,7 @@ def test_every_type_of_shape_is_compared(shapes: Scene) -> None:
     assert found == {*Primitive.__args__, Instance, Difference}  # of set operations one
 
 
+@pytest.mark.slow
 def test_crossings_are_repeated_ray_intersections(shapes: Scene) -> None:
     """Of rays whose crossings are so far apart that Mitsuba can leave each without passing two."""
     with coarse_meshes(512, 256):

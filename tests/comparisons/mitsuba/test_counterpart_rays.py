@@ -71,6 +71,7 @@ shapes:
 """  # noqa: E501
 
 
+@pytest.mark.cases(5)
 @pytest.mark.parametrize("shear", [3e-15, 3.3e-15, 5e-15, 7e-15, 1e-10])
 @pytest.mark.parametrize("name", ROUND)
 def test_maps_that_are_nearly_similarities(name: str, shear: float) -> None:
@@ -93,6 +94,7 @@ def climbed(ours: str, theirs: str) -> RungResult:
     return geometry(scene, build_tables(scene), load(Scene.parse(theirs)), pixels=700)
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("name", SCENES)
 def test_a_counterpart_is_met_in_the_same_places(name: str) -> None:
     text = text_of(SCENES[name][0])
@@ -107,6 +109,7 @@ def test_a_counterpart_is_met_in_the_same_places(name: str) -> None:
             assert stand_in["sag"] < 1e-4
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", SCENES)
 def test_another_counterpart_is_distinguished(name: str) -> None:
     shape, right, wrong = SCENES[name]
@@ -115,6 +118,7 @@ def test_another_counterpart_is_distinguished(name: str) -> None:
     assert climbed(text, text.replace(right, wrong)).status == "differ"
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     "change",
     [("", ""), ("[-2, 0, 0]", "[-2.001, 0, 0]"), ("[2, 0, 0]", "[0, 0, 2]"), ("-1.4", "1.4")],

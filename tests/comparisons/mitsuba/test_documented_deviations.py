@@ -100,6 +100,7 @@ def documented():
 QUICK = {(1.5, 0.01), (1.9, 0.1), (1.3, 0.5)}
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("index", "alpha", "ggx", "beckmann"),
     [

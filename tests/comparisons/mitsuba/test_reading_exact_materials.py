@@ -145,7 +145,7 @@ def test_the_exact_material_has_the_files_own_parameters(material: str, tmp_path
     assert error < 3e-3  # a twelfth of what a blend with a mirror is off
 
 
-@pytest.mark.cases(6)
+@pytest.mark.cases(5)
 @FAST
 @pytest.mark.parametrize("material", FAR_OFF)
 def test_mitsubas_own_differs(

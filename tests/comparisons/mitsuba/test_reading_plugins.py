@@ -54,7 +54,7 @@ def fast() -> None:
         pytest.skip("needs a variant of Mitsuba that takes many rays at once")
 
 
-@pytest.mark.cases(31)
+@pytest.mark.cases(17)
 @pytest.mark.parametrize("kind", ["sphere", "rectangle"])
 @pytest.mark.parametrize("name", BSDFS)
 def test_light_of_bsdfs_is_that_of_mitsuba(name, kind, images):

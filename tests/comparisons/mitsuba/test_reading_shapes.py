@@ -104,7 +104,7 @@ def case(kind: str, to_world: str, flip: bool, textured: bool, folder: Path) -> 
     return {"s": {**shape, "to_world": MAPS[to_world](), "flip_normals": flip, "bsdf": bsdf}}
 
 
-@pytest.mark.cases(115)
+@pytest.mark.cases(67)
 @pytest.mark.parametrize("textured", [False, True], ids=["plain", "textured"])
 @pytest.mark.parametrize("flip", [False, True], ids=["", "flipped"])
 @pytest.mark.parametrize("to_world", MAPS)

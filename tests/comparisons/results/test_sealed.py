@@ -72,7 +72,7 @@ def as_lists(found):
 KEEPERS = (rung, picture, fact, reference_of_gate, reference_of_converge, record)
 
 
-@pytest.mark.cases(5)
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("keeper", KEEPERS, ids=lambda k: k.__name__)
 def test_damage_is_not_believed(tmp_path, keeper):
     """Every length that a file could be cut to, and 1,000 changed bits, or all if it has fewer."""

@@ -60,7 +60,7 @@ def film_of(scene: Scene, names: tuple[str, ...], wide: bool = False) -> tuple[F
     return film, film
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("wide", [False, True])
 @pytest.mark.parametrize("sampler", [None, Sobol(spp=8)])
 def test_right_layers_agree(
@@ -119,7 +119,7 @@ FAULTS: dict[str, tuple[str, Callable[[Any], Any]]] = {
 }  # fmt: skip
 
 
-@pytest.mark.cases(12)
+@pytest.mark.cases(5)
 @pytest.mark.parametrize("fault", FAULTS)
 def test_faults_are_found_and_named(
     scene: Scene, tables: Any, counterpart: Any, fault: str, monkeypatch: pytest.MonkeyPatch
@@ -155,7 +155,7 @@ def test_ray_casting(
     assert fault is None or CAST_FAULTS[fault][0] in found.reason
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", ["display_modes", "mesh_colours", "transforms", "csg_nested"])
 def test_scenes_of_ray_casting_agree(name: str) -> None:
     scene = Scene.load(SCENES / f"{name}.yaml")
@@ -230,6 +230,7 @@ GROUND = {
 }
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("height", [0.2, 1.0, 3.0])
 @pytest.mark.parametrize("name", GROUND)
 def test_textures_up_to_the_horizon(name: str, height: float, image_folder: Path) -> None:

@@ -8,6 +8,7 @@ from comparisons.rungs.rays.neighbours import is_mixture
 RNG = np.random.default_rng(5)
 
 
+@pytest.mark.cases(13)
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 193])
 def test_weighted_means_are_mixtures_and_what_lies_outside_is_none(count, scale):

@@ -88,6 +88,7 @@ def test_a_wider_limit_is_met_sooner():
         judged(scene(), limit=0.001)
 
 
+@pytest.mark.slow
 def test_noise_is_inconclusive_and_the_stated_samples_decide():
     decided = 0
     for seed in range(20):
@@ -110,7 +111,7 @@ def test_a_bias_within_the_margin_is_permitted():
 # The decision: sensitivity
 
 
-@pytest.mark.cases(11)
+@pytest.mark.cases(7)
 @pytest.mark.parametrize("fault", FAULTS)
 def test_faults_are_found_and_named(fault):
     changed, words = FAULTS[fault]

@@ -92,7 +92,7 @@ def alarms_of(law, counts, cases, side=32):
     return alarms
 
 
-@pytest.mark.cases(9)
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("counts", [(4, 4), (8, 8), (16, 16), (4, 16), (16, 8)])
 @pytest.mark.parametrize("law", LAWS)
 def test_false_alarms(law, counts):
@@ -119,6 +119,7 @@ def test_false_alarms_of_the_smoke_suite():
     assert statuses.count("differ") + statuses.count("invalid") <= 1
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("law", [normal, lognormal, fireflies, on_and_off, texture])
 def test_false_alarms_of_a_single_picture(law):
     alarms = 0
@@ -130,6 +131,7 @@ def test_false_alarms_of_a_single_picture(law):
     assert alarms == 0
 
 
+@pytest.mark.cases(10)
 @pytest.mark.parametrize("count", [1, 4, 16])
 @pytest.mark.parametrize("law", [normal, lognormal, fireflies, on_and_off, texture])
 def test_false_alarms_against_a_known_mean(law, count):
@@ -170,7 +172,7 @@ def alarms_against_a_precise_reference(law, counts, cases):
     return alarms
 
 
-@pytest.mark.cases(18)
+@pytest.mark.cases(7)
 @pytest.mark.parametrize("counts", PRECISE)
 @pytest.mark.parametrize("law", LAWS)
 def test_false_alarms_against_a_precise_reference(law, counts):

@@ -152,6 +152,7 @@ def test_nothing_to_run_is_no_success(tmp_path):
         plan(suite(), tmp_path / "none")
 
 
+@pytest.mark.slow
 def test_only_some_rungs(tmp_path):
     folder = scenes(tmp_path / "scenes", "a", "b")
     found = run_in(tmp_path / "out", folder, rungs=("whitted",))
@@ -192,6 +193,7 @@ def test_what_is_done_is_not_done_again(tmp_path):
     assert "differ" in (out / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_damaged_record_is_made_again(tmp_path):
     folder, out = scenes(tmp_path / "scenes", "a"), tmp_path / "out"
     first = run_in(out, folder)

@@ -30,6 +30,7 @@ def test_the_command_as_a_whole(tmp_path, program):
     assert again[:6] == ["reference-rt", "suite", str(mine), "--only", "a", "--fresh"]
 
 
+@pytest.mark.slow
 def test_annotations_for_github_need_no_option(tmp_path, program, monkeypatch):
     folder = scenes(tmp_path / "scenes", "a", "differ")
     mine = tmp_path / "mine.yaml"

@@ -52,6 +52,7 @@ def processes_of(found, verdict):
     return [c.rungs[0].numbers["process"] for c in found.cases if c.verdict == verdict]
 
 
+@pytest.mark.slow
 def test_a_process_that_hangs_is_ended(tmp_path):
     folder = scenes(tmp_path / "scenes", "a", "hang", "z")
     found = run_in(tmp_path / "out", folder, "about: x\ncase_seconds: 20\n", workers=Threads(2))
@@ -71,6 +72,7 @@ def test_processes_are_shared_out(tmp_path, monkeypatch):
     assert {case.rungs[0].numbers["threads"] for case in found.cases} == {3}
 
 
+@pytest.mark.slow
 def test_where_no_case_can_run_nothing_is_said_of_any(tmp_path):
     folder = scenes(tmp_path / "scenes", "a", "unavailable")
     with pytest.raises(ReferenceUnavailableError, match="no reference here"):

@@ -155,6 +155,7 @@ class _Killing:
         return self._cluster.submit(function, *arguments)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.usefixtures("fake_runners")
 def test_cases_that_fail_on_a_cluster(machines, tmp_path, monkeypatch):

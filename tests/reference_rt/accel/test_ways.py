@@ -224,6 +224,7 @@ def test_instances():
     assert found.hit.mean() > 0.05
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("offset", [2.0, 1e3])
 def test_from_anywhere_inside_and_on_things(offset):
     rng = np.random.default_rng(32)

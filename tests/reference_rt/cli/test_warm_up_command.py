@@ -155,6 +155,7 @@ def test_ctrl_c_keeps_what_is_compiled(tmp_path):
     assert [*tmp_path.glob("kernels/*/tiles.render_tile-*")]
 
 
+@pytest.mark.slow
 def test_a_bar_with_a_count():
     """Its fraction is that of the time, of which the first kernels take most."""
     written = io.StringIO()

@@ -21,6 +21,7 @@ PRINTING = (
 pytestmark = pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a full device")  # noqa: PTH110
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("arguments", PRINTING, ids=" ".join)
 def test_a_full_disk(arguments):
     with open("/dev/full", "w") as full:  # noqa: PTH123

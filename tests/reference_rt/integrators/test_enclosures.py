@@ -40,6 +40,7 @@ def looking(eye, target):
     return rt.Orthographic(eye=eye, target=target, up=(0.1, 0.2, 0.9), width=1e-12)
 
 
+@pytest.mark.cases(5)
 @budgets
 @pytest.mark.parametrize("max_depth", [2, 3, 4, None])
 @pytest.mark.parametrize("seen", ["outside", "inside"])
@@ -62,6 +63,7 @@ def test_concentric_spheres(max_depth, seen, spp, power):
     assert_mean(scene, RADIANCE * left[0 if seen == "inside" else 1], power)
 
 
+@pytest.mark.cases(5)
 @budgets
 @pytest.mark.parametrize("max_depth", [2, 3, 4, None])
 @pytest.mark.parametrize("seen", ["upper", "lower"])

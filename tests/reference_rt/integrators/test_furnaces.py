@@ -61,6 +61,7 @@ def test_closed_furnace_without_roulette(albedo, depth):
     assert_mean(scene, (1 - albedo**depth) / (1 - albedo), power=5e-3)
 
 
+@pytest.mark.cases(6)
 @pytest.mark.parametrize("depth", range(7))
 def test_max_depth_counts_edges(depth):
     """By scattered rays alone every path brings the same, and `max_depth` is the number of
@@ -165,7 +166,7 @@ ROUGH = {
 }
 
 
-@pytest.mark.cases(5)
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("name", ROUGH)
 @pytest.mark.parametrize("roulette", [1, 4096])
 def test_rough_bodies_never_shine(name, roulette, sky):

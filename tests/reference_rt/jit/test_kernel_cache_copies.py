@@ -34,6 +34,7 @@ print(rt.__file__, hits, misses)
 """
 
 
+@pytest.mark.slow
 def test_a_copy_finds_the_kernels_of_another(tmp_path):
     package, found = Path(reference_rt.__file__).parent, []
     for name in ("one", "other"):

@@ -148,6 +148,7 @@ def main():
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is one process")
 def test_what_others_compile_is_found_in_the_cache(tmp_path):
     """By this process; the next one finds all."""

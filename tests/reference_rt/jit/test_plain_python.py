@@ -72,6 +72,7 @@ def both(tmp_path_factory, request):
     return compiled, dict(np.load(file))
 
 
+@pytest.mark.slow
 def test_same_bits(both):
     compiled, plain = both
     assert set(compiled) == set(plain)

@@ -136,6 +136,7 @@ def read(value, put):
     assert ends.tolist() == [table.before, table.after]
 
 
+@pytest.mark.cases(8)
 @needs_jit
 @pytest.mark.parametrize("case", CASES)
 def test_what_is_written_is_read(case, monkeypatch):

@@ -117,7 +117,7 @@ def test_linked_and_specialised_kernels_give_the_same_bits(name):
     assert len(np.unique(linked.layers[linked.shown])) > 3
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @needs_jit
 @pytest.mark.parametrize("integrator", [rt.Path(), rt.Direct(), rt.Whitted()], ids=lambda i: i.type)
 def test_given_rays_have_the_same_bits(integrator, monkeypatch):

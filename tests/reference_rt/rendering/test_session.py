@@ -172,6 +172,7 @@ def test_too_little_memory_is_refused(box, tmp_path):
 # ---- processes ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_processes_change_no_bit(box, whole):
     assert same(rt.render(box, workers=2), whole)
 

@@ -95,6 +95,7 @@ def test_sound_files(tmp_path, number):
     read(tmp_path, content, f"mesh{suffix}")
 
 
+@pytest.mark.slow
 @settings(max_examples=1000)
 @given(file=damaged())
 def test_damaged_files(tmp_path_factory, file):

@@ -40,6 +40,7 @@ def disks_and_rays(rng, n, stretch, offset, distance):
     return shapes, tables, rows, *rays_at_plane(rng, tables.disks, rows, x, y, distance)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     ("stretch", "offset", "distance"), [(0.0, 3.0, 5.0), (3.0, 3.0, 5.0), (1.0, 1e4, 1e6)]
 )

@@ -38,6 +38,7 @@ def random_rings(rng, flat):
     return tuple(tuple(map(tuple, (r @ m[:, :2].T + at).tolist())) for r in rings)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     ("flat", "stretch", "offset", "distance"),
     [(True, 0.0, 3.0, 5.0), (True, 3.0, 3.0, 5.0), (True, 1.0, 1e4, 1e6), (False, 1.0, 3.0, 5.0)],

@@ -28,6 +28,7 @@ from reference_rt.util.errors import SceneError
 # ---- spans, bounds, coordinates -----------------------------------------------------------------
 
 
+@pytest.mark.cases(10)
 @BY_NAME
 def test_spans(name):
     """All crossings, entering and leaving in turn; the first with t > 0 is the hit."""

@@ -156,6 +156,7 @@ def tiles(layer):
 SEEDS = [*range(6), *(pytest.param(k, marks=pytest.mark.slow) for k in range(6, 60))]
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_means_are_those_of_scattered_rays_alone(tmp_path, seed):
     """All is under one more map: a similarity of a size of 1e-3 to 1e3, up to 1e6 sizes away."""

@@ -240,6 +240,7 @@ def test_from_inside_of_the_solid(mesh):
 # ---- laws ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("way", WAYS)
 def test_nothing_is_left_of_a_solid_without_itself(way, mesh):
     rng = np.random.default_rng(2)

@@ -108,6 +108,7 @@ def write_answers(_folder, file):
     np.savez(file, **answers())
 
 
+@pytest.mark.slow
 def test_plain_python_gives_the_same_bits(tmp_path):
     for name, t in same_in_plain_python(write_answers, tmp_path).items():
         assert 10 < np.isfinite(t).sum() < len(t), name
