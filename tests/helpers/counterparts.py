@@ -8,8 +8,10 @@ from typing import Any
 import pytest
 
 from comparisons.geometry.frame import OURS
+from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.translate import load
 from comparisons.mitsuba.translate.shapes import canonical, quadrics
+from comparisons.mitsuba.translate.shapes.stand_ins import coarser
 from reference_rt import Scene
 
 
@@ -19,6 +21,13 @@ def coarse_meshes(*cells: int) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(quadrics, "CELLS", cells)
         patch.setattr(canonical, "CURVED", cells)
+        yield
+
+
+@contextmanager
+def quick() -> Iterator[None]:
+    """Nothing is compiled, and meshes are coarse: their larger error is measured."""
+    with scalar(), coarser(0.35):
         yield
 
 
