@@ -31,6 +31,12 @@ def quick() -> Iterator[None]:
         yield
 
 
+def faulty_counterpart(text: str, right: str, wrong: str, folder: Path | None = None) -> Any:
+    """The counterpart of a scene, with one thing in it replaced."""
+    assert text.count(right) == 1
+    return load(Scene.parse(text.replace(right, wrong), folder=folder))
+
+
 EVERY_MATERIAL = """
 camera: {type: perspective, eye: [0.3, 1.5, 9], target: [0, 0.5, 0], fov: 40}
 film: {width: 24, height: 16}
