@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from comparisons.experiments.stability import furnaces as f10_furnaces
 from comparisons.experiments.stability.bsdfs.samples import PURE
-from comparisons.experiments.stability.furnaces import family as f10_furnaces
-from comparisons.experiments.stability.furnaces.family import COSINES
+from comparisons.experiments.stability.furnaces import COSINES
 from comparisons.experiments.stability.harness import chance, worlds
 from comparisons.experiments.stability.harness.chance import Mean
 from comparisons.experiments.stability.harness.core import (
@@ -22,7 +22,7 @@ from comparisons.experiments.stability.harness.core import (
 )
 from comparisons.experiments.stability.harness.families import family
 from comparisons.experiments.stability.harness.worlds import judge
-from comparisons.experiments.stability.radiometry import lamps as f12_lamps
+from comparisons.experiments.stability.radiometry import lights as f12_lamps
 
 
 def test_the_level_of_a_full_run_is_that_of_all_its_tests() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import stability_runs
 
-from comparisons.experiments.stability.determinism import parts
+from comparisons.experiments.stability import determinism
 from comparisons.experiments.stability.harness import bits
 from comparisons.experiments.stability.harness.core import OURS, Outcome
 
@@ -21,14 +21,14 @@ def test_the_same_bits(series, x, tmp_path):
 
 def test_sums_in_another_order_are_seen(tmp_path, monkeypatch):
     """A band that leaves the last bits to chance."""
-    honest = parts._band
+    honest = determinism._band
 
     def careless(*arguments):
         honest(*arguments)
         sums = arguments[6]  # of the band's pixels
         sums[0] = np.nextafter(sums[0], np.inf)
 
-    monkeypatch.setattr(parts, "_band", careless)
+    monkeypatch.setattr(determinism, "_band", careless)
     assert measured("bands", 64.0, tmp_path).failures > 20
 
 

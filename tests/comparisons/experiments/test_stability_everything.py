@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from comparisons.experiments.stability.hierarchy.every import compare_all
-from comparisons.experiments.stability.hierarchy.scenes import everything, lattice_rays
+from comparisons.experiments.stability.hierarchy import compare_all, everything, lattice_rays
 
 # What the scene's mesh leaves out is no news here.
 pytestmark = pytest.mark.filterwarnings("ignore::reference_rt.util.errors.SceneWarning")

@@ -8,13 +8,12 @@ from stability_runs import measured
 
 import reference_rt as rt
 from comparisons.experiments.methods.errors import U
+from comparisons.experiments.stability.far import FAMILY as F1
 from comparisons.experiments.stability.far import curved, spheres
-from comparisons.experiments.stability.far.family import FAMILY as F1
-from comparisons.experiments.stability.far.law import BAND, Truth, gaps, judge_by_moving
+from comparisons.experiments.stability.far.spheres import BAND, Truth, gaps, judge_by_moving
 from comparisons.experiments.stability.harness.core import MITSUBA, OURS
 from comparisons.experiments.stability.harness.rays import Rays
-from comparisons.experiments.stability.roots.law import judge, of_quadratics
-from comparisons.experiments.stability.roots.solvers import ferrari, numpy_roots
+from comparisons.experiments.stability.roots import ferrari, judge, numpy_roots, of_quadratics
 
 
 def drawn(family, name, x, cases, folder, mitsuba=False):

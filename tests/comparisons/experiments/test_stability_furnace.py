@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from stability_runs import measured
 
-from comparisons.experiments.stability.bsdfs import digits, pairs, samples
-from comparisons.experiments.stability.bsdfs.law import density_between, fresnel, masking
-from comparisons.experiments.stability.furnaces import family as f10_furnaces
+from comparisons.experiments.stability import furnaces as f10_furnaces
+from comparisons.experiments.stability.bsdfs import digits, samples
+from comparisons.experiments.stability.bsdfs.digits import density_between, fresnel, masking
 from comparisons.experiments.stability.harness.bsdfs import Bsdf, Ours, Samples, towards
 from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray
 from comparisons.experiments.stability.harness.outcomes import of_errors, relative
-from comparisons.experiments.stability.radiometry import flat_lights, lights, solid_angles
+from comparisons.experiments.stability.radiometry import lights, solid_angles
 from reference_rt.lights.emitters import point
 
 
@@ -72,9 +72,9 @@ def planted(fault: str) -> Callable[..., Iterator[tuple[str, Bsdf]]]:
 @pytest.mark.parametrize(
     ("module", "family", "series", "fault", "x", "cases"),
     [
-        (pairs, "F11", "grazing", "one-sided", 10.0, 150),
-        (pairs, "F11", "roughness", "one-sided", 1.0, 150),
-        (pairs, "F11", "matched indices", "one-sided", 1e5, 150),
+        (samples, "F11", "grazing", "one-sided", 10.0, 150),
+        (samples, "F11", "roughness", "one-sided", 1.0, 150),
+        (samples, "F11", "matched indices", "one-sided", 1e5, 150),
         (samples, "F11", "weights", "weight", 1.0, 150),
         (samples, "F11", "weights", "density", 1.0, 150),
         (samples, "F11", "weights", "nan", 1e4, 150),
@@ -124,9 +124,9 @@ def test_wide_spots_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     ("module", "series", "kernel", "factor", "x"),
     [
         (solid_angles, "small spheres", "_of_sphere", 1.0 + 1e-8, 1e6),
-        (flat_lights, "flat lights", "_of_rectangle", 1.0 - 1e-12, 1e20),
-        (flat_lights, "flat lights", "_of_triangle", 1.0 + 1e-12, 1e20),
-        (flat_lights, "lights that fill the sky", "_of_rectangle", 1.0 + 1e-9, 1e12),
+        (solid_angles, "flat lights", "_of_rectangle", 1.0 - 1e-12, 1e20),
+        (solid_angles, "flat lights", "_of_triangle", 1.0 + 1e-12, 1e20),
+        (solid_angles, "lights that fill the sky", "_of_rectangle", 1.0 + 1e-9, 1e12),
     ],
 )
 def test_wrong_solid_angles_are_seen(
@@ -149,7 +149,7 @@ def test_lights_sampled_by_their_area_miss_the_sky(monkeypatch: pytest.MonkeyPat
         d2 = ((p[:, None] - q) ** 2).sum(axis=2)
         return np.asarray(d2 * np.sqrt(d2) / (4.0 * p[:, 2:]))
 
-    monkeypatch.setattr(flat_lights, "_rectangle_densities", by_area)
+    monkeypatch.setattr(solid_angles, "_rectangle_densities", by_area)
     assert run("F12", "lights that fill the sky", 1.0).failures == 0
     assert run("F12", "lights that fill the sky", 1e3).failures > 100
     assert run("F12", "flat lights", 1e20).failures == 0

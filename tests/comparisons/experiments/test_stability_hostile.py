@@ -10,17 +10,16 @@ import pytest
 import reference_rt as rt
 from comparisons.experiments.stability.harness.solids import Stretch, Truth
 from comparisons.experiments.stability.harness.solids import problem as list_problem
-from comparisons.experiments.stability.hostile import pool, rays
+from comparisons.experiments.stability.hostile import bomb, example, pool, problem, rays
 from comparisons.experiments.stability.hostile.bases import BASES, files, write_files
 from comparisons.experiments.stability.hostile.damage import (
     as_text,
     damaged,
     deep,
+    sentence,
     with_numbers,
     with_structure,
 )
-from comparisons.experiments.stability.hostile.family import bomb, example, problem
-from comparisons.experiments.stability.hostile.grammar import sentence
 from comparisons.experiments.stability.hostile.pool import Answer, answers
 from comparisons.experiments.stability.solids.trees import Tree, chain, rewritten
 from reference_rt.rendering.query import Intersections

@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from comparisons.experiments.stability.contact import family as contact
-from comparisons.experiments.stability.contact.light import fresnel, shadow_scene
-from comparisons.experiments.stability.contact.stacks import plates
+from comparisons.experiments.stability import contact as contact
+from comparisons.experiments.stability.contact import fresnel, plates, shadow_scene
 from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw
 from comparisons.experiments.stability.harness.leaving import bound, lit
 from comparisons.experiments.stability.leaving import family as leaving

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import reference_rt as rt
+from comparisons.experiments.stability import metamorphic as f09_metamorphic
 from comparisons.experiments.stability.harness import scenes
 from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw
 from comparisons.experiments.stability.harness.families import family
 from comparisons.experiments.stability.harness.meshes import write_obj
-from comparisons.experiments.stability.metamorphic import family as f09_metamorphic
-from comparisons.experiments.stability.metamorphic import light, solids
+from comparisons.experiments.stability.metamorphic import light, rays
 from comparisons.experiments.stability.metamorphic import motion as f09_motion
 from comparisons.experiments.stability.metamorphic import rays as f09_rays
 from comparisons.geometry.float32 import round32
@@ -105,7 +105,7 @@ def test_solids_are_judged_by_what_is_resolved(tmp_path):
     scene = scenes.solids(tmp_path)
     bench = f09_rays.Bench(scene, 90, np.random.default_rng(3))
     o, d, found = bench.ours.o, bench.ours.d, bench.ours.found
-    met = solids.Judge(scene).decide(o, d)
+    met = rays.Judge(scene).decide(o, d)
     solid = np.flatnonzero(found.identities[:, 0] > 0)
     assert len(solid) > 20
     nothing = np.array([-1, -1, -1, -1])
@@ -127,7 +127,7 @@ def test_a_film_may_show_or_not(gap, either, tmp_path):
     cut = rt.Box(transform=[{"translate": [0.0, 0.0, -gap]}])
     film = rt.Difference(of=(rt.Box(), cut), transform=())
     scene = rt.Scene.parse("{}", folder=tmp_path).changed(shapes=(rt.Disk(), film))
-    (met,) = solids.Judge(scene).decide(np.array([[0.1, 0.2, 4.0]]), np.array([[0.0, 0, -1]]))
+    (met,) = rays.Judge(scene).decide(np.array([[0.1, 0.2, 4.0]]), np.array([[0.0, 0, -1]]))
     assert met.allows(np.array([1, -1, 0, 5]), 3.0)
     assert met.allows(np.array([0, -1, 0, 0]), 4.0) == either
     assert not met.allows(np.array([1, -1, 0, 2]), 5.0)

@@ -9,14 +9,13 @@ import stability_runs
 
 import reference_rt as rt
 from comparisons.experiments.methods.errors import U
+from comparisons.experiments.stability import hierarchy, watertight
+from comparisons.experiments.stability import slivers as f04
+from comparisons.experiments.stability import watertight as f03
 from comparisons.experiments.stability.harness import meshes
 from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw
-from comparisons.experiments.stability.hierarchy import every
-from comparisons.experiments.stability.slivers import family as f04
 from comparisons.experiments.stability.slivers.judge import DISTANCES, RING, Judge, Question
-from comparisons.experiments.stability.watertight import family as f03
-from comparisons.experiments.stability.watertight import seams
-from comparisons.experiments.stability.watertight.tracers import by_method, crossings
+from comparisons.experiments.stability.watertight import by_method, crossings
 from reference_rt import textbook
 
 # Cases have triangles without area on purpose: what a mesh leaves out is no news here.
@@ -101,10 +100,10 @@ def test_text_book_methods_leak():
 
 def test_seams_of_something_else_are_seen():
     """Rays that hit nothing, or another shape than they start in."""
-    case = seams.drawn(np.random.default_rng(0), ("box", "sphere"), 1.0, 50)
+    case = watertight.drawn(np.random.default_rng(0), ("box", "sphere"), 1.0, 50)
     shape = case.whose.copy()
     shape[3], shape[70] = -1, 0
-    found = seams.judged(case, SimpleNamespace(shape=shape, t=np.full(100, math.inf)))
+    found = watertight.judged(case, SimpleNamespace(shape=shape, t=np.full(100, math.inf)))
     assert (found.cases, found.failures) == (100, 2)
     assert found.examples[1]["found"] == "shape 0 at t = inf"
 
@@ -192,7 +191,7 @@ def test_pictures():
 
 def test_a_box_that_is_too_small_is_seen(tmp_path, monkeypatch):
     """Planes of boxes moved inwards by a millionth: rays in them miss what they hold."""
-    honest = every.rt.build_tables
+    honest = hierarchy.rt.build_tables
 
     def damaged(scene):
         tables = honest(scene)
@@ -200,7 +199,7 @@ def test_a_box_that_is_too_small_is_seen(tmp_path, monkeypatch):
         upper[upper < 10.0] -= np.float32(1e-6)
         return tables
 
-    monkeypatch.setattr(every.rt, "build_tables", damaged)
+    monkeypatch.setattr(hierarchy.rt, "build_tables", damaged)
     assert measured(tmp_path, "F5", "primitives", 100.0, 2000)[OURS].failures > 0
 
 
@@ -211,7 +210,7 @@ def test_of_several_at_one_place_the_first_counts():
     tables = rt.build_tables(rt.Scene(shapes=far + near, hierarchy="sah"))
     o = np.array([[0.0, 0.0, 2.0], [-2.0, 0.0, 2.0], [0.0, 0.0, 2.0]])
     d = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, -1.0], [0.0, 0.0, 1.0]])
-    found = every.named(tables, every.every(tables, o, d))
+    found = hierarchy.named(tables, hierarchy.every(tables, o, d))
     assert found[:, :4].tolist() == [
         [2.0, 3.0, 2.0, 0.0],
         [3.0, 3.0, 0.0, 0.0],

@@ -1,7 +1,7 @@
 """All families, in order.
 
-To add one: a folder beside `harness` whose `family.py` states its law, ranges, counts and what
-passes at its top and defines a `Family`, and a line here.
+To add one: a module beside `harness`, or a folder, that states its law, ranges, counts and what
+passes at its top and defines a `FAMILY`, and a line here.
 """
 
 import importlib
@@ -29,5 +29,5 @@ MODULES = {
 
 def family(name: str) -> Family:
     """The `FAMILY` of its module, which is imported only when it is needed."""
-    module = importlib.import_module(f"comparisons.experiments.stability.{MODULES[name]}.family")
+    module = importlib.import_module(f"comparisons.experiments.stability.{MODULES[name]}")
     return cast(Family, module.FAMILY)

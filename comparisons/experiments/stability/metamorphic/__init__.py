@@ -18,10 +18,325 @@ same to the last bit.
 Range.  Offset / size 1 to 1e13, factors 1e-50 to 1e50 and 2^-160 to 2^160, all mirrors and
 exchanges of axes, any rotation, groups nested up to 16 deep.
 
-Counts.  Rays of a point as in `family._CASES`; a picture has 48 x 36 pixels.
+Counts.  Rays of a point as in `_CASES`; a picture has 48 x 36 pixels.
 
 Passes.  No failure within each series' guaranteed range.
 
-`motion` transforms scenes, `rearranged` reorders and groups them; `rays`, `solids` and `light`
-judge.
-"""
+`motion` transforms scenes, `rearranged` reorders and groups them; `rays` and `light`
+judge."""
+
+import tempfile
+from collections.abc import Callable, Iterator
+from functools import partial
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+import reference_rt as rt
+from comparisons.experiments.methods.setting import unit_rows
+from comparisons.experiments.stability.harness import scenes
+from comparisons.experiments.stability.harness.bits import same_bits
+from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Shot
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
+from comparisons.experiments.stability.harness.outcomes import together
+from comparisons.experiments.stability.metamorphic import light, rays
+from comparisons.experiments.stability.metamorphic.motion import (
+    MIRRORS,
+    TURNINGS,
+    Motion,
+    grown,
+    moved,
+    offset,
+    shrunk,
+    turns_of,
+)
+from comparisons.experiments.stability.metamorphic.rays import Outcomes
+from comparisons.experiments.stability.metamorphic.rearranged import nested, rearranged
+from comparisons.geometry.exact.dyadic import BoolArray
+from comparisons.geometry.float32 import round32
+from reference_rt.shapes.csg.anchor import FAR
+
+# ---- images of F9's failures, 192 pixels wide ----------------------------------------------------
+
+
+WIDTH, HEIGHT = 192, 144
+
+SPP = 16
+
+WRONG = np.array([0.85, 0.10, 0.05])
+
+
+def shoot_light(motion: Callable[[float], Motion], contestant: str, x: float) -> Shot:
+    """The path-traced scene, transformed."""
+    with tempfile.TemporaryDirectory() as folder:
+        scene = scenes.path(Path(folder)).changed(
+            film=rt.Film(width=WIDTH, height=HEIGHT), sampler=rt.Sobol(spp=SPP, seed=3)
+        )
+        first, found = (light.colours(contestant, s) for s in (scene, moved(scene, motion(x))))
+    visible = np.abs(found - first).max(axis=-1) > 0.1 * first.max(axis=-1) + 0.02
+    visible |= ~np.isfinite(found).all(axis=-1)
+    said = f"{contestant} at {x:g}: {_percent(visible)} of the pixels visibly other than at 1"
+    return Shot(_bytes(np.clip(np.nan_to_num(found), 0.0, 1.0) ** (1.0 / 2.2)), said)
+
+
+def shoot_rays(motion: Callable[[float], Motion], contestant: str, x: float) -> Shot:
+    """What the pixels' rays hit in the scene of things, transformed; red where it is not what they
+    hit before."""
+    with tempfile.TemporaryDirectory() as folder:
+        scene = scenes.things(Path(folder))
+        o = np.tile(scene.camera.eye, (WIDTH * HEIGHT, 1))
+        d = round32(_directions(scene))
+        pixels = rays.Rays(o, d, np.ones(len(o), bool))
+        answers = []
+        for one in (Motion(), motion(x)):
+            other = moved(scene, one)
+            o, d = rays.through(one, pixels)
+            if contestant == OURS:
+                answers.append(rays.ours(rt.build_tables(other), o, d))
+            else:
+                answers.append(rays.mitsubas(other, o, d))
+    first, found = answers
+    wrong = rays.differ(first, found)
+    # A colour a face: the golden ratio spreads hues.
+    face = first.identities @ (7, 5, 3, 1)
+    hue = np.mod(face[:, None] * 0.618 + np.array([0.0, 0.33, 0.67]), 1.0)
+    shown = np.where(first.identities[:, :1] < 0, 0.95, 0.35 + 0.5 * hue)
+    shown[wrong] = WRONG
+    said = f"{contestant} at {x:g}: {_percent(wrong)} of the rays hit something else (red)"
+    return Shot(_bytes(shown.reshape(HEIGHT, WIDTH, 3)), said)
+
+
+def _directions(scene: rt.Scene) -> FloatArray:
+    x, y = np.meshgrid(np.arange(WIDTH) + 0.5, np.arange(HEIGHT) + 0.5)
+    view = scene.camera.setup(WIDTH, HEIGHT)
+    across, down = x.reshape(-1, 1) / WIDTH, y.reshape(-1, 1) / HEIGHT
+    return unit_rows(
+        np.array(view.corner) + np.array(view.right) * across + np.array(view.down) * down
+    )
+
+
+def _percent(some: BoolArray) -> str:
+    return f"{100.0 * np.mean(some):.2g} %"
+
+
+def _bytes(values: FloatArray) -> npt.NDArray[np.uint8]:
+    return np.rint(255.0 * values).astype(np.uint8)
+
+
+# ---- the series ----------------------------------------------------------------------------------
+
+
+EXACT_TO = 1e12
+"""The largest offset / size at which all coordinates are exact: 4e12 and multiples of 1/256, which
+vertices of scaled meshes are."""
+
+
+# ---- rays ---------------------------------------------------------------------------------------
+
+Make = Callable[[Path], rt.Scene]
+
+
+def rays_under(
+    motions: list[Motion],
+    exact: bool,
+    makes: tuple[Make, ...],
+    draw: Draw,
+    unmoved: bool = False,
+) -> Iterator[Outcomes]:
+    """All scenes under all motions; Mitsuba takes part in what it has."""
+    for make in makes:
+        scene, takes_part = make(draw.folder), draw.mitsuba and make is scenes.things
+        bench = rays.Bench(scene, draw.cases // len(motions), draw.rng, takes_part)
+        for motion in motions:
+            o, d = rays.through(motion, bench.rays)
+            yield bench.compared(moved(scene, motion), o, d, None, motion.factor, exact, unmoved)
+
+
+BOTH = (scenes.things, scenes.curves)
+ALL = (*BOTH, scenes.solids)
+
+
+def _translated(draw: Draw, x: float) -> Outcomes:
+    return together(rays_under([offset(x)], x <= EXACT_TO, BOTH, draw))
+
+
+def _translated_solids(draw: Draw, x: float) -> Outcomes:
+    """Solids near the origin round as they are far from it, others as they are large: there the
+    scene before, of which this one is an exact copy, says what is right."""
+    return together(rays_under([offset(x)], False, (scenes.solids,), draw, unmoved=x > FAR))
+
+
+def _scaled(motion: Callable[[float], Motion], draw: Draw, x: float) -> Outcomes:
+    return together(rays_under([motion(x)], False, ALL, draw))
+
+
+def _powers(draw: Draw, x: float) -> Outcomes:
+    """Rays and pictures, both ways."""
+    motions = [Motion(2.0**x), Motion(2.0**-x)]
+    found = [*rays_under(motions, True, ALL, draw)]
+    for make, motion in product((scenes.path, scenes.whitted), motions):
+        scene = make(draw.folder)
+        first, other = (light.colours(OURS, s) for s in (scene, moved(scene, motion)))
+        found.append({OURS: same_bits(first, other)})
+    return together(found)
+
+
+def _turned(draw: Draw, x: float) -> Outcomes:
+    turns = turns_of(draw.rng, x)
+    found = [*rays_under([Motion(turn=t) for t in turns], False, ALL, draw)]
+    scene = scenes.whitted(draw.folder)
+    for turn in turns[:3]:
+        mirrored = bool(np.linalg.det(turn) < 0.0)
+        found.append({OURS: light.judged(OURS, scene, Motion(turn=turn), mirrored)})
+    return together(found)
+
+
+# ---- the family ---------------------------------------------------------------------------------
+
+FACTORS = (*decades(0, 12), 1e20, 1e30, 1e50)
+
+_CASES = 600, 6_000
+
+_SCALE = (
+    "float32 scales like float64, and rays from the eye have no epsilon: Mitsuba's hit the same "
+    "until what it computes leaves float32's range, "
+)
+
+_GROWN = (
+    "Mitsuba begins rays (1 + |p|) 8.9e-5 off surfaces, which grows with them: its pictures are "
+    "the same up to 1e8 and fail from 1e9 on (778 of 1,728 pixels)"
+)
+
+_CHANGE = "relative change of t"
+_DIFFERENCE = "largest difference / mean of the picture"
+
+_LIGHT_ENDS = (
+    "64 u (offset + size) is where rounding may put a point: beyond 1e12 sizes that is 3e-2 of the "
+    "size, as large as what the picture shows"
+)
+
+FAMILY = Family(
+    id="F9",
+    name="metamorphic images",
+    law="a scene that is moved, scaled, turned, mirrored, reordered or grouped shows the same ids "
+    "and, within u times the scene's condition, the same light",
+    anchors="ANARI's test suite has scenes with a Variant axis, compared by image metrics; pbrt, "
+    "Embree and Mitsuba test no such law",
+    series=(
+        Series(
+            "translated",
+            Sweep("offset / size", decades(0, 13), (1.0, 1e8, 1e12), *_CASES),
+            "Scenes of every primitive, and their rays, moved by whole numbers.  A ray that "
+            "hits something else, or not at exactly the same t, breaks the law.",
+            _translated,
+            unit=_CHANGE,
+            shoot=partial(shoot_rays, offset),
+        ),
+        Series(
+            "translated solids",
+            Sweep("offset / size", decades(0, 12), (1e4,), 240, 1000),
+            "The same of set operations, which are seen from next to them where they are "
+            "far out.  Rays that differ must be right by F7's law: beyond 16 sizes in the scene "
+            "before it is moved, which allows no error that grows with the offset.",
+            _translated_solids,
+            unit=_CHANGE,
+        ),
+        Series(
+            "translated light",
+            Sweep("offset / size", decades(0, 13), (1e3, 1e9), 1, 1),
+            "Pictures, path-traced and by Whitted, of scenes moved by whole numbers.  A pixel"
+            " that changes by more than its condition times u (offset + size) breaks the law.",
+            partial(light.under, offset),
+            unit=_DIFFERENCE,
+            holds_to=1e12,
+            law=_LIGHT_ENDS,
+            shoot=partial(shoot_light, offset),
+        ),
+        Series(
+            "shrunk",
+            Sweep("1 / factor", FACTORS, (1e9,), *_CASES),
+            "Scenes of every primitive and of solids, and their rays, made smaller.",
+            partial(_scaled, shrunk),
+            unit=_CHANGE,
+            explained=_SCALE + "from 1e20 on (163 of 437 rays)",
+            shoot=partial(shoot_rays, shrunk),
+        ),
+        Series(
+            "grown",
+            Sweep("factor", FACTORS, (1e9,), *_CASES),
+            "Scenes of every primitive and of solids, and their rays, made larger.",
+            partial(_scaled, grown),
+            unit=_CHANGE,
+            explained=_SCALE + "from 1e12 on (132 of 434 rays)",
+            shoot=partial(shoot_rays, grown),
+        ),
+        Series(
+            "shrunk light",
+            Sweep("1 / factor", FACTORS, (1e1, 1e9), 1, 1),
+            "Pictures of scenes made smaller, lights such that they look the same.",
+            partial(light.under, shrunk),
+            unit=_DIFFERENCE,
+            shoot=partial(shoot_light, shrunk),
+        ),
+        Series(
+            "grown light",
+            Sweep("factor", FACTORS, (1e9,), 1, 1),
+            "Pictures of scenes made larger, lights such that they look the same.",
+            partial(light.under, grown),
+            unit=_DIFFERENCE,
+            explained=_GROWN,
+            shoot=partial(shoot_light, grown),
+        ),
+        Series(
+            "powers of two",
+            Sweep(
+                "|k| of the factors 2^k and 2^-k",
+                (1.0, 3.0, 10.0, 30.0, 60.0, 100.0, 160.0),
+                (160.0,),
+                *_CASES,
+            ),
+            "Rays and pictures of scenes scaled by powers of two: the same to the last bit.",
+            _powers,
+            unit=_CHANGE,
+            explained=_SCALE + "from 2^60 on (238 of 434 rays); x is an exponent",
+        ),
+        Series(
+            "turned",
+            Sweep(
+                "0 mirrors, 1 exchanges of axes, 2 rotations, 3 rotations with mirrors",
+                TURNINGS,
+                (MIRRORS,),
+                *_CASES,
+            ),
+            "Rays, and pictures by Whitted, of scenes turned and mirrored.",
+            _turned,
+            unit=_CHANGE,
+            explained="turns have no extreme",
+        ),
+        Series(
+            "rearranged",
+            Sweep(
+                "0 shapes reversed, 1 shuffled, 2 triangles shuffled, 3 meshes split in two",
+                (0.0, 1.0, 2.0, 3.0),
+                (3.0,),
+                *_CASES,
+            ),
+            "Rays and pictures of scenes whose parts come in another order: the same to the "
+            "last bit.",
+            rearranged,
+            unit=_CHANGE,
+            explained="an order has no extreme",
+        ),
+        Series(
+            "nested",
+            Sweep("groups within groups", (1.0, 2.0, 4.0, 8.0, 16.0), (4.0,), *_CASES),
+            "Shapes drawn as instances of groups of groups, each under a map of its own, "
+            "against the same shapes under one transform.",
+            nested,
+            unit=_CHANGE,
+            explained="Mitsuba knows no groups within groups: it is told the product of the maps",
+        ),
+    ),
+)

@@ -22,5 +22,30 @@ roulette.
 
 Passes.  No failure.
 
-`lights`: points and spots; `solid_angles`, `flat_lights`: densities; `lamps`: rendered pictures.
-"""
+`lights`: points and spots, and rendered pictures of lamps; `solid_angles`: densities."""
+
+from comparisons.experiments.stability.harness.family import Family
+from comparisons.experiments.stability.radiometry.lights import (
+    AREA,
+    DISTANCE,
+    RADIANCE,
+    ROULETTE,
+    SPOT,
+)
+from comparisons.experiments.stability.radiometry.solid_angles import (
+    CLOSE_SPHERE,
+    FLAT,
+    SKY,
+    SMALL_SPHERE,
+)
+
+# ---- the series ----------------------------------------------------------------------------------
+
+
+FAMILY = Family(
+    id="F12",
+    name="radiometry at extremes",
+    law="light of any size, distance, brightness, cone and depth arrives as closed forms say",
+    anchors="no other project is known to test these",
+    series=(AREA, RADIANCE, DISTANCE, SPOT, SMALL_SPHERE, CLOSE_SPHERE, FLAT, SKY, ROULETTE),
+)
