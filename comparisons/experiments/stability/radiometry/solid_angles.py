@@ -125,8 +125,8 @@ CLOSE_SPHERE = Series(
 #
 # Nothing is left to chance: a light sample is a function of two random numbers, and the mean of
 # 1 / pdf over all of them, an integral over the unit square, is the light's solid angle whatever
-# the sampler.  Gauss and Legendre's rule takes it, after u = s²(3 - 2s), which makes the roots of warps
-# to triangles smooth.
+# the sampler.  Gauss and Legendre's rule takes it, after u = s²(3 - 2s), which makes the roots of
+# warps to triangles smooth.
 
 
 CORNERS = ((-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (0.0, 1.0, 0.0))
