@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import Baselines, Layer, NoiseFree
+from comparisons.commands.options import Baselines, Layer, NoiseFree, compare_extra
 from reference_rt.cli.adjusted import adjusted
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import SceneError, UsageError
@@ -60,7 +59,7 @@ def accept(
     """Accept pictures as a baseline for `gate --baseline`; refused in CI."""
     with compare_extra("accepting"):
         from comparisons.gate import baselines as store
-        from comparisons.gate.digest import scene_digest
+        from comparisons.gate.baselines import scene_digest
         from comparisons.gate.pictures_in import read_candidates
         from comparisons.gate.reference import check_sizes, is_noise_free
         from comparisons.runs.provenance import ours
@@ -129,8 +128,7 @@ def _too_noisy(pictures: "FloatArray", limit: float) -> str:
 
 def _described(record: "Record", folder: Path) -> str:
     """A baseline in one line."""
-    from comparisons.gate.baselines import scene_of
-    from comparisons.gate.digest import scene_digest
+    from comparisons.gate.baselines import scene_digest, scene_of
 
     of = "no scene"
     if record.scene is not None:

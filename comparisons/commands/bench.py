@@ -5,8 +5,7 @@ from typing import Annotated
 
 import typer
 
-from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import Fresh, Scenes, out_folder, table_in
+from comparisons.commands.options import Fresh, Scenes, compare_extra, out_folder, table_in
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import UsageError
 
@@ -36,13 +35,13 @@ def bench(
         from comparisons.experiments.bench.run import run
         from comparisons.experiments.bench.setting import Setting
         from comparisons.experiments.bench.table import Display
-        from comparisons.report import marker_block, terminal
+        from comparisons.report import templates, terminal
 
     groups = chosen(only or ())
     if mesh is not None and not mesh.is_file():
         raise UsageError(f"--mesh: there is no file '{mesh}'")
     if markdown is not None:
-        marker_block.check(markdown, "bench")
+        templates.check(markdown, "bench")
     with Display() as display:
         setting = Setting(scenes=scenes, mesh=mesh, quick=quick, say=display.say)
         outcome = run(groups, setting, out, display, fresh)
@@ -50,7 +49,7 @@ def bench(
     console.print(table.terminal(outcome.rows, console.width))
     if markdown is not None:
         written = table.markdown(outcome.rows, outcome.machine, outcome.not_measured)
-        marker_block.rewrite(markdown, "bench", written)
+        templates.rewrite(markdown, "bench", written)
     for name, why in outcome.not_measured.items():
         say(f"{name}: not measured: {why}", err=True)
     say(f"{out / 'results.json'}, {out / 'bench.md'}", err=True)

@@ -6,9 +6,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import AllowMissing, Fixed, Fresh, Threads, TimeLimit, out_folder
-from reference_rt.cli.defaults import Defaults, by_name
+from comparisons.commands.options import (
+    AllowMissing,
+    Fixed,
+    Fresh,
+    Threads,
+    TimeLimit,
+    compare_extra,
+    out_folder,
+)
+from reference_rt.cli.adjusted import Defaults, by_name
 from reference_rt.cli.guarded import guarded
 from reference_rt.util.errors import UsageError
 

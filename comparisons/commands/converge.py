@@ -8,9 +8,8 @@ from typing import Annotated
 
 import typer
 
-from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import ClusterFile, Fresh, Scheduler, out_folder
-from reference_rt.cli.defaults import Defaults, by_name
+from comparisons.commands.options import ClusterFile, Fresh, Scheduler, compare_extra, out_folder
+from reference_rt.cli.adjusted import Defaults, by_name
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import SceneError, UsageError, printable
 
@@ -68,7 +67,6 @@ def converge(
     """
     with compare_extra():
         from comparisons.experiments.convergence.curves import Curves
-        from comparisons.experiments.convergence.data import Settings
         from comparisons.experiments.convergence.methods import chosen
         from comparisons.experiments.convergence.outputs import (
             again,
@@ -78,11 +76,12 @@ def converge(
         )
         from comparisons.experiments.convergence.page import write_page
         from comparisons.experiments.convergence.run import INVALID, curves_of
+        from comparisons.experiments.convergence.store import Settings
         from comparisons.results.case import INTERRUPTED
         from comparisons.runs.elsewhere import run_elsewhere
         from comparisons.runs.provenance import provenance
         from comparisons.suites.suite import Changes, folder_name
-    from reference_rt.cli.where import Where
+    from reference_rt.cli.render_options import Where
     from reference_rt.util.console import ProgressLine
     from reference_rt.util.files import check_writable
     from reference_rt.util.workers import Processes

@@ -5,9 +5,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import AllowMissing
-from reference_rt.cli.defaults import Defaults, by_name
+from comparisons.commands.options import AllowMissing, compare_extra
+from reference_rt.cli.adjusted import Defaults, by_name
 from reference_rt.cli.guarded import guarded, say
 
 

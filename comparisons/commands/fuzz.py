@@ -9,12 +9,12 @@ from typing import Annotated, Any
 
 import typer
 
-from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import (
     ClusterFile,
     JUnit,
     NumberOfWorkers,
     Scheduler,
+    compare_extra,
     out_folder,
 )
 from reference_rt.cli.guarded import guarded, say
@@ -97,13 +97,12 @@ def fuzz(
     """
     with compare_extra("fuzzing"):
         from comparisons.experiments.fuzz import summary
-        from comparisons.experiments.fuzz.finding import RUNGS, Effort, Grammar
+        from comparisons.experiments.fuzz.fields import features as known
+        from comparisons.experiments.fuzz.finding import RUNGS, Effort, Grammar, remove
         from comparisons.experiments.fuzz.run import Plan, run
-        from comparisons.experiments.fuzz.stored import remove
         from comparisons.experiments.fuzz.summary import Display, write_page
-        from comparisons.experiments.fuzz.types import features as known
         from comparisons.runs.provenance import provenance
-    from reference_rt.cli.where import Where
+    from reference_rt.cli.render_options import Where
     from reference_rt.util.files import check_writable
     from reference_rt.util.workers import Threads
 

@@ -8,10 +8,17 @@ from typing import Annotated, Any
 
 import typer
 
-from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import Baselines, Fixed, GitHub, JUnit, Layer, NoiseFree, Threads
-from reference_rt.cli.adjusted import adjusted
-from reference_rt.cli.defaults import Defaults, by_name
+from comparisons.commands.options import (
+    Baselines,
+    Fixed,
+    GitHub,
+    JUnit,
+    Layer,
+    NoiseFree,
+    Threads,
+    compare_extra,
+)
+from reference_rt.cli.adjusted import Defaults, adjusted, by_name
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import ReferenceRtError, UsageError, printable
 

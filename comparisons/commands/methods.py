@@ -6,8 +6,7 @@ from typing import Annotated
 
 import typer
 
-from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import out_folder
+from comparisons.commands.options import compare_extra, out_folder
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import UsageError
 

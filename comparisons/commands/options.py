@@ -1,5 +1,7 @@
 """Options that several commands have, with one help text each."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -7,6 +9,21 @@ import typer
 
 from reference_rt.cli.render_options import ClusterFile as ClusterFile
 from reference_rt.cli.render_options import Scheduler as Scheduler
+from reference_rt.util.errors import ReferenceUnavailableError
+
+# ---- the message of a command whose Python packages, the extra `compare`, are not installed ------
+
+
+@contextmanager
+def compare_extra(doing: str = "comparing") -> Iterator[None]:
+    """Wrap a command's own imports.  Raises ReferenceUnavailableError if a package is missing."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        raise ReferenceUnavailableError(
+            f"{doing} needs {error.name}: pip install 'reference-rt[compare]'"
+        ) from None
+
 
 Baselines = Annotated[Path, typer.Option(metavar="DIR", help="The folder of baselines.")]
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from comparisons.commands.extra import compare_extra
+from comparisons.commands.options import compare_extra
 from reference_rt.cli.guarded import guarded, say
 
 

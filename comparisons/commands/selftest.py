@@ -36,7 +36,7 @@ def selftest(
     cluster: ClusterFile = None,
 ) -> None:
     """Test the harness: plant faults and check that the suites catch them; count false alarms."""
-    from reference_rt.cli.where import Where
+    from reference_rt.cli.render_options import Where
     from reference_rt.util.workers import Processes
 
     where = Where(workers, scheduler, cluster)

@@ -8,12 +8,12 @@ from typing import Annotated
 
 import typer
 
-from comparisons.commands.extra import compare_extra
 from comparisons.commands.options import (
     ClusterFile,
     Fresh,
     NumberOfWorkers,
     Scheduler,
+    compare_extra,
     out_folder,
     table_in,
 )
@@ -54,8 +54,8 @@ def stability(
         from comparisons.experiments.stability.harness import table
         from comparisons.experiments.stability.harness.core import Effort
         from comparisons.experiments.stability.harness.display import Display
-        from comparisons.experiments.stability.harness.families import MODULES
-        from comparisons.experiments.stability.harness.families import family as family_of
+        from comparisons.experiments.stability.harness.family import MODULES
+        from comparisons.experiments.stability.harness.family import family as family_of
         from comparisons.experiments.stability.harness.page import write_page
         from comparisons.experiments.stability.harness.results_json import again, write
         from comparisons.experiments.stability.harness.run import (
@@ -64,11 +64,11 @@ def stability(
             run,
             shoot,
         )
-        from comparisons.report import marker_block, terminal
+        from comparisons.report import templates, terminal
         from comparisons.runs.provenance import ours, provenance
 
         import_module("matplotlib")  # before minutes of measuring that the page then cannot show
-    from reference_rt.cli.where import Where
+    from reference_rt.cli.render_options import Where
     from reference_rt.util.files import check_writable
     from reference_rt.util.workers import Threads
 
@@ -87,7 +87,7 @@ def stability(
     kept = out / "settings" / "a setting", out / "pictures" / "a picture"
     check_writable(out / "results.json", out / "results.csv", page, *kept)
     if markdown is not None:
-        marker_block.check(markdown, "stability")
+        templates.check(markdown, "stability")
     missing = mitsuba_is_there() if mitsuba else "not asked"
     effort: Effort = "full" if full else "quick"
     choice = Choice(names, effort, seed, series, at, not missing)
@@ -106,7 +106,7 @@ def stability(
     console = terminal.console()
     console.print(table.terminal(found, console.width))
     if markdown is not None:
-        marker_block.rewrite(markdown, "stability", table.markdown(found, effort, seed, facts))
+        templates.rewrite(markdown, "stability", table.markdown(found, effort, seed, facts))
     holds = True
     for one in (s for some in table.summaries(found).values() for s in some):
         holds &= one.holds

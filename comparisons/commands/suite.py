@@ -8,10 +8,17 @@ from typing import Annotated
 
 import typer
 
-from comparisons.commands.extra import compare_extra
-from comparisons.commands.options import ClusterFile, Fresh, GitHub, JUnit, Scenes, Scheduler
-from comparisons.results.rungs import COMPARED
-from reference_rt.cli.defaults import Defaults, by_name
+from comparisons.commands.options import (
+    ClusterFile,
+    Fresh,
+    GitHub,
+    JUnit,
+    Scenes,
+    Scheduler,
+    compare_extra,
+)
+from comparisons.results.case import COMPARED
+from reference_rt.cli.adjusted import Defaults, by_name
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import UsageError
 
@@ -66,7 +73,7 @@ def suite(
         from comparisons.suites.display import summarise
         from comparisons.suites.run import Options, Run, run_suite
         from comparisons.suites.suite import Changes, load_suite, plan
-    from reference_rt.cli.where import Where
+    from reference_rt.cli.render_options import Where
     from reference_rt.util.files import check_writable
     from reference_rt.util.workers import Threads
 

@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 import platformdirs
 
-from comparisons.gate.copies import fingerprint
-from comparisons.gate.digest import scene_digest, source_digest
+from comparisons.gate.baselines import fingerprint, scene_digest, source_digest
 from comparisons.gate.pictures_in import Picture, variance_of
-from comparisons.results.sealed import read_arrays, write_arrays
+from comparisons.results.files import read_arrays, write_arrays
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.render import Progress, render
 from reference_rt.rendering.scene import Scene

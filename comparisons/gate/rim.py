@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.diagnosis.misfit import Hypothesis
 from comparisons.compare.judge import Lights
 from comparisons.compare.path_length import Lengths
 from comparisons.gate.pictures_in import Picture

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.geometry.float32 import UNIT_ROUNDOFF
+from comparisons.geometry.frame import UNIT_ROUNDOFF
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from comparisons.mitsuba.translate.materials import translate_material

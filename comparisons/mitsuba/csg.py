@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.geometry.flatten import Leaf, Tree
-from comparisons.geometry.float32 import delta, round32
+from comparisons.geometry.frame import delta, round32
 from comparisons.mitsuba.hits import (
     BoolArray,
     MitsubaHits,

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from comparisons.geometry.float32 import UNIT_ROUNDOFF
+from comparisons.geometry.frame import UNIT_ROUNDOFF
 from comparisons.mitsuba.scene import RawHits
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.rendering.query import Intersections

@@ -11,7 +11,7 @@ Works in scalar variants and in wide ones, where all rays are traced together.
 
 from typing import Any, NamedTuple
 
-from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF
+from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.csg import (
     MOST_CROSSINGS,

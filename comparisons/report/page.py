@@ -2,28 +2,73 @@
 
 The page loads nothing from the network (its content security policy forbids it), so it can be
 archived, mailed, or opened from disk. All text is escaped: scene names come from users. Its script
-draws the pictures from float data; without JavaScript there are thumbnails.
-"""
+draws the pictures from float data; without JavaScript there are thumbnails."""
 
 import base64
 import hashlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
 
-from comparisons.report.fitting import Fitted, fitted
-from comparisons.report.flip_map import flip_map
-from comparisons.report.histograms import histograms
+from comparisons.report.pictures_data import as_json, pack
+from comparisons.report.plots import histograms
 from comparisons.report.templates import encoded, template, write
-from comparisons.report.thumbnails import Thumbnail, Thumbnails, thumbnails
+from comparisons.report.thumbnails import Thumbnail, Thumbnails, flip_map, thumbnails
 from comparisons.report.values import shown
-from comparisons.results.case import RUNGS, Case, Metrics, Status, how_many
+from comparisons.results.case import RUNGS, Case, Images, Metrics, Status, how_many
+from comparisons.results.files import named
 from comparisons.results.headline import headline
-from comparisons.results.naming import named
+
+# ---- limits the size of the page: reduces or omits the float pictures of some cases --------------
+
+
+COARSEST = 32
+"""The largest block, in pixels of each side, that is averaged into one pixel; float pictures that
+are still too large are omitted."""
+
+FEWEST_BYTES = 1.0
+"""Bytes per packed pixel that nearly all pictures need at least."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The float pictures of a case as JSON ("": omitted); means over factor x factor pixels."""
+
+    data: str
+    factor: int
+
+
+def fitted(
+    pictures: Sequence[Images | None], failed: Sequence[bool], most_bytes: int
+) -> list[Fitted | None]:
+    """The pictures of all cases within `most_bytes`; None where a case has none.
+
+    The largest pictures of cases that did not fail are reduced first; those of failed cases only
+    when no others are left.
+    """
+    kept = {i: _packed(p, 1, most_bytes) for i, p in enumerate(pictures) if p is not None}
+    while sum(len(one.data) for one in kept.values()) > most_bytes:
+        _, _, coarse = max((not failed[i], len(one.data), i) for i, one in kept.items() if one.data)
+        images = pictures[coarse]
+        assert images is not None
+        kept[coarse] = _packed(images, 2 * kept[coarse].factor, most_bytes)
+    return [kept.get(i) for i in range(len(pictures))]
+
+
+def _packed(images: Images, factor: int, most_bytes: int) -> Fitted:
+    pixels = images.candidate[..., 0].size + images.reference[..., 0].size
+    # Packing takes seconds for a picture that cannot fit anyway.
+    while factor <= COARSEST and FEWEST_BYTES * pixels > most_bytes * factor**2:
+        factor *= 2
+    if factor > COARSEST:
+        return Fitted("", factor)
+    return Fitted(as_json(pack(images, factor)), factor)
+
 
 MOST_BYTES = 15_000_000
 """Default size limit of a page: it can still be mailed, and opens without a wait."""

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from comparisons.results.case import Case, RungResult
+from comparisons.results.files import plain
 from comparisons.results.headline import headline
-from comparisons.results.json_values import plain
 from reference_rt.util.files import replacing
 
 SCHEMA = 2

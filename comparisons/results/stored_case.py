@@ -15,8 +15,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from comparisons.results.case import Case, FloatArray, Images
-from comparisons.results.json_values import plain
-from comparisons.results.sealed import sealed, unsealed
+from comparisons.results.files import plain, sealed, unsealed
 from reference_rt.core.exr import read_exr, write_exr
 from reference_rt.util.errors import ImageError
 from reference_rt.util.files import read_input, read_text, replacing

@@ -10,8 +10,8 @@ from rich.text import Text
 from comparisons.report import terminal
 from comparisons.report.ci.ranking import ranked
 from comparisons.results.case import WARNING, Case, how_many
+from comparisons.results.files import named
 from comparisons.results.headline import first_difference, headline
-from comparisons.results.naming import named
 from comparisons.results.verdict import PASSING
 from comparisons.suites.worker import Request
 from reference_rt.util.console import Bar

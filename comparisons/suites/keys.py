@@ -11,7 +11,7 @@ from urllib.parse import unquote
 from comparisons.compare.budget import Budget
 from comparisons.mitsuba.backend import Backend
 from comparisons.mitsuba.reading.reference import file_of
-from comparisons.runs import fingerprint
+from comparisons.runs import provenance
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.files import read_input, read_text
 
@@ -28,7 +28,7 @@ def case_key(scene: Scene, budget: Budget, rungs: tuple[str, ...], backend: Back
         "budget": budget.model_dump(),
         "rungs": rungs,
         "sources": code_fingerprint(),
-        "versions": fingerprint.package_versions(),
+        "versions": provenance.package_versions(),
         "variant": backend.variant,
         "llvm": backend.llvm_path,
     }
@@ -79,4 +79,4 @@ def _with_parts(path: Path) -> list[Path]:
 
 def code_fingerprint() -> str:
     """The hash of the sources that verdicts depend on."""
-    return fingerprint.code_fingerprint(*_APART)
+    return provenance.code_fingerprint(*_APART)

@@ -11,7 +11,7 @@ from reference_rt.accel.geometry import Geometry, closest_hit, occluded
 from reference_rt.accel.packet import PACKET_SIZE
 from reference_rt.accel.packet_traversal import FOUND, INCOHERENT, closest_of_packet
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.ray import BLOCK, Hit, Ray
+from reference_rt.core.ray import BLOCK, Hit, Ray, scaled
 from reference_rt.core.ray_block import (
     HIT_FLOATS,
     HIT_INTEGERS,
@@ -21,7 +21,6 @@ from reference_rt.core.ray_block import (
     put_ray,
     ray_of,
 )
-from reference_rt.core.scaled_ray import scaled
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 

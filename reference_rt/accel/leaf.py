@@ -8,7 +8,7 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import Crossing, Hit, Ray
 from reference_rt.core.ray_block import HitBlock, RayBlock, hit_of, put_hit, ray_of
 from reference_rt.jit.kernel import kernel
-from reference_rt.jit.simd_kernels import lowest
+from reference_rt.jit.simd import lowest
 from reference_rt.shapes import TRIANGLE, Shapes
 from reference_rt.shapes.csg.tables import Solids
 from reference_rt.shapes.meshes import triangle

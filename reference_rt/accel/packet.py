@@ -6,12 +6,10 @@ from typing import Any, NamedTuple
 
 from reference_rt.accel.bvh import CENTER, Bvh
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.ray import surface_error
-from reference_rt.core.scaled_ray import SHORT
+from reference_rt.core.ray import SHORT, surface_error
 from reference_rt.core.vec3 import Vec3, component, max_abs
 from reference_rt.jit.kernel import kernel, reciprocal
-from reference_rt.jit.simd import VECTOR_WIDTH, larger, smaller
-from reference_rt.jit.simd_kernels import simd_kernel
+from reference_rt.jit.simd import VECTOR_WIDTH, larger, simd_kernel, smaller
 
 PACKET_SIZE = 16
 """Rays in a packet.  Measured on the bunny, camera rays along rows of 1024 pixels, at a time when

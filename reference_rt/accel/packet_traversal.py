@@ -25,8 +25,7 @@ from reference_rt.core.ray import BLOCK, Ray, no_hit
 from reference_rt.core.ray_block import HitBlock, RayBlock, put_hit, put_ray
 from reference_rt.core.vec3 import component, row
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
-from reference_rt.jit.simd import VECTOR_WIDTH, larger, smaller
-from reference_rt.jit.simd_kernels import lowest, simd_kernel
+from reference_rt.jit.simd import VECTOR_WIDTH, larger, lowest, simd_kernel, smaller
 from reference_rt.shapes.instances import Instances
 from reference_rt.shapes.meshes.watertight import PROJECTION_FLOATS, Shear
 

@@ -9,8 +9,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Ray, surface_error
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel, reciprocal
-from reference_rt.jit.simd import VECTOR_WIDTH, larger, smaller
-from reference_rt.jit.simd_kernels import lowest, prefetch, simd_kernel
+from reference_rt.jit.simd import VECTOR_WIDTH, larger, lowest, prefetch, simd_kernel, smaller
 
 
 class SlabRay(NamedTuple):

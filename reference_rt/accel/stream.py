@@ -30,8 +30,16 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import BLOCK, SURFACE_ROUNDING, no_hit
 from reference_rt.core.ray_block import HitBlock, RayBlock, put_hit, ray_of
 from reference_rt.jit.kernel import entry_kernel, kernel, local_floats, local_uint32
-from reference_rt.jit.simd import VECTOR_WIDTH, larger, least, select, with_sign
-from reference_rt.jit.simd_kernels import lowest, prefetch, simd_kernel
+from reference_rt.jit.simd import (
+    VECTOR_WIDTH,
+    larger,
+    least,
+    lowest,
+    prefetch,
+    select,
+    simd_kernel,
+    with_sign,
+)
 from reference_rt.shapes import Shapes
 from reference_rt.shapes.csg.tables import Solids
 from reference_rt.shapes.meshes.watertight import PROJECTION_FLOATS, Shear

@@ -1,7 +1,7 @@
 """The scene that a command is about: its argument, and options that change it."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,6 +12,31 @@ from reference_rt.util.errors import SceneError, UsageError
 
 if TYPE_CHECKING:
     from reference_rt.rendering.scene import Scene
+
+
+# ---- `-D name=value`: values for a scene of another program, whose format has such defaults ------
+
+
+Defaults = Annotated[
+    list[str] | None,
+    typer.Option(
+        "-D", metavar="NAME=VALUE", help="A value for a <default> of a Mitsuba scene; repeatable."
+    ),
+]
+
+
+def by_name(given: Sequence[str] | None) -> dict[str, str]:
+    """The values by name.  Raises UsageError."""
+    found: dict[str, str] = {}
+    for text in given or ():
+        name, equals, value = text.partition("=")
+        if not name or not equals:
+            raise UsageError(f"-D: expected NAME=VALUE, such as spp=64, got '{text}'")
+        if name in found:
+            raise UsageError(f"-D: '{name}' is given twice; expected one value")
+        found[name] = value
+    return found
+
 
 SceneArgument = Annotated[
     Path, typer.Argument(metavar="SCENE", help="A .yaml or .json scene, or a Mitsuba .xml one.")

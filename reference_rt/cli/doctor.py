@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numba
 
-from reference_rt.jit.compiler import INLINING
-from reference_rt.jit.kernel import CACHE_FOLDER, COMPILER
+from reference_rt.jit.kernel import CACHE_FOLDER
 from reference_rt.jit.kernel_cache import cache_root
 
 CHECKS = "reference_rt.checks"
@@ -50,10 +49,7 @@ def _compiler() -> Check:
     if numba.config.DISABLE_JIT:
         advice = "unset NUMBA_DISABLE_JIT: plain Python is some hundred times slower"
         return Check("compiler", f"{version}, switched off", advice)
-    if COMPILER.name != INLINING:
-        advice = "see docs/numba.md: kernels take twice as long to compile"
-        return Check("compiler", f"{version}, its own pipeline", advice)
-    return Check("compiler", f"{version}, {COMPILER.name} pipeline")
+    return Check("compiler", version)
 
 
 def _caches() -> Iterable[Check]:

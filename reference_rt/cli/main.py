@@ -12,8 +12,7 @@ from typing import Annotated
 import typer
 
 from reference_rt.cli import render_options
-from reference_rt.cli.adjusted import SceneArgument, adjusted, without_blas
-from reference_rt.cli.defaults import Defaults, by_name
+from reference_rt.cli.adjusted import Defaults, SceneArgument, adjusted, by_name, without_blas
 from reference_rt.cli.guarded import guarded, is_output_lost, lost_output, say
 from reference_rt.cli.preview_command import preview
 from reference_rt.util.errors import ImageError
@@ -81,7 +80,7 @@ def render(
     Ctrl-C writes the picture so far, marked as partial in its header.
     """
     from reference_rt.cli.render import Limited, Stored, render_to_file
-    from reference_rt.cli.where import Where
+    from reference_rt.cli.render_options import Where
     from reference_rt.rendering.image import check_suffix
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.files import check_writable

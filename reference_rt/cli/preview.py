@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from reference_rt.cli.guarded import say
-from reference_rt.cli.quantities import percentage
+from reference_rt.cli.render_options import percentage
 from reference_rt.cli.terminal_picture import Pixels, draws_sixels, half_blocks, room, sixels
 from reference_rt.rendering.image import display, eight_bits
 from reference_rt.rendering.loop import Limits

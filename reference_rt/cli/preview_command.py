@@ -4,8 +4,7 @@ from typing import Annotated
 
 import typer
 
-from reference_rt.cli.adjusted import SceneArgument, adjusted, without_blas
-from reference_rt.cli.defaults import Defaults, by_name
+from reference_rt.cli.adjusted import Defaults, SceneArgument, adjusted, by_name, without_blas
 from reference_rt.cli.guarded import guarded
 
 
@@ -32,7 +31,7 @@ def preview(
 ) -> None:
     """Show a picture of a scene that becomes less noisy until it is closed or interrupted."""
     from reference_rt.cli import preview as previews
-    from reference_rt.cli.quantities import share_of
+    from reference_rt.cli.render_options import share_of
     from reference_rt.rendering.scene import Scene
 
     loaded = adjusted(Scene.load(scene, by_name(define)), size=size)

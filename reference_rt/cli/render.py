@@ -7,8 +7,14 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from reference_rt.cli.quantities import bytes_of, duration, percentage, seconds_of, share_of
-from reference_rt.cli.where import Where
+from reference_rt.cli.render_options import (
+    Where,
+    bytes_of,
+    duration,
+    percentage,
+    seconds_of,
+    share_of,
+)
 from reference_rt.jit.kernel_cache import cache_root
 from reference_rt.rendering import image
 from reference_rt.rendering.framebuffer import delete_old

@@ -16,8 +16,12 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Description
 from reference_rt.core.ray import Ray, ray_from
 from reference_rt.core.vec3 import Vec3, max_component, to_world
-from reference_rt.integrators.direct_light import direct, light_selection_normal, power_heuristic
-from reference_rt.integrators.hidden_lamps import behind_lamps
+from reference_rt.integrators.direct_light import (
+    behind_lamps,
+    direct,
+    light_selection_normal,
+    power_heuristic,
+)
 from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
 from reference_rt.integrators.shading import place, shade
 from reference_rt.jit.kernel import kernel, local_floats

@@ -34,10 +34,10 @@ from reference_rt.core.ray_block import add_vector, put_ray, put_vector, ray_of,
 from reference_rt.core.vec3 import Vec3, is_black, max_component, to_world
 from reference_rt.integrators.direct_light import (
     light_selection_normal,
+    pass_lamps,
     power_heuristic,
     unshadowed,
 )
-from reference_rt.integrators.hidden_lamps import pass_lamps
 from reference_rt.integrators.path_state import State, put_state, start, state_of
 from reference_rt.integrators.scene_tables import SceneTables, shapes_of
 from reference_rt.integrators.scratch import Scratch

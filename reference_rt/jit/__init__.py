@@ -8,7 +8,7 @@
 - `table_words.py`, `operation_types.py`, `function_pointer.py`, `generated.py`: what these are made
   of, that is tables in memory, types of annotations, calls through function pointers, generated
   text.
-- `compiler.py`, `numba_pipeline.py`: our pipeline, and the fallback to Numba's own.
+- `compiler.py`: our pipeline of Numba's passes.
 - `numba_codegen.py`: what code generation takes from inside Numba (docs/numba.md).
 - `kernel_cache.py`: compiled kernels on disk.
 - `parallel_compile.py`: kernels compiled in several processes.

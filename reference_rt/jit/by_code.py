@@ -41,9 +41,9 @@ from typing import Any, TypeVar
 
 from numba import types
 
-from reference_rt.jit.generated import define, parameters_of
 from reference_rt.jit.kernel import is_named_tuple, kernel, overload_kernel
 from reference_rt.jit.links import Group, Link, Row, stop
+from reference_rt.jit.numba_codegen import define, parameters_of
 
 F = TypeVar("F", bound=Callable[..., Any])
 

@@ -12,7 +12,8 @@ import numpy.typing as npt
 from numba import types
 from numba.extending import intrinsic
 
-from reference_rt.jit.kernel import COMPILER, Signature
+from reference_rt.jit.compiler import invoke
+from reference_rt.jit.kernel import Signature
 from reference_rt.jit.numba_codegen import function_at, items_of
 
 FunctionPointer = npt.NDArray[np.intp]
@@ -57,4 +58,4 @@ def emit_call(
         context.cast(builder, value, a, b)
         for value, a, b in zip(values, given, declared, strict=True)
     ]
-    return COMPILER.invoke(context, builder, function, returns, declared, arguments)
+    return invoke(context, builder, function, returns, declared, arguments)

@@ -31,9 +31,7 @@ from reference_rt.jit.numba_codegen import array_at
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-COMPILER = compiler.choose()
-
-CACHE_FOLDER = prepare_folder(COMPILER.name)
+CACHE_FOLDER = prepare_folder()
 
 
 def kernel(function: F) -> F:
@@ -41,24 +39,24 @@ def kernel(function: F) -> F:
 
     IEEE arithmetic in the order written.  Always inlined, because the machine's calling convention
     would pass the scene's tables field by field, some 400 words a call (measured: inlined, a render
-    is 1.5 times faster).  `numba_pipeline.py` does that without compiling anything twice;
+    is 1.5 times faster).  `compiler.py` does that without compiling anything twice;
     `compiler.py` chooses between it and Numba's own compiler.
     """
-    inlined: F = register_jitable(**COMPILER.kernel)(function)
+    inlined: F = register_jitable(**compiler.KERNEL)(function)
     return inlined
 
 
 def overload_kernel(function: Any) -> Callable[[F], F]:
     """`numba.extending.overload` for functions that kernels call: decorates a function that takes
     the arguments' types and returns the kernel for them, or None."""
-    decorate: Callable[[F], F] = overload(function, jit_options=COMPILER.kernel, strict=False)
+    decorate: Callable[[F], F] = overload(function, jit_options=compiler.KERNEL, strict=False)
     return decorate
 
 
 def entry_kernel(function: F) -> F:
     """Compile `function`, which Python calls with arrays, at the first call for each set of
     argument types, and cache the result on disk.  Runs without the GIL."""
-    compiled: F = njit(**COMPILER.entry)(function)
+    compiled: F = njit(**compiler.ENTRY)(function)
     _cache(compiled, function)
     return compiled
 
@@ -69,7 +67,7 @@ def callee_kernel(function: Callable[..., Any], of: Callable[..., Any], name: st
     of: the kernel of which `function`, a generated one, is made;  name: what tells it apart from
     others that are made of the same kernel.
     """
-    compiled = njit(**COMPILER.callee)(function)
+    compiled = njit(**compiler.CALLEE)(function)
     _cache(compiled, of, name)
     return compiled
 

@@ -47,11 +47,11 @@ _MAGIC = b"reference_rt kernel\n"
 _CHECKSUM_BYTES = 32
 
 
-def _sources_digest(compiler: str) -> str:
+def _sources_digest() -> str:
     """Digest of all sources, versions and the bounds-check flag.  Numba's own key lacks that flag
     and edits in a callee's file (numba#1833)."""
     digest = hashlib.sha256()
-    for version in (sys.version, numba.__version__, llvmlite.__version__, compiler):
+    for version in (sys.version, numba.__version__, llvmlite.__version__):
         digest.update(version.encode())
     digest.update(str(numba.config.BOUNDSCHECK).encode())
     for source in sorted(_PACKAGE.rglob("*.py")):  # kernels of every folder call each other
@@ -66,13 +66,11 @@ def cache_root() -> Path:
     return Path(root)
 
 
-def prepare_folder(compiler: str) -> str | None:
+def prepare_folder() -> str | None:
     """Create the folder for kernels of exactly these sources and versions; None if it cannot be
-    written, or others could write machine code into it.  Deletes folders that are no longer used.
-
-    compiler: the name of the compiler, part of the key.
-    """
-    folder = cache_root() / "kernels" / _sources_digest(compiler)
+    written, or others could write machine code into it.  Deletes folders that are no longer
+    used."""
+    folder = cache_root() / "kernels" / _sources_digest()
     try:
         _make(folder)
         os.utime(folder)

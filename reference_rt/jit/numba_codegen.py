@@ -1,11 +1,12 @@
 """What functions that generate LLVM code need from inside Numba, in one place.
 
 Numba documents `intrinsic`, but little of what an intrinsic's generator may use.  All modules that
-generate code get the rest from here, except `numba_pipeline.py`.  `docs/numba.md` lists everything
-in this package that depends on undocumented parts of Numba, and why.
-"""
+generate code get the rest from here, except `compiler.py`.  `docs/numba.md` lists everything
+in this package that depends on undocumented parts of Numba, and why."""
 
-from collections.abc import Sequence
+import inspect
+import linecache
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numba
@@ -16,6 +17,30 @@ from numba.core.base import BaseContext
 from numba.core.callconv import CPUCallConv
 from numba.core.codegen import JITCodeLibrary
 from numba.np import arrayobj
+
+# Kernels made of generated text: `by_code.py` and `links.py` write it, and tracebacks show it.
+
+
+def parameters_of(function: Callable[..., Any]) -> list[str]:
+    """The names of a function's parameters."""
+    return [*inspect.signature(function).parameters]
+
+
+def define(
+    text: str, module: str, name: str, label: str, known: Mapping[str, Any]
+) -> Callable[..., Any]:
+    """The function `name` that a text defines.
+
+    module: in which it is said to be;  label: what tells it apart, in tracebacks, from others of
+    the same name;  known: the values of all other names in the text.
+    """
+    file = f"<{module}.{name} {label}>"
+    linecache.cache[file] = len(text), None, text.splitlines(keepends=True), file
+    names = {"__name__": module, **known}
+    exec(compile(text, file, "exec"), names)
+    made: Callable[..., Any] = names[name]
+    return made
+
 
 SUPPORTED = "0.68"
 """The release of Numba that `jit/` is written for, as in pyproject.toml."""

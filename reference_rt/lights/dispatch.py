@@ -6,15 +6,13 @@ draws a direction to it.  p and n are the point and the shading normal for which
 
 from typing import Any
 
-from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import SurfacePoint
 from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.lights.emitters import area
 from reference_rt.lights.light import AREA, ENVIRONMENT, NO_LIGHT, LightSample
 from reference_rt.lights.selection import choice
-from reference_rt.lights.selection.choice import LightSampler
-from reference_rt.lights.selection.tree import LightTree, Pick
+from reference_rt.lights.selection.tree import Pick
 from reference_rt.lights.tables import (
     Lights,
     by_code,
@@ -65,42 +63,25 @@ def _area_density(lights: Lights, i: int, shapes: Shapes, p: Vec3, q: SurfacePoi
 def pick(lights: Lights, p: Vec3, n: Vec3, u: float) -> Pick:
     """A light for a surface at `p` with normal `n`, which is 0 for light from all sides.  Its
     probability is 0 if there is none."""
-    return _pick(lights.choice, lights.tree, p, n, u)
-
-
-@kernel
-def _pick(lights: LightSampler | None, tree: LightTree | None, p: Vec3, n: Vec3, u: float) -> Pick:
-    if lights is None:
+    if lights.choice is None:
         return Pick(0, 0.0)
-    return choice.pick(lights, tree, p, n, u)
+    return choice.pick(lights.choice, lights.tree, p, n, u)
 
 
 @kernel
 def pick_probability(lights: Lights, p: Vec3, n: Vec3, k: int) -> float:
     """The probability that `pick` returns light k."""
-    return _pick_probability(lights.choice, lights.tree, p, n, k)
-
-
-@kernel
-def _pick_probability(
-    lights: LightSampler | None, tree: LightTree | None, p: Vec3, n: Vec3, k: int
-) -> float:
-    if lights is None:
+    if lights.choice is None:
         return 0.0
-    return choice.probability(lights, tree, p, n, k)
+    return choice.probability(lights.choice, lights.tree, p, n, k)
 
 
 @kernel
 def count(lights: Lights) -> int:
     """The number of entries that can be picked."""
-    return _count(lights.choice)
-
-
-@kernel
-def _count(lights: LightSampler | None) -> int:
-    if lights is None:
+    if lights.choice is None:
         return 0
-    return choice.count(lights)
+    return choice.count(lights.choice)
 
 
 @kernel
@@ -108,23 +89,9 @@ def sample_one(
     lights: Lights, k: int, shapes: Shapes, textures: Textures | None, p: Vec3, u0: float, u1: float
 ) -> LightSample:
     """A sample of the light from entry k at `p`; its pdf is without the probability of k."""
-    return _sample_one(lights.choice, lights, k, shapes, textures, p, u0, u1)
-
-
-@kernel
-def _sample_one(
-    entries: LightSampler | None,
-    lights: Lights,
-    k: int,
-    shapes: Shapes,
-    textures: Textures | None,
-    p: Vec3,
-    u0: float,
-    u1: float,
-) -> LightSample:
-    if entries is None:
+    if lights.choice is None:
         return NO_LIGHT
-    kind, i = entries.kind[k], entries.row[k]
+    kind, i = lights.choice.kind[k], lights.choice.row[k]
     found: LightSample = _sample(emitters(lights), kind, i, shapes, textures, p, u0, u1)
     return found
 
@@ -155,23 +122,9 @@ def sample_fixed(
 ) -> LightSample:
     """`sample_one` where nothing is random: every area light is its one point at (u0, u1), which
     for a rectangle is the same wherever it is seen from."""
-    return _fixed_of_one(lights.choice, lights, k, shapes, textures, p, u0, u1)
-
-
-@kernel
-def _fixed_of_one(
-    entries: LightSampler | None,
-    lights: Lights,
-    k: int,
-    shapes: Shapes,
-    textures: Textures | None,
-    p: Vec3,
-    u0: float,
-    u1: float,
-) -> LightSample:
-    if entries is None:
+    if lights.choice is None:
         return NO_LIGHT
-    kind, i = entries.kind[k], entries.row[k]
+    kind, i = lights.choice.kind[k], lights.choice.row[k]
     found: LightSample = _sample_fixed(emitters(lights), kind, i, shapes, textures, p, u0, u1)
     return found
 
@@ -221,11 +174,6 @@ def environment_pdf(lights: Lights, p: Vec3, n: Vec3, arriving: Vec3) -> float:
 @kernel
 def ambient(lights: Lights) -> Vec3:
     """The ambient radiance I_a of the Phong model."""
-    return _ambient(lights.ambient)
-
-
-@kernel
-def _ambient(radiance: FloatArray | None) -> Vec3:
-    if radiance is None:
+    if lights.ambient is None:
         return Vec3(0.0, 0.0, 0.0)
-    return row(radiance, 0)
+    return row(lights.ambient, 0)

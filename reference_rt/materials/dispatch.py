@@ -128,21 +128,14 @@ def pdf(materials: Materials, shading: Shading, wi: Vec3) -> float:
 @kernel
 def eval_pdf(materials: Materials, shading: Shading, wi: Vec3) -> Scattered:
     """`evaluate` and `pdf` at once, which share much of their work."""
-    return _eval_pdf(materials.flat_leaves, materials, shading, wi)
-
-
-@kernel
-def _eval_pdf(
-    flat_leaves: FlattenedMaterials | None, materials: Materials, shading: Shading, wi: Vec3
-) -> Scattered:
     m = shading.point.material
-    if flat_leaves is None:
+    if materials.flat_leaves is None:
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return bsdf.eval_pdf(materials.leaves, kind, i, shading.at, shading.wo, wi)
-    if is_absent(flat_leaves):
+    if is_absent(materials.flat_leaves):
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return bsdf.eval_pdf(materials.leaves, kind, i, shading.at, shading.wo, wi)
-    return eval_pdf_nested(flat_leaves, materials.leaves, shading, wi)
+    return eval_pdf_nested(materials.flat_leaves, materials.leaves, shading, wi)
 
 
 @kernel
@@ -150,41 +143,24 @@ def sample(
     materials: Materials, shading: Shading, u_lobe: float, u0: float, u1: float
 ) -> BsdfSample:
     """A direction sampled for `shading.wo`; pdf = 0 if the material scatters nothing."""
-    return _sample(materials.flat_leaves, materials, shading, u_lobe, u0, u1)
-
-
-@kernel
-def _sample(
-    flat_leaves: FlattenedMaterials | None,
-    materials: Materials,
-    shading: Shading,
-    u_lobe: float,
-    u0: float,
-    u1: float,
-) -> BsdfSample:
     m = shading.point.material
-    if flat_leaves is None:
+    if materials.flat_leaves is None:
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return bsdf.sample(materials.leaves, kind, i, shading.at, shading.wo, u_lobe, u0, u1)
-    if is_absent(flat_leaves):
+    if is_absent(materials.flat_leaves):
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return bsdf.sample(materials.leaves, kind, i, shading.at, shading.wo, u_lobe, u0, u1)
-    return sample_nested(flat_leaves, materials.leaves, shading, u_lobe, u0, u1)
+    return sample_nested(materials.flat_leaves, materials.leaves, shading, u_lobe, u0, u1)
 
 
 @kernel
 def branch_count(materials: Materials, m: int) -> int:
     """The number of `branches` of a material."""
-    return _branch_count(materials.flat_leaves, m)
-
-
-@kernel
-def _branch_count(flat_leaves: FlattenedMaterials | None, m: int) -> int:
-    if flat_leaves is None:
+    if materials.flat_leaves is None:
         return 1
-    if is_absent(flat_leaves):
+    if is_absent(materials.flat_leaves):
         return 1
-    return leaf_count(flat_leaves, m)
+    return leaf_count(materials.flat_leaves, m)
 
 
 @kernel
@@ -210,38 +186,24 @@ def prepare(materials: Materials, shading: Shading, at: At) -> None:
 @kernel
 def ambient(materials: Materials, shading: Shading) -> Vec3:
     """The ambient reflectance k_a of the Phong model, summed over the layers; black for others."""
-    return _ambient(materials.flat_leaves, materials, shading)
-
-
-@kernel
-def _ambient(
-    flat_leaves: FlattenedMaterials | None, materials: Materials, shading: Shading
-) -> Vec3:
     m = shading.point.material
-    if flat_leaves is None:
+    if materials.flat_leaves is None:
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return bsdf.ambient(materials.leaves, kind, i, shading.at)
-    if is_absent(flat_leaves):
+    if is_absent(materials.flat_leaves):
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return bsdf.ambient(materials.leaves, kind, i, shading.at)
-    return ambient_nested(flat_leaves, materials.leaves, shading)
+    return ambient_nested(materials.flat_leaves, materials.leaves, shading)
 
 
 @kernel
 def branches(materials: Materials, shading: Shading, k: int) -> Branches:
     """The perfectly reflected and refracted directions of layer k of a material."""
-    return _branches(materials.flat_leaves, materials, shading, k)
-
-
-@kernel
-def _branches(
-    flat_leaves: FlattenedMaterials | None, materials: Materials, shading: Shading, k: int
-) -> Branches:
     m = shading.point.material
-    if flat_leaves is None:
+    if materials.flat_leaves is None:
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return bsdf.branches(materials.leaves, kind, i, shading.at, shading.wo)
-    if is_absent(flat_leaves):
+    if is_absent(materials.flat_leaves):
         kind, i = _kind(materials.kind, materials, m), _row(materials.row, m)
         return bsdf.branches(materials.leaves, kind, i, shading.at, shading.wo)
-    return branches_nested(flat_leaves, materials.leaves, shading, k)
+    return branches_nested(materials.flat_leaves, materials.leaves, shading, k)

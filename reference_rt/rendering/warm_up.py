@@ -69,7 +69,6 @@ from reference_rt.rendering.query.hits import (
     occluded_of_few,
 )
 from reference_rt.rendering.query.light import direct_kernel, pdf_kernel, sample_kernel
-from reference_rt.rendering.query.linked import geometry_of
 from reference_rt.rendering.query.radiance import cast_kernel
 from reference_rt.rendering.query.rays import camera_kernel
 from reference_rt.rendering.query.tracing import (
@@ -83,6 +82,7 @@ from reference_rt.rendering.query.tracing import (
     describe,
     empty_hits,
     empty_primitives,
+    geometry_of,
 )
 from reference_rt.sampling import Grid, Independent, Sobol
 from reference_rt.scene.build import BuiltScene

@@ -22,8 +22,7 @@ from reference_rt.lights.emitters import constant, environment_map
 from reference_rt.lights.selection import bounds
 from reference_rt.lights.selection.bounds import LightBounds
 from reference_rt.lights.selection.choice import FEW
-from reference_rt.lights.selection.tree import LightTree
-from reference_rt.lights.selection.tree_build import build
+from reference_rt.lights.selection.tree import LightTree, build
 from reference_rt.materials import Emissive
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes import TABLES as SHAPE_TABLES

@@ -13,8 +13,15 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.model import Positive
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.jit.kernel import kernel
-from reference_rt.textures.image_file import Encoding
-from reference_rt.textures.texels import Bytes, Texels, joined, most_bytes, read_texels, room_of
+from reference_rt.textures.image_file import (
+    Bytes,
+    Encoding,
+    Texels,
+    joined,
+    most_bytes,
+    read_texels,
+    room_of,
+)
 from reference_rt.textures.texture import Texture
 from reference_rt.util.memory import check_memory
 

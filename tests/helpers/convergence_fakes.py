@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from comparisons.experiments.convergence.data import Reference
 from comparisons.experiments.convergence.ladder import Climb
 from comparisons.experiments.convergence.methods import Shot
+from comparisons.experiments.convergence.store import Reference
 
 SHAPE = (12, 16, 3)
 TRUE = np.random.default_rng(0).uniform(0.2, 2.0, SHAPE)

@@ -6,7 +6,7 @@ import signal
 import sys
 import time
 
-from comparisons.experiments.fuzz import stored
+from comparisons.experiments.fuzz import finding
 from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced, Request
 from comparisons.runs.processes.protocol import carry_out, private_stdout
 
@@ -24,14 +24,14 @@ def scene(request: Request) -> None:
         time.sleep(600.0)
     findings = [FOUND] if request.number in (4, 5) else []
     types = ["shape:sphere", "material:mirror"]
-    stored.add(
+    finding.add(
         request.out, Checked(number=request.number, findings=findings, types=types, lit=True)
     )
 
 
 def reduced(request: Request) -> None:
     assert request.finding is not None
-    stored.add_reduced(
+    finding.add_reduced(
         request.out,
         Reduced(
             number=request.number,

@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from comparisons.experiments.stability.harness import families, worker
+from comparisons.experiments.stability.harness import family, worker
 from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Outcome, Shot
 from comparisons.experiments.stability.harness.family import Family, Series, Sweep, alone, decades
 
@@ -78,8 +78,8 @@ def install():
         fake = type(module)(f"comparisons.experiments.stability.{name}.family")
         fake.FAMILY = one
         sys.modules[fake.__name__] = fake
-    families.MODULES.clear()
-    families.MODULES.update({name: name for name in FAMILIES})
+    family.MODULES.clear()
+    family.MODULES.update({name: name for name in FAMILIES})
 
 
 if __name__ == "__main__":

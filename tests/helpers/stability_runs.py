@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from comparisons.experiments.stability.harness.core import Draw, Outcome, generator
-from comparisons.experiments.stability.harness.families import family
+from comparisons.experiments.stability.harness.family import family
 
 
 def measured(

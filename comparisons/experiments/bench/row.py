@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from comparisons.experiments.bench.timing import Spread, ratios, spread
-from comparisons.results.json_values import plain
+from comparisons.results.files import plain
 
 Better = Literal["lower", "higher"]
 

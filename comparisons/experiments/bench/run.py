@@ -17,8 +17,7 @@ from comparisons.experiments.bench.groups import GROUPS, Group
 from comparisons.experiments.bench.row import Row, row_from
 from comparisons.experiments.bench.setting import Setting
 from comparisons.experiments.bench.table import Display, markdown
-from comparisons.runs.fingerprint import code_fingerprint
-from comparisons.runs.provenance import ours
+from comparisons.runs.provenance import code_fingerprint, ours
 from reference_rt.util.errors import ReferenceUnavailableError
 from reference_rt.util.files import check_writable, read_text, replacing
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from comparisons.runs.cooldown import cool_down
+from comparisons.runs.elsewhere import cool_down
 
 ROUNDS = 7
 """Default number of rounds: one or two disturbances do not move the median far."""

@@ -45,8 +45,8 @@ def reached(scene: Scene, target: float, seconds: float) -> "dict[str, Target]":
     Raises SceneError, ReferenceUnavailableError; ValueError for a deterministic scene.
     """
     # Imported here: the package's name is imported by its modules too.
-    from comparisons.experiments.convergence.data import Settings, size_within
     from comparisons.experiments.convergence.run import converge
+    from comparisons.experiments.convergence.store import Settings, size_within
 
     if scene.integrator.deterministic:
         raise ValueError(f"{scene.name}: is deterministic; expected a random integrator")

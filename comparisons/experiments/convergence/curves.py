@@ -7,11 +7,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from comparisons.experiments.convergence.data import Reference, Rung, weights
 from comparisons.experiments.convergence.estimates import errors, linear_time, time_to
 from comparisons.experiments.convergence.findings import Findings, Ratio, compared, points_of
 from comparisons.experiments.convergence.methods import Method, Renderer
-from comparisons.experiments.convergence.store import Store
+from comparisons.experiments.convergence.store import Reference, Rung, Store, weights
 from reference_rt.core.arrays import FloatArray
 
 # ---- pictures at equal time and at equal error --------------------------------------------------

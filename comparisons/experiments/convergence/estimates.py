@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import optimize, stats
 
-from comparisons.experiments.convergence.data import Reference, Rung, weights
+from comparisons.experiments.convergence.store import Reference, Rung, weights
 from reference_rt.core.arrays import FloatArray
 
 LEVEL = 0.95

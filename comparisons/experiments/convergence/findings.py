@@ -7,7 +7,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from comparisons.experiments.convergence.data import Reference, Rung, weights
 from comparisons.experiments.convergence.estimates import (
     Bias,
     Estimate,
@@ -22,6 +21,7 @@ from comparisons.experiments.convergence.estimates import (
     standard_error,
     time_to,
 )
+from comparisons.experiments.convergence.store import Reference, Rung, weights
 from reference_rt.core.arrays import FloatArray
 
 MEDIAN_ERROR = math.sqrt(math.pi / 2.0)

@@ -8,14 +8,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from comparisons.experiments.convergence.data import (
-    FIRST,
-    Reference,
-    Rung,
-    Settings,
-    size_within,
-    weights,
-)
 from comparisons.experiments.convergence.estimates import Accumulator, against
 from comparisons.experiments.convergence.methods import (
     AbsentError,
@@ -25,7 +17,15 @@ from comparisons.experiments.convergence.methods import (
     Stable,
     with_sampler,
 )
-from comparisons.experiments.convergence.store import Store
+from comparisons.experiments.convergence.store import (
+    FIRST,
+    Reference,
+    Rung,
+    Settings,
+    Store,
+    size_within,
+    weights,
+)
 from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
 

@@ -12,7 +12,7 @@ from comparisons.geometry.flatten import copies_of
 from comparisons.mitsuba.backend import LLVM, SCALAR, backend, mitsuba, variant
 from comparisons.mitsuba.notes import notes_of
 from comparisons.mitsuba.translate import MOST_INSTANCES, UntranslatableError, to_mitsuba
-from comparisons.runs.cooldown import cool_down
+from comparisons.runs.elsewhere import cool_down
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.render import Progress, render
 from reference_rt.rendering.scene import Scene

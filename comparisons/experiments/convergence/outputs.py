@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from comparisons.experiments.convergence.curves import Curves
-from comparisons.experiments.convergence.data import Settings
 from comparisons.experiments.convergence.estimates import Line
 from comparisons.experiments.convergence.findings import Findings, Ratio, Target
+from comparisons.experiments.convergence.store import Settings
 from comparisons.report.values import percent
-from comparisons.results.files import csv_file
-from comparisons.results.json_values import plain
+from comparisons.results.files import csv_file, plain
 from reference_rt.util.files import replacing
 
 # ---- for a terminal -----------------------------------------------------------------------------

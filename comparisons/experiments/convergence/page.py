@@ -9,10 +9,10 @@ import numpy as np
 from markupsafe import Markup
 
 from comparisons.experiments.convergence.curves import Crops, Curves
-from comparisons.experiments.convergence.data import Settings
 from comparisons.experiments.convergence.estimates import Bias, Line
 from comparisons.experiments.convergence.findings import Ratio, Target
 from comparisons.experiments.convergence.starts import STAGES
+from comparisons.experiments.convergence.store import Settings
 from comparisons.report.plots import Curve, log_log
 from comparisons.report.templates import template, write
 from comparisons.report.thumbnails import png_url

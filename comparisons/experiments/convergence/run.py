@@ -11,7 +11,6 @@ from comparisons.compare import pictures
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import budgeted
 from comparisons.experiments.convergence.curves import Curves, GridPoint, Grids, GridStep, crops_of
-from comparisons.experiments.convergence.data import FIRST, WIDEST, Settings, size_within, weights
 from comparisons.experiments.convergence.findings import findings_of
 from comparisons.experiments.convergence.ladder import (
     SPP,
@@ -37,7 +36,17 @@ from comparisons.experiments.convergence.methods import (
     with_sampler,
 )
 from comparisons.experiments.convergence.starts import starts_of
-from comparisons.experiments.convergence.store import COUNT, Store, reference_of, run_key
+from comparisons.experiments.convergence.store import (
+    COUNT,
+    FIRST,
+    WIDEST,
+    Settings,
+    Store,
+    reference_of,
+    run_key,
+    size_within,
+    weights,
+)
 from comparisons.mitsuba.backend import SCALAR, backend
 from comparisons.mitsuba.translate import UntranslatableError, load
 from comparisons.suites.suite import Changes, read

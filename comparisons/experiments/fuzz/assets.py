@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.fuzz.data import Data
 from comparisons.experiments.fuzz.fields import DIGITS, Draw
+from comparisons.experiments.fuzz.finding import Data
 from comparisons.experiments.stability.hostile.bases import COPIES, MESHES
 from comparisons.experiments.stability.hostile.bases import files as sound_files
 from reference_rt.core.arrays import FloatArray, IntArray

@@ -13,18 +13,20 @@ import numpy as np
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, gather
 from comparisons.compare.judge import judge
-from comparisons.experiments.fuzz.data import Data, copy_of, named_in
+from comparisons.experiments.fuzz.fields import types_in
 from comparisons.experiments.fuzz.finding import (
     DETERMINISTIC,
     Checked,
+    Data,
     Effort,
     Finding,
+    copy_of,
+    named_in,
     without_numbers,
 )
 from comparisons.experiments.fuzz.generate import parse
 from comparisons.experiments.fuzz.identities import IDENTITIES, Original
 from comparisons.experiments.fuzz.reduce import renamed, without_unused
-from comparisons.experiments.fuzz.types import types_in
 from comparisons.geometry.flatten import copies_of
 from comparisons.mitsuba.translate.materials import is_textured
 from comparisons.mitsuba.translate.shapes.stand_ins import coarser

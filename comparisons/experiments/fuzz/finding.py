@@ -1,13 +1,95 @@
 """What a worker of the fuzzer is asked for, with how much effort, and what it finds, as data."""
 
+import json
+import os
 import re
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from comparisons.experiments.fuzz.data import Data
+from reference_rt.util.files import replacing
+
+# ---- scenes as plain data: walks, copies, and YAML of one line for each part ---------------------
+
+
+Data = dict[str, Any]
+"""A scene, or a part of one, as its file's data."""
+
+_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
+_WORDS = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}
+
+
+def shapes_of(scene: Data) -> Iterator[Data]:
+    """All shapes of a scene's data: operands of solids and members of groups too."""
+    for shape in scene.get("shapes", ()):
+        yield from _with_operands(shape)
+    for members in scene.get("groups", {}).values():
+        for shape in members:
+            yield from _with_operands(shape)
+
+
+def _with_operands(shape: Data) -> Iterator[Data]:
+    yield shape
+    for operand in shape.get("of", ()):
+        yield from _with_operands(operand)
+
+
+def named_in(part: Any) -> Iterator[tuple[Data, str]]:
+    """Every field of a part that is a text but for its type, at any depth, with the data that it
+    belongs to: some are names of materials and textures."""
+    if isinstance(part, dict):
+        for key, value in part.items():
+            if isinstance(value, str) and key != "type":
+                yield part, key
+            else:
+                yield from named_in(value)
+    elif isinstance(part, list):
+        for value in part:
+            yield from named_in(value)
+
+
+def text_of(scene: Data) -> str:
+    """YAML, one line for each shape, material, light and so on."""
+    lines: list[str] = []
+    for key, value in scene.items():
+        if isinstance(value, dict) and key in ("textures", "materials", "groups"):
+            if value:
+                lines.append(f"{key}:")
+                lines += [f"  {_flow(name)}: {_flow(part)}" for name, part in value.items()]
+        elif isinstance(value, list):
+            if value:
+                lines.append(f"{key}:")
+                lines += [f"  - {_flow(part)}" for part in value]
+        else:
+            lines.append(f"{key}: {_flow(value)}")
+    return "\n".join(lines) + "\n"
+
+
+def _flow(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_flow(k)}: {_flow(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_flow, value)) + "]"
+    if isinstance(value, str):
+        bare = _PLAIN.fullmatch(value) and value.lower() not in _WORDS
+        return value if bare else json.dumps(value, ensure_ascii=False)
+    if isinstance(value, float) and value == int(value) and abs(value) < 1e15:
+        return str(int(value))
+    return json.dumps(value)
+
+
+def copy_of(data: Any) -> Any:
+    """A deep copy of plain data."""
+    if isinstance(data, dict):
+        return {key: copy_of(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [copy_of(value) for value in data]
+    return data
+
 
 # ---- effort -------------------------------------------------------------------------------------
 
@@ -139,3 +221,77 @@ class Request(BaseModel):
     def grammar(self) -> Grammar:
         """What scenes are made of."""
         return Grammar(self.features, self.extreme)
+
+
+# The results of a run in its folder: a line for each scene, a file for each reduced finding.
+
+
+SCENES = "scenes.jsonl"
+FINDINGS = "findings"
+
+
+def add(folder: Path, checked: Checked) -> None:
+    """Append what came of a scene.  Processes append whole lines at the same time."""
+    line = checked.model_dump_json().encode() + b"\n"
+    folder.mkdir(parents=True, exist_ok=True)
+    file = os.open(folder / SCENES, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
+    try:
+        os.write(file, line)
+    finally:
+        os.close(file)
+
+
+class Reader:
+    """Reads what processes append: each call returns what is new."""
+
+    def __init__(self, folder: Path) -> None:
+        self._path, self._read = folder / SCENES, 0
+
+    def new(self) -> dict[int, Checked]:
+        """What was stored since the last call, by number.  A line that is not whole, of a process
+        that died, is left out."""
+        found: dict[int, Checked] = {}
+        if not self._path.exists():
+            return found
+        with self._path.open("rb") as file:
+            file.seek(self._read)
+            text = file.read()
+        whole = text[: text.rfind(b"\n") + 1]
+        self._read += len(whole)
+        for line in whole.splitlines():
+            with suppress(ValidationError):
+                checked = Checked.model_validate_json(line)
+                found[checked.number] = checked
+        return found
+
+
+def add_reduced(folder: Path, reduced: Reduced) -> None:
+    """Store a reduced finding."""
+    with replacing(folder / FINDINGS / f"{reduced.number}.json") as temporary:
+        temporary.write_text(reduced.model_dump_json(indent=1), encoding="utf-8")
+
+
+def reduced(folder: Path) -> Iterator[Reduced]:
+    """All reduced findings, by number."""
+    files = sorted((folder / FINDINGS).glob("*.json"), key=lambda file: int(file.stem))
+    for file in files:
+        yield Reduced.model_validate_json(file.read_text(encoding="utf-8"))
+
+
+def check_settings(folder: Path, settings: dict[str, object]) -> bool:
+    """Whether the folder holds results of the same settings, or none; then they are stored."""
+    path = folder / "settings.json"
+    text = json.dumps(settings, indent=1, sort_keys=True)
+    if path.exists():
+        return path.read_text(encoding="utf-8") == text
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return True
+
+
+def remove(folder: Path) -> None:
+    """Remove the results of earlier runs."""
+    for name in (SCENES, "settings.json"):
+        (folder / name).unlink(missing_ok=True)
+    for file in (folder / FINDINGS).glob("*.json"):
+        file.unlink()

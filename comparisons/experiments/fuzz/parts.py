@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from comparisons.experiments.fuzz.assets import mesh
-from comparisons.experiments.fuzz.data import Data, text_of
-from comparisons.experiments.fuzz.fields import Draw, Names, rounded, values
-from comparisons.experiments.fuzz.types import types
+from comparisons.experiments.fuzz.fields import Draw, Names, rounded, types, values
+from comparisons.experiments.fuzz.finding import Data, text_of
 from reference_rt.materials import Emissive, Wrapper
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables

@@ -14,7 +14,7 @@ from statistics import median
 from typing import Any
 
 import reference_rt
-from comparisons.experiments.fuzz.types import all_types
+from comparisons.experiments.fuzz.fields import all_types
 from comparisons.experiments.selftest import FAULTS
 from comparisons.experiments.selftest.fault import SourceFault
 from comparisons.experiments.selftest.sensitivity import patched_text

@@ -7,10 +7,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from comparisons.experiments.fuzz import assets, stored
-from comparisons.experiments.fuzz.data import Data
+from comparisons.experiments.fuzz import assets
+from comparisons.experiments.fuzz import finding as stored
+from comparisons.experiments.fuzz.fields import types_in
 from comparisons.experiments.fuzz.finding import (
     Checked,
+    Data,
     Effort,
     Finding,
     Grammar,
@@ -20,7 +22,6 @@ from comparisons.experiments.fuzz.finding import (
 )
 from comparisons.experiments.fuzz.generate import generate
 from comparisons.experiments.fuzz.reduce import reduce
-from comparisons.experiments.fuzz.types import types_in
 from comparisons.runs.processes import pool
 from reference_rt.util.errors import UsageError
 from reference_rt.util.workers import Threads, Workers
@@ -218,10 +219,10 @@ def _reduce_all(plan: Plan, found: Run, say: Callable[[str], None]) -> None:
     counts = Counter(one.finding.rung for one in found.reduced)
     chosen: list[tuple[int, Finding]] = []
     seen: Counter[tuple[str, str]] = Counter()
-    for number, finding in found.findings:
-        seen[finding.key] += 1
-        if seen[finding.key] <= EACH and number not in done:
-            chosen.append((number, finding))
+    for number, one in found.findings:
+        seen[one.key] += 1
+        if seen[one.key] <= EACH and number not in done:
+            chosen.append((number, one))
     if plan.stop:
         chosen = chosen[: max(0, 1 - sum(counts.values()))]
     if chosen:

@@ -12,10 +12,9 @@ from typing import Any
 from junitparser import Failure, JUnitXml, TestCase, TestSuite
 from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 
-from comparisons.experiments.fuzz.data import text_of
-from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced
+from comparisons.experiments.fuzz.fields import all_types, possible_pairs
+from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced, text_of
 from comparisons.experiments.fuzz.run import Plan, Run
-from comparisons.experiments.fuzz.types import all_types, possible_pairs
 from comparisons.report.templates import template, write
 from reference_rt.util.console import Bar
 from reference_rt.util.errors import printable

@@ -15,20 +15,22 @@ from pathlib import Path
 import numpy as np
 
 from comparisons.compare.pictures import mitsuba_cast
-from comparisons.experiments.fuzz import assets, stored
+from comparisons.experiments.fuzz import assets
+from comparisons.experiments.fuzz import finding as stored
 from comparisons.experiments.fuzz.check import FAILED, check, of_rung
-from comparisons.experiments.fuzz.data import Data, text_of
+from comparisons.experiments.fuzz.fields import types_in
 from comparisons.experiments.fuzz.finding import (
     Checked,
+    Data,
     Effort,
     Finding,
     Reduced,
     Request,
+    text_of,
     without_numbers,
 )
 from comparisons.experiments.fuzz.generate import generate, parse
 from comparisons.experiments.fuzz.reduce import reduce
-from comparisons.experiments.fuzz.types import types_in
 from comparisons.gate.driver import Command, Driver
 from comparisons.gate.errors import RendererError
 from comparisons.gate.reference import is_noise_free

@@ -10,9 +10,8 @@ import reference_rt as rt
 from comparisons.experiments.methods.setting import Draw, Family, Trial, Truth, powers
 from comparisons.experiments.methods.vectors import unit_vectors
 from comparisons.geometry.exact import first_hit
-from comparisons.geometry.exact.crossings import IntArray
 from comparisons.geometry.exact.dyadic import NEVER, BoolArray
-from comparisons.geometry.exact.referee import MARGIN
+from comparisons.geometry.exact.referee import MARGIN, IntArray
 from reference_rt.accel import bvh
 from reference_rt.core.arrays import FloatArray
 from reference_rt.textbook import SceneParameters

@@ -9,8 +9,14 @@ from typing import Any
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Say
 from comparisons.experiments.selftest.fault import Fault, Finding
-from comparisons.experiments.selftest.power import Calibration, Curve, calibration, power_curves
-from comparisons.experiments.selftest.sensitivity import Budgets, sensitivity
+from comparisons.experiments.selftest.sensitivity import (
+    Budgets,
+    Calibration,
+    Curve,
+    calibration,
+    power_curves,
+    sensitivity,
+)
 from comparisons.experiments.selftest.specificity import Alarms, specificity
 from comparisons.runs.provenance import provenance
 from comparisons.suites.suite import load_suite, plan

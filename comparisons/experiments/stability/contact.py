@@ -28,10 +28,17 @@ import numpy as np
 import reference_rt as rt
 from comparisons.experiments.methods.errors import U
 from comparisons.experiments.methods.setting import FloatArray
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, Outcome, Shot
+from comparisons.experiments.stability.harness.core import (
+    MITSUBA,
+    OURS,
+    Draw,
+    Outcome,
+    Shot,
+    outcome,
+    together,
+)
 from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.harness.leaving import CONTACT, PIXELS, bound, lit, picture
-from comparisons.experiments.stability.harness.outcomes import outcome, together
 from comparisons.experiments.stability.harness.steps import matrix
 from comparisons.geometry import frame
 from comparisons.geometry.exact.dyadic import BoolArray

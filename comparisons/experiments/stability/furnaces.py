@@ -35,18 +35,20 @@ from comparisons.experiments.stability.harness.bsdfs import (
     index_of,
     towards,
 )
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, Outcome
-from comparisons.experiments.stability.harness.densities import integral
-from comparisons.experiments.stability.harness.family import Family, Series, Sweep
-from comparisons.experiments.stability.harness.outcomes import (
+from comparisons.experiments.stability.harness.core import (
+    MITSUBA,
+    OURS,
+    Draw,
+    Outcome,
     of_errors,
     one_case,
     plain,
     together,
     unit_of,
 )
-from comparisons.experiments.stability.harness.rooms import closed, shells
-from comparisons.experiments.stability.harness.worlds import measure, ours, theirs
+from comparisons.experiments.stability.harness.densities import integral
+from comparisons.experiments.stability.harness.family import Family, Series, Sweep
+from comparisons.experiments.stability.harness.worlds import closed, measure, ours, shells, theirs
 from reference_rt.materials import Material
 
 # ---- the series ----------------------------------------------------------------------------------

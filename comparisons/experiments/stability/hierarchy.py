@@ -28,20 +28,25 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.methods.setting import unit_vectors
-from comparisons.experiments.stability.harness.core import OURS, Draw, Effort, FloatArray, Outcome
+from comparisons.experiments.stability.harness.core import (
+    OURS,
+    Draw,
+    Effort,
+    FloatArray,
+    Outcome,
+    outcome,
+)
 from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.harness.meshes import cube, write
-from comparisons.experiments.stability.harness.outcomes import outcome
 from comparisons.experiments.stability.harness.steps import any_turn, at, scaled
 from comparisons.geometry.exact.dyadic import BoolArray
 from reference_rt import shapes as any_shape
 from reference_rt.accel import bvh
 from reference_rt.core import transform
 from reference_rt.core.arrays import IntArray
-from reference_rt.core.ray import Hit
+from reference_rt.core.ray import Hit, is_representable
 from reference_rt.core.ray import at as point_at
-from reference_rt.core.scaled_ray import is_representable
-from reference_rt.core.scaled_ray import scaled as scaled_ray
+from reference_rt.core.ray import scaled as scaled_ray
 from reference_rt.core.vec3 import row
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel, kernel

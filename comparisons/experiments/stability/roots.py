@@ -30,10 +30,9 @@ import numpy as np
 
 from comparisons.experiments.methods.errors import U
 from comparisons.experiments.methods.setting import across, unit_vectors
-from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Outcome, outcome
 from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
-from comparisons.experiments.stability.harness.outcomes import outcome
-from comparisons.experiments.stability.harness.rays import Rays
+from comparisons.experiments.stability.harness.steps import Rays
 from comparisons.geometry.exact.curved import torus_quartic
 from comparisons.geometry.exact.dyadic import CERTAIN, BoolArray, Dyadic
 from reference_rt.core.ray import Ray

@@ -34,6 +34,8 @@ from comparisons.experiments.stability.harness.core import (
     FloatArray,
     Outcome,
     Shot,
+    outcome,
+    together,
 )
 from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.harness.meshes import (
@@ -48,7 +50,6 @@ from comparisons.experiments.stability.harness.meshes import (
     write,
 )
 from comparisons.experiments.stability.harness.mitsubas import traced
-from comparisons.experiments.stability.harness.outcomes import outcome, together
 from comparisons.experiments.stability.harness.steps import any_turn, at
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.mitsuba.backend import mitsuba

@@ -194,7 +194,7 @@ _CUBE, _MESH = ([2, 1, 3], [4, 0, 5]), ([3, 4, 5], [0, 1, 2])
 
 _ROUNDINGS = 8.0 * 2.0**-24
 """How far a hit point lies off its surface, over the scene's largest coordinate: the bound
-`comparisons.geometry.float32.ROUNDINGS`, of which a third was measured."""
+`comparisons.geometry.frame.ROUNDINGS`, of which a third was measured."""
 
 
 MOST_COMPONENTS = 4

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF
+from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.scene import for_rays

@@ -6,8 +6,7 @@ it, and float32 may move the surface by e = `Frame.delta` to either side.  So th
 anywhere between h - e and h + e: it skips thinner gaps and features, and if e exceeds h it may
 start behind its own surface and hit it again.  Prediction: our own tracer, started at these
 heights, hits another surface than from the exact point, or two that coincide.  Measurement:
-Mitsuba's tracer, started as Mitsuba does, hits another surface.
-"""
+Mitsuba's tracer, started as Mitsuba does, hits another surface."""
 
 from typing import NamedTuple
 
@@ -26,6 +25,25 @@ from reference_rt.materials import Dielectric, RoughDielectric, ThinDielectric
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
+
+# ---- the error bound of a hit point, which the bounds of all rungs follow from -------------------
+
+
+def slide(
+    sizes: ShapeSizes,
+    o: FloatArray,
+    d: FloatArray,
+    hits: Intersections,
+    sag: FloatArray | float = 0.0,
+) -> FloatArray:
+    """(n,): how far a hit may slide along its ray and its surface: `Frame.delta`, the distance by
+    which float32 moves the surface, plus `sag`, the error of a mesh that stands in for it, over
+    the ray's cosine to n."""
+    cosine = np.abs(np.sum(d * hits.n, axis=1)) / np.linalg.norm(d, axis=1)
+    with np.errstate(divide="ignore"):
+        size = sizes.frame.delta(o, hits.p, sizes.reach_of(hits.shape)) + sag
+        return np.asarray(size / cosine)
+
 
 RAYS = 2000
 """A third of the rays whose hits are the starting points."""

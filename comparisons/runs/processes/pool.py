@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from comparisons.runs.elsewhere import check_sources
-from comparisons.runs.fingerprint import everything_fingerprint
 from comparisons.runs.processes.child import Children, Ended
+from comparisons.runs.provenance import everything_fingerprint
 from reference_rt.util.files import replacing
 from reference_rt.util.workers import Threads, Workers, run_all
 

@@ -9,8 +9,7 @@ import numpy.typing as npt
 
 from reference_rt import materials as any_material
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.ray import SurfacePoint
-from reference_rt.core.scaled_ray import scaled
+from reference_rt.core.ray import SurfacePoint, scaled
 from reference_rt.core.vec3 import Frame, Vec3, normalize, row
 from reference_rt.jit.kernel import entry_kernel, kernel, local_floats
 from reference_rt.jit.links import Linker
@@ -18,7 +17,6 @@ from reference_rt.materials import Materials, Shading, scratch_floats
 from reference_rt.materials.textured import evaluate_textures, lookup_cache_size
 from reference_rt.rendering.linking import linked_materials, linked_textures
 from reference_rt.rendering.query.hits import BoolArray
-from reference_rt.rendering.query.linked import Linked, linked
 from reference_rt.rendering.query.rays import (
     broadcast,
     check_in_unit_cube,
@@ -26,6 +24,7 @@ from reference_rt.rendering.query.rays import (
     numbers,
     shaped,
 )
+from reference_rt.rendering.query.tracing import Linked, linked
 from reference_rt.scene.build import BuiltScene
 from reference_rt.scene.model import no_such
 from reference_rt.shapes import Sphere

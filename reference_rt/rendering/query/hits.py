@@ -15,7 +15,6 @@ from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import row
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel
-from reference_rt.rendering.query.linked import link_to_geometry
 from reference_rt.rendering.query.rays import Rays, checked_rays, in_blocks, rays_of, shaped
 from reference_rt.rendering.query.tracing import (
     BLOCKS,
@@ -31,6 +30,7 @@ from reference_rt.rendering.query.tracing import (
     empty_hits,
     empty_primitives,
     first_beyond,
+    link_to_geometry,
     rows_of,
     trace_in_ray_order,
 )

@@ -11,8 +11,7 @@ from reference_rt import lights as any_light
 from reference_rt.accel.array_query import Primitives
 from reference_rt.accel.geometry import Geometry, closest_hit, surface
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.ray import Ray
-from reference_rt.core.scaled_ray import scaled
+from reference_rt.core.ray import Ray, scaled
 from reference_rt.core.vec3 import normalize, row
 from reference_rt.integrators.direct_light import direct
 from reference_rt.integrators.scene_tables import SceneTables
@@ -23,12 +22,6 @@ from reference_rt.lights import TABLES, Constant, EnvironmentMap, Lights
 from reference_rt.materials import scratch_floats
 from reference_rt.rendering.linking import linked_lights, linked_shapes, linked_textures
 from reference_rt.rendering.query.hits import BoolArray
-from reference_rt.rendering.query.linked import (
-    Linked,
-    link_to_geometry,
-    link_to_scene,
-    linked,
-)
 from reference_rt.rendering.query.rays import (
     broadcast,
     check_in_unit_cube,
@@ -38,7 +31,16 @@ from reference_rt.rendering.query.rays import (
     rays_of,
     shaped,
 )
-from reference_rt.rendering.query.tracing import NO_LIMIT, FirstHits, empty_hits, hit_of
+from reference_rt.rendering.query.tracing import (
+    NO_LIMIT,
+    FirstHits,
+    Linked,
+    empty_hits,
+    hit_of,
+    link_to_geometry,
+    link_to_scene,
+    linked,
+)
 from reference_rt.scene.build import BuiltScene
 from reference_rt.shapes import TABLES as SHAPE_TABLES
 from reference_rt.shapes import Shapes

@@ -6,8 +6,7 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import component
 from reference_rt.jit.kernel import kernel
-from reference_rt.jit.simd import VECTOR_WIDTH, select
-from reference_rt.jit.simd_kernels import simd_kernel
+from reference_rt.jit.simd import VECTOR_WIDTH, select, simd_kernel
 from reference_rt.shapes.rounding import product_error
 
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from comparisons.compare.diagnosis import likeliest, of_rungs
+from comparisons.compare import diagnosis
+from comparisons.compare.diagnosis import likeliest
 from comparisons.results.case import FloatArray, Images, RungResult
 from reference_rt.rendering.image import srgb
 from reference_rt.rendering.render import render
@@ -261,11 +262,11 @@ def geometry(mismatches: int, **kinds: int) -> RungResult:
     ],
 )  # fmt: skip
 def test_of_rungs(rung: RungResult, name: str | None) -> None:
-    found = of_rungs([RungResult("input", "agree", ""), rung, RungResult("images", "differ", "")])
+    found = diagnosis([RungResult("input", "agree", ""), rung, RungResult("images", "differ", "")])
     assert (found.name if found else None) == name
 
 
 def test_no_broken_rung_has_no_cause() -> None:
-    assert of_rungs([RungResult("geometry", "agree", "", {})]) is None
+    assert diagnosis([RungResult("geometry", "agree", "", {})]) is None
     camera = RungResult("geometry", "differ", "the camera: 5 of 9 rays differ", {})
-    assert of_rungs([camera]) is None
+    assert diagnosis([camera]) is None

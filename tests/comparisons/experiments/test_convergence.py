@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from comparisons.experiments.convergence.data import Reference, Rung, weights
 from comparisons.experiments.convergence.estimates import (
     Accumulator,
     against,
@@ -16,6 +15,7 @@ from comparisons.experiments.convergence.estimates import (
     mean_of,
 )
 from comparisons.experiments.convergence.findings import findings_of, ratio
+from comparisons.experiments.convergence.store import Reference, Rung, weights
 from reference_rt.core.arrays import FloatArray
 
 SHAPE = (24, 32, 3)

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from comparisons.experiments.convergence.data import Settings
 from comparisons.experiments.convergence.estimates import (
     DRAWS,
     Points,
@@ -24,6 +23,7 @@ from comparisons.experiments.convergence.ladder import (
     why_left_out,
 )
 from comparisons.experiments.convergence.methods import Shot
+from comparisons.experiments.convergence.store import Settings
 
 
 def points(spp, seconds, squared, log_error=0.02, freedom=7):

@@ -15,7 +15,6 @@ from typer.testing import CliRunner
 import comparisons.commands.register
 from comparisons.experiments import convergence
 from comparisons.experiments.convergence.curves import Curves
-from comparisons.experiments.convergence.data import Settings, size_within, weights
 from comparisons.experiments.convergence.findings import findings_of
 from comparisons.experiments.convergence.ladder import Climb, climb
 from comparisons.experiments.convergence.methods import (
@@ -28,7 +27,15 @@ from comparisons.experiments.convergence.methods import (
 from comparisons.experiments.convergence.outputs import COLUMNS, write_results, write_table
 from comparisons.experiments.convergence.page import write_page
 from comparisons.experiments.convergence.run import converge, prepared
-from comparisons.experiments.convergence.store import COUNT, Store, reference_of, run_key
+from comparisons.experiments.convergence.store import (
+    COUNT,
+    Settings,
+    Store,
+    reference_of,
+    run_key,
+    size_within,
+    weights,
+)
 from comparisons.mitsuba.translate import to_mitsuba
 from reference_rt.cameras.film import Film
 from reference_rt.cameras.filters import BoxFilter

@@ -6,14 +6,19 @@ import numpy as np
 import pytest
 from pydantic import Field
 
-from comparisons.experiments.fuzz import assets, fields, types
+from comparisons.experiments.fuzz import assets, fields
 from comparisons.experiments.fuzz.assets import CLOSED, DAMAGES, OPEN, mesh
-from comparisons.experiments.fuzz.data import shapes_of, text_of
-from comparisons.experiments.fuzz.fields import Draw, Names
-from comparisons.experiments.fuzz.finding import Grammar
+from comparisons.experiments.fuzz.fields import (
+    GROUPS,
+    Draw,
+    Names,
+    all_types,
+    possible_pairs,
+    types_in,
+)
+from comparisons.experiments.fuzz.finding import Grammar, shapes_of, text_of
 from comparisons.experiments.fuzz.generate import generate, parse
 from comparisons.experiments.fuzz.summary import coverage, table
-from comparisons.experiments.fuzz.types import GROUPS, all_types, possible_pairs, types_in
 from reference_rt.core.model import Positive
 from reference_rt.materials import Diffuse, Mirror
 from reference_rt.rendering.render import render
@@ -64,7 +69,7 @@ def test_features_are_in_every_scene(files):
         assert names & set(GROUPS["csg"])
         assert names & set(GROUPS["glass"])
     with pytest.raises(UsageError, match=r"no 'glas'.*did you mean 'glass'"):
-        types.features(("glas",))
+        fields.features(("glas",))
 
 
 def test_what_a_type_needs_no_line_for(monkeypatch):
@@ -76,15 +81,15 @@ def test_what_a_type_needs_no_line_for(monkeypatch):
         tint: Annotated[float, Field(ge=0.0, le=1.0)]
 
     monkeypatch.setitem(
-        types.KINDS, "material", Annotated[Mirror | Velvet, Field(discriminator="type")]
+        fields.KINDS, "material", Annotated[Mirror | Velvet, Field(discriminator="type")]
     )
-    types.types.cache_clear()
+    fields.types.cache_clear()
     try:
-        assert types.types("material")["velvet"] is Velvet
+        assert fields.types("material")["velvet"] is Velvet
         draw = Draw(np.random.default_rng(0))
         drawn = [fields.values(Velvet, draw, Names(textures=["t"])) for _ in range(40)]
     finally:
-        types.types.cache_clear()
+        fields.types.cache_clear()
     for one in drawn:
         Velvet.model_validate(one)
     assert {key for one in drawn for key in one} == {"type", "pile", "tint", "reflectance"}

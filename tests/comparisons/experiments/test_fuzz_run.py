@@ -12,14 +12,14 @@ from junitparser import JUnitXml
 from typer.testing import CliRunner
 
 from comparisons.commands.fuzz import fuzz
+from comparisons.experiments.fuzz import finding, summary
 from comparisons.experiments.fuzz import run as running
-from comparisons.experiments.fuzz import stored, summary
+from comparisons.experiments.fuzz.fields import features as known
 from comparisons.experiments.fuzz.finding import Checked, Effort
 from comparisons.experiments.fuzz.planted import Planted, feature_of, source_faults
 from comparisons.experiments.fuzz.planted import summary as planted_summary
 from comparisons.experiments.fuzz.run import Plan, run
 from comparisons.experiments.fuzz.summary import write_page
-from comparisons.experiments.fuzz.types import features as known
 from comparisons.experiments.selftest.sensitivity import patched_text
 from reference_rt.scene.model import SceneModel
 from reference_rt.util.errors import UsageError
@@ -50,7 +50,7 @@ def test_a_scene_that_hangs_is_a_finding(tmp_path, fake_workers):
 
 def test_scenes_that_crash_or_raise_are_findings(tmp_path, fake_workers):
     plan = Plan(tmp_path, count=7, workers=Threads(2), shrink=0.0)
-    stored.add(tmp_path, Checked(number=3))  # it would hang
+    finding.add(tmp_path, Checked(number=3))  # it would hang
     told = []
     found = run(plan, told.append)
     assert sorted(c.number for c in told) == [0, 1, 2, 4, 5, 6]
@@ -112,10 +112,10 @@ def test_it_stops_at_the_first_finding(tmp_path, fake_workers):
 
 
 def test_half_a_line_is_left_out(tmp_path):
-    stored.add(tmp_path, Checked(number=3))
-    with (tmp_path / stored.SCENES).open("a") as file:
+    finding.add(tmp_path, Checked(number=3))
+    with (tmp_path / finding.SCENES).open("a") as file:
         file.write('{"number": 4, "lit"')
-    reader = stored.Reader(tmp_path)
+    reader = finding.Reader(tmp_path)
     assert set(reader.new()) == {3}
     assert reader.new() == {}
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from comparisons.experiments.selftest.pools import Pools
-from comparisons.experiments.selftest.power import Calibration, calibration, of_pools
+from comparisons.experiments.selftest.sensitivity import Calibration, calibration, of_pools
 from comparisons.experiments.selftest.specificity import (
     CASES,
     KINDS,
@@ -95,7 +95,7 @@ def test_a_single_picture_is_judged():
     assert "with a single picture on a side" in reason
 
 
-# Calibration
+# ---- calibration ---------------------------------------------------------------------------------
 
 
 def pools_of(noise: float, gain: float = 1.0) -> Pools:

@@ -16,17 +16,15 @@ from builders import HELPERS
 from typer.testing import CliRunner
 
 from comparisons.commands import register
-from comparisons.experiments.stability.harness import families, run, table
-from comparisons.experiments.stability.harness.core import OURS, Outcome, generator
+from comparisons.experiments.stability.harness import family, run, table
+from comparisons.experiments.stability.harness.core import OURS, Found, Outcome, generator, outcome
 from comparisons.experiments.stability.harness.family import Family, Series, Sweep
-from comparisons.experiments.stability.harness.outcomes import outcome
-from comparisons.experiments.stability.harness.result import Found
-from comparisons.experiments.stability.harness.summary import summarise
+from comparisons.experiments.stability.harness.table import summarise
 
 
 @pytest.fixture
 def fakes(monkeypatch):
-    monkeypatch.setattr(families, "MODULES", dict(families.MODULES))
+    monkeypatch.setattr(family, "MODULES", dict(family.MODULES))
     monkeypatch.setattr(run, "WORKER", ("stability_fakes",))
     before = os.environ.get("PYTHONPATH", "")
     monkeypatch.setenv("PYTHONPATH", f"{HELPERS}{os.pathsep}{before}".rstrip(os.pathsep))

@@ -20,7 +20,7 @@ from comparisons.experiments.stability.harness.core import (
     Outcome,
     generator,
 )
-from comparisons.experiments.stability.harness.families import family
+from comparisons.experiments.stability.harness.family import family
 from comparisons.experiments.stability.harness.worlds import judge
 from comparisons.experiments.stability.radiometry import lights as f12_lamps
 

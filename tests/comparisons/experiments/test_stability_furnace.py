@@ -15,8 +15,13 @@ from comparisons.experiments.stability import furnaces as f10_furnaces
 from comparisons.experiments.stability.bsdfs import digits, samples
 from comparisons.experiments.stability.bsdfs.digits import density_between, fresnel, masking
 from comparisons.experiments.stability.harness.bsdfs import Bsdf, Ours, Samples, towards
-from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray
-from comparisons.experiments.stability.harness.outcomes import of_errors, relative
+from comparisons.experiments.stability.harness.core import (
+    OURS,
+    Draw,
+    FloatArray,
+    of_errors,
+    relative,
+)
 from comparisons.experiments.stability.radiometry import lights, solid_angles
 from reference_rt.lights.emitters import point
 

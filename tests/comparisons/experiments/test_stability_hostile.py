@@ -10,7 +10,7 @@ import pytest
 import reference_rt as rt
 from comparisons.experiments.stability.harness.solids import Stretch, Truth
 from comparisons.experiments.stability.harness.solids import problem as list_problem
-from comparisons.experiments.stability.hostile import bomb, example, pool, problem, rays
+from comparisons.experiments.stability.hostile import bomb, example, problem, rays, worker
 from comparisons.experiments.stability.hostile.bases import BASES, files, write_files
 from comparisons.experiments.stability.hostile.damage import (
     as_text,
@@ -20,7 +20,7 @@ from comparisons.experiments.stability.hostile.damage import (
     with_numbers,
     with_structure,
 )
-from comparisons.experiments.stability.hostile.pool import Answer, answers
+from comparisons.experiments.stability.hostile.worker import Answer, answers
 from comparisons.experiments.stability.solids.trees import Tree, chain, rewritten
 from reference_rt.rendering.query import Intersections
 from reference_rt.util.errors import ImageError, SceneError
@@ -147,7 +147,7 @@ def test_hostile_scenes_in_plain_python(tmp_path):
 
 
 def test_limits_of_time_differ(monkeypatch):
-    assert pool.PLAIN_SECONDS > pool.SECONDS
+    assert worker.PLAIN_SECONDS > worker.SECONDS
     assert sys.executable
 
 

@@ -12,12 +12,12 @@ import reference_rt as rt
 from comparisons.experiments.stability import metamorphic as f09_metamorphic
 from comparisons.experiments.stability.harness import scenes
 from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw
-from comparisons.experiments.stability.harness.families import family
+from comparisons.experiments.stability.harness.family import family
 from comparisons.experiments.stability.harness.meshes import write_obj
 from comparisons.experiments.stability.metamorphic import light, rays
 from comparisons.experiments.stability.metamorphic import motion as f09_motion
 from comparisons.experiments.stability.metamorphic import rays as f09_rays
-from comparisons.geometry.float32 import round32
+from comparisons.geometry.frame import round32
 
 EPSILON = 1e-4
 """What an absolute ray epsilon is."""

@@ -12,12 +12,11 @@ from junitparser import JUnitXml
 from typer.testing import CliRunner
 
 from comparisons.commands.accept import accept
-from comparisons.gate.baselines import MOST_KEPT
-from comparisons.gate.copies import Copies, fingerprint
+from comparisons.gate.baselines import MOST_KEPT, Copies, fingerprint
 from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import of_files
-from comparisons.results.sealed import sealed
+from comparisons.results.files import sealed
 from reference_rt.core.arrays import FloatArray
 
 pytestmark = pytest.mark.usefixtures("gate_folder")

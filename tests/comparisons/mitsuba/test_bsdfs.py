@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import reference_rt as rt
-from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF
+from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.mitsuba import accuracy
 from comparisons.mitsuba.accuracy import both_sides, clearcoat_error, directions, table_error
 from comparisons.mitsuba.backend import mitsuba

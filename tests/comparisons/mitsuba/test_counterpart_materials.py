@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from counterparts import every_material
 
-from comparisons.geometry.float32 import ROUNDINGS, UNIT_ROUNDOFF, round32
+from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF, round32
 from comparisons.mitsuba.accuracy import accuracy
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays

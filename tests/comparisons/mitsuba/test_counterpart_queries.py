@@ -8,7 +8,7 @@ import pytest
 from counterparts import coarse_meshes, counterpart_of, every_material, every_shape
 from query_scene import LIT
 
-from comparisons.geometry.float32 import UNIT_ROUNDOFF, delta, round32
+from comparisons.geometry.frame import UNIT_ROUNDOFF, delta, round32
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.scene import for_rays

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from comparisons.geometry.float32 import UNIT_ROUNDOFF
+from comparisons.geometry.frame import UNIT_ROUNDOFF
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import trace
 from comparisons.mitsuba.translate import load

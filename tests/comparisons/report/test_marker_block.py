@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from comparisons.report.marker_block import END, begin, rewrite
+from comparisons.report.templates import END, begin, rewrite
 from reference_rt.util.errors import UsageError
 
 BEGIN = begin("bench")

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from comparisons.report.flip_map import LONGEST, VIRIDIS, flip_map
-from comparisons.report.histograms import BINS, FOOT, HEIGHT, WIDTH, histograms
+from comparisons.report.plots import BINS, FOOT, HEIGHT, WIDTH, histograms
+from comparisons.report.thumbnails import LONGEST_MAP, VIRIDIS, flip_map
 from comparisons.report.values import rows_of
 from comparisons.results.case import Images
 from comparisons.statistics.metrics import image_metrics
@@ -109,7 +109,7 @@ def test_a_large_map_is_reduced():
     rng = np.random.default_rng(2)
     found, _ = flip_map(Images(*rng.uniform(size=(2, 40, 300, 3))))
     assert (found.width, found.height) == (300, 40)
-    assert max(pixels(found).shape) <= LONGEST
+    assert max(pixels(found).shape) <= LONGEST_MAP
 
 
 @pytest.mark.parametrize(

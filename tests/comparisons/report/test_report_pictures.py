@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from report_page import noise
 
-from comparisons.report.fitting import fitted
+from comparisons.report.page import fitted
 from comparisons.report.pictures_data import as_json, pack, reduced, reduced_images, unpack
 from comparisons.results.case import Images
 

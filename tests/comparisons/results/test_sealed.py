@@ -7,10 +7,9 @@ import pytest
 from test_stored_case import case
 
 from comparisons.experiments.convergence import store as convergence_reference
-from comparisons.experiments.convergence.data import Rung
-from comparisons.experiments.convergence.store import Store
+from comparisons.experiments.convergence.store import Rung, Store
 from comparisons.gate import reference as gate_reference
-from comparisons.results.sealed import sealed, unsealed
+from comparisons.results.files import sealed, unsealed
 from comparisons.results.stored_case import StoredCaseError, read_case, write_case
 
 PICTURES = np.random.default_rng(1).random((2, 1, 2, 3))

@@ -12,8 +12,7 @@ from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.counterpart import trace
 from comparisons.mitsuba.translate import load
 from comparisons.rungs import geometry
-from comparisons.rungs.rays.adversarial_rays import aimed_rays
-from comparisons.rungs.rays.judgement import MOST_JUDGED, judged
+from comparisons.rungs.geometry import MOST_JUDGED, aimed_rays, judged
 from comparisons.rungs.rays.rays import Rays, mixed_rays
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections

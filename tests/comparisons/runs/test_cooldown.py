@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from comparisons.runs.cooldown import cool_down
+from comparisons.runs.elsewhere import cool_down
 
 
 class Clock:

@@ -9,7 +9,7 @@ from test_statistics_false_alarms import LAWS
 
 from comparisons.results.case import FloatArray
 from comparisons.rungs.input import input_rung
-from comparisons.statistics.odd_replicate import odd_replicate
+from comparisons.statistics.shared_noise import odd_replicate
 
 
 def noisy(rng: np.random.Generator, mean: FloatArray, count: int, noise: float) -> FloatArray:

@@ -8,14 +8,13 @@ from scipy import stats
 from comparisons.compare.judge import Evidence, judge, of_replicates
 from comparisons.statistics import Known, compare
 from comparisons.statistics.decide import findings
-from comparisons.statistics.rare import met_once, unseen, worse
+from comparisons.statistics.rare import around, met_once, share_unmet, unseen, worse
 from comparisons.statistics.sides import side_of
-from comparisons.statistics.unmet import around, share_unmet
 
 SIDE = 48
 BASE = 0.1
 
-# The family: a side that finds a lamp by scattered rays alone, and one that samples it.
+# ---- the family: a side that finds a lamp by scattered rays alone, and one that samples it -------
 
 
 def lamp_light():
@@ -83,7 +82,7 @@ def test_a_known_mean_with_a_lamp_found_by_scattered_rays_alone():
         assert not found.pixels.differs.any()
 
 
-# What it costs
+# ---- what it costs -------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("factor", [0.0, 0.3, 3.0, 30.0])
@@ -122,7 +121,7 @@ def test_noise_without_rare_light_loses_no_power():
         assert reach < 1.15 * ordinary * (critical + 2.33 * np.sqrt(1 + critical**2 / 2 / min(dof)))
 
 
-# The parts
+# ---- the parts -----------------------------------------------------------------------------------
 
 
 def test_energy_met_once():
@@ -190,7 +189,7 @@ def test_pixels_that_rare_light_has_not_met():
     assert share_unmet(side_of(1.3 * sampled_light(rng, 16)), sampled) < 0.002
 
 
-# What is said
+# ---- what is said --------------------------------------------------------------------------------
 
 
 def test_agreement_is_refused_where_light_may_be_missing():

@@ -8,19 +8,22 @@ from planted import HEIGHT, LAMP, MARGINS, NONE, WIDTH, replicates, scene
 from scipy import stats
 
 from comparisons.statistics import Known, compare
-from comparisons.statistics.cells import chance_of_parting, image_test, pixel_test, tile_test
 from comparisons.statistics.sides import known_side, side_of
 from comparisons.statistics.uniformity import uniformity
 from comparisons.statistics.welch import (
     Error,
     bias_test,
+    chance_of_parting,
+    image_test,
     noise_ratio,
+    pixel_test,
     quantiles,
     satterthwaite,
+    tile_test,
     welch_errors,
 )
 
-# Welch's test itself
+# ---- Welch's test itself -------------------------------------------------------------------------
 
 
 def test_statistic_is_welchs():
@@ -150,7 +153,7 @@ def test_the_margin_of_a_pixel_follows_its_noise():
     assert margin.max() == pytest.approx(0.05, rel=1e-3)
 
 
-# Uniformity
+# ---- uniformity ----------------------------------------------------------------------------------
 
 
 def test_ranks_are_uniform_whatever_the_noise():

@@ -33,7 +33,7 @@ from reference_rt.rendering import query
 from reference_rt.rendering.accumulation import jobs_of
 from reference_rt.rendering.kernels import Running
 from reference_rt.rendering.query import hits, tracing
-from reference_rt.rendering.query.linked import link_to_geometry
+from reference_rt.rendering.query.tracing import link_to_geometry
 from reference_rt.scene import build_hierarchies
 from reference_rt.shapes import box
 from reference_rt.shapes.curved import sphere

@@ -92,17 +92,10 @@ def test_the_slow_variant_is_a_note_and_none_a_failure(monkeypatch):
     assert "pip install" in check.advice
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "said"),
-    [
-        ("CACHE_FOLDER", None, "cannot be written"),
-        ("COMPILER", doctor.COMPILER._replace(name="stock"), "its own pipeline"),
-    ],
-)
-def test_what_slows_down_is_a_note(monkeypatch, others, name, value, said):
+def test_what_slows_down_is_a_note(monkeypatch, others):
     others()
-    monkeypatch.setattr(doctor, name, value)
+    monkeypatch.setattr(doctor, "CACHE_FOLDER", None)
     lines = [*doctor.page(doctor.checks())]
     noted = [line for line in lines if line.startswith("note")]
-    assert any(said in line for line in noted)
+    assert any("cannot be written" in line for line in noted)
     assert not any(line.startswith("FAIL") for line in lines)

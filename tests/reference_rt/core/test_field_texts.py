@@ -7,8 +7,7 @@ import re
 import pytest
 
 import reference_rt as rt
-from reference_rt.core.field_texts import field_texts
-from reference_rt.core.model import Description
+from reference_rt.core.model import Description, field_texts
 
 MOST_WORDS = 30
 """Words of a sentence."""

@@ -219,13 +219,9 @@ def test_other_versions_are_deleted_when_they_are_old(kernels):
     (kernels / "file").write_text("")
     for name in ("old", "file"):
         os.utime(kernels / name, (long_ago, long_ago))
-    folder = Path(kernel_cache.prepare_folder("one"))
+    folder = Path(kernel_cache.prepare_folder())
     assert set(kernels.iterdir()) == {folder, kernels / "new"}
     assert folder.stat().st_mode & 0o077 == 0
-
-
-def test_other_compilers_have_other_folders(kernels):
-    assert kernel_cache.prepare_folder("one") != kernel_cache.prepare_folder("another")
 
 
 def test_an_edit_anywhere_in_the_package_gives_another_folder(kernels, monkeypatch):
@@ -235,32 +231,32 @@ def test_an_edit_anywhere_in_the_package_gives_another_folder(kernels, monkeypat
     package = kernels.parent / "package"
     shutil.copytree(whole, package, ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(kernel_cache, "_PACKAGE", package)
-    found = [kernel_cache.prepare_folder("one")]
+    found = [kernel_cache.prepare_folder()]
     one_of_each_folder = {path.parent: path for path in sorted(package.rglob("*.py"))}
     assert {package, package / "jit", package / "shapes" / "curved"} <= set(one_of_each_folder)
     for path in one_of_each_folder.values():
         path.write_text(path.read_text() + "# edited\n")
-        found.append(kernel_cache.prepare_folder("one"))
+        found.append(kernel_cache.prepare_folder())
         path.rename(path.with_stem("renamed"))
-        found.append(kernel_cache.prepare_folder("one"))
+        found.append(kernel_cache.prepare_folder())
     assert len(set(found)) == len(found) > 40
 
 
 @pytest.mark.parametrize("what", ["file", "link to nothing"])
 def test_what_stands_in_the_place_of_the_folder_is_replaced(what, kernels):
-    folder = Path(kernel_cache.prepare_folder("one"))
+    folder = Path(kernel_cache.prepare_folder())
     folder.rmdir()
     if what == "file":
         folder.write_text("")
     else:
         folder.symlink_to("nowhere")
-    assert kernel_cache.prepare_folder("one") == str(folder)
+    assert kernel_cache.prepare_folder() == str(folder)
     assert folder.is_dir()
 
 
 def test_links_to_nothing_keep_nobody_from_the_cache(kernels):
     (kernels / "link").symlink_to("nowhere")
-    assert kernel_cache.prepare_folder("one") is not None
+    assert kernel_cache.prepare_folder() is not None
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="no owners")
@@ -269,7 +265,7 @@ def test_links_to_nothing_keep_nobody_from_the_cache(kernels):
 def test_what_others_may_write_is_not_run(mode, up, kernels, monkeypatch):
     """An entry with a right checksum is machine code of whoever wrote it.  mode: None of another
     owner."""
-    folder = Path(kernel_cache.prepare_folder("one"))
+    folder = Path(kernel_cache.prepare_folder())
     stranger = (folder, *folder.parents)[up]
     if mode is not None:
         stranger.chmod(mode)
@@ -283,5 +279,5 @@ def test_what_others_may_write_is_not_run(mode, up, kernels, monkeypatch):
 
         monkeypatch.setattr(Path, "stat", stat)
     with pytest.warns(RuntimeWarning, match=f"^kernels are not cached: {stranger} belongs") as said:
-        assert kernel_cache.prepare_folder("one") is None
+        assert kernel_cache.prepare_folder() is None
     assert "\n" not in str(said[0].message)

@@ -23,7 +23,6 @@ from linked_tables import (
     values,
 )
 
-from reference_rt.jit.compiler import CHOICE, INLINING, STOCK
 from reference_rt.jit.links import Linker
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
@@ -77,11 +76,9 @@ def test_a_type_without_the_kernel_needs_no_link():
     assert (done.returncode, done.stdout) == (0, "before\nafter\n")
 
 
-@pytest.mark.cases(1)
-@pytest.mark.parametrize("compiler", [INLINING, STOCK])
-def test_errors_come_back_through_links(compiler):
+def test_errors_come_back_through_links():
     """Kernels raise none, except with Numba's check of indices."""
-    done = process_that_calls("out of bounds", NUMBA_BOUNDSCHECK="1", **{CHOICE: compiler})
+    done = process_that_calls("out of bounds", NUMBA_BOUNDSCHECK="1")
     assert (done.returncode, done.stdout) == (1, "before\n")
     assert done.stderr.splitlines()[-1] == "IndexError: index is out of bounds"
 

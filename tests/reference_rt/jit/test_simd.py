@@ -8,8 +8,7 @@ import pytest
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel, local_floats
-from reference_rt.jit.simd import VECTOR_WIDTH, larger, least, smaller
-from reference_rt.jit.simd_kernels import lowest, plain, simd_kernel
+from reference_rt.jit.simd import VECTOR_WIDTH, larger, least, lowest, plain, simd_kernel, smaller
 from reference_rt.shapes.meshes import watertight
 from reference_rt.shapes.meshes.watertight import shear_of
 

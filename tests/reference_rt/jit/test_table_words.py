@@ -1,10 +1,6 @@
 """The content of tables: what is written in Python is what compiled code reads, to the bit."""
 
 import math
-import os
-import subprocess
-import sys
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numba
@@ -14,9 +10,7 @@ import pytest
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit import kernel
-from reference_rt.jit.compiler import CHOICE, STOCK
-from reference_rt.jit.links import Linkable, Linker
-from reference_rt.jit.table_words import words_of
+from reference_rt.jit.links import Linkable, Linker, words_of
 
 needs_jit = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
@@ -142,15 +136,6 @@ def read(value, put):
 def test_what_is_written_is_read(case, monkeypatch):
     monkeypatch.setattr(kernel, "CACHE_FOLDER", None)
     read(*CASES[case])
-
-
-@needs_jit
-def test_numbas_own_compiler_reads_the_same():
-    """Its tuples are laid out otherwise."""
-    cases = "nested", "cube of float32", "matrix of int64", "none"
-    code = f"from test_table_words import *\nfor case in {cases}: read(*CASES[case])"
-    environment = {CHOICE: STOCK, "PYTHONPATH": str(Path(__file__).parent)}
-    subprocess.run([sys.executable, "-c", code], env=os.environ | environment, check=True)
 
 
 def test_words_of_numbers():

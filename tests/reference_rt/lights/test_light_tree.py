@@ -12,7 +12,7 @@ from reference_rt.lights.emitters.point import Point
 from reference_rt.lights.emitters.spot import Spot
 from reference_rt.lights.selection import tree as light_tree
 from reference_rt.lights.selection.bounds import LightBounds, of_points, of_spots
-from reference_rt.lights.selection.tree_build import build
+from reference_rt.lights.selection.tree import build
 
 U = 2.0**-53
 ANY_SIDE = np.zeros(3)

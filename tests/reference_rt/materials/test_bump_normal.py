@@ -17,9 +17,9 @@ from reference_rt.materials.nested.normal_map import NormalMap
 from reference_rt.shapes.shape import Tangents
 from reference_rt.textures.bitmap import table_of
 from reference_rt.textures.checker import Checkers
+from reference_rt.textures.image_file import Texels
 from reference_rt.textures.lookup import At, Textures, lookup, lookup_gradient
 from reference_rt.textures.parameter import Palette
-from reference_rt.textures.texels import Texels
 from reference_rt.textures.texture import BITMAP, CHECKER, UvMap
 
 PALETTE = Palette({"t": 0}, [5.0])

@@ -13,14 +13,15 @@ from pydantic import TypeAdapter, ValidationError
 from reference_rt.core.vec3 import Vec3, dot
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.materials.bsdfs.rough import Rough
-from reference_rt.materials.microfacet import beckmann
-from reference_rt.materials.microfacet.beckmann import _slope_across, _slope_seen
+from reference_rt.materials.microfacet import ggx_and_smith
 from reference_rt.materials.microfacet.ggx_and_smith import (
     BECKMANN,
     GGX,
     MIN_ALPHA,
     AlphaParameter,
     Microfacets,
+    _slope_across,
+    _slope_seen,
     density,
     g1,
     g1_over_cos,
@@ -188,7 +189,7 @@ def test_beckmanns_slopes_end_where_their_density_does(edge):
         assert slopes[0] <= slopes[1] <= slopes[2] <= min(c / s, 6.5)
         most = min(c / s, 6.5)
         for u, x in zip((1.0 - 2 * edge, 1.0 - edge), slopes, strict=False):
-            assert abs(beckmann.seen(c, s, x) / beckmann.seen(c, s, most) - u) < 16 * U
+            assert abs(ggx_and_smith.seen(c, s, x) / ggx_and_smith.seen(c, s, most) - u) < 16 * U
 
 
 def edges():

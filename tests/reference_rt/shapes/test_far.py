@@ -10,8 +10,7 @@ from builders import U, unit_vectors
 import reference_rt as rt
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel
-from reference_rt.jit.simd import VECTOR_WIDTH, product_error
-from reference_rt.jit.simd_kernels import simd_kernel
+from reference_rt.jit.simd import VECTOR_WIDTH, product_error, simd_kernel
 from reference_rt.shapes.rounding import along_from, difference_error
 
 SPECIAL = [0.0, -0.0, math.inf, -math.inf, math.nan, 5e-324, 1e-160, 1.7e308, -1.7e308, 1.0, 3.0]

@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.fuzz.data import Data, named_in, shapes_of
-from comparisons.experiments.fuzz.finding import Finding
+from comparisons.experiments.fuzz.finding import Data, Finding, named_in, shapes_of
 from comparisons.experiments.fuzz.identities.rays import Bench, Original, ray_words, words
 from comparisons.geometry.frame import Frame
 from comparisons.mitsuba.translate.moved import moved

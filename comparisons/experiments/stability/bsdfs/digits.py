@@ -9,9 +9,12 @@ from flint import arb, ctx
 
 from comparisons.experiments.stability.bsdfs.samples import in_float32, matched
 from comparisons.experiments.stability.harness.bsdfs import ALPHA, towards
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
-from comparisons.experiments.stability.harness.family import Series, Sweep, decades
-from comparisons.experiments.stability.harness.outcomes import (
+from comparisons.experiments.stability.harness.core import (
+    MITSUBA,
+    OURS,
+    Draw,
+    FloatArray,
+    Outcome,
     hexed,
     of_errors,
     plain,
@@ -19,7 +22,8 @@ from comparisons.experiments.stability.harness.outcomes import (
     together,
     unit_of,
 )
-from comparisons.geometry.float32 import round32
+from comparisons.experiments.stability.harness.family import Series, Sweep, decades
+from comparisons.geometry.frame import round32
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from reference_rt.core.vec3 import row

@@ -17,10 +17,12 @@ from comparisons.experiments.stability.harness.bsdfs import (
     index_of,
     towards,
 )
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
-from comparisons.experiments.stability.harness.densities import fit
-from comparisons.experiments.stability.harness.family import Series, Sweep, decades
-from comparisons.experiments.stability.harness.outcomes import (
+from comparisons.experiments.stability.harness.core import (
+    MITSUBA,
+    OURS,
+    Draw,
+    FloatArray,
+    Outcome,
     hexed,
     of_errors,
     one_case,
@@ -28,6 +30,8 @@ from comparisons.experiments.stability.harness.outcomes import (
     together,
     unit_of,
 )
+from comparisons.experiments.stability.harness.densities import fit
+from comparisons.experiments.stability.harness.family import Series, Sweep, decades
 from reference_rt.materials import (
     Conductor,
     Dielectric,

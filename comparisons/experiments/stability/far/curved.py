@@ -24,16 +24,15 @@ from comparisons.experiments.stability.harness.core import (
     Shot,
     pixel_grid,
 )
-from comparisons.experiments.stability.harness.rays import Rays
-from comparisons.experiments.stability.harness.steps import matrix
+from comparisons.experiments.stability.harness.steps import Rays, matrix
 from comparisons.geometry.exact.dyadic import Dyadic
-from comparisons.geometry.float32 import round32
+from comparisons.geometry.frame import round32
 from comparisons.mitsuba.backend import scalar
 from reference_rt.core.arrays import IntArray
 from reference_rt.core.transform import Transform, rotate
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.shapes import Cone, Cylinder, Quadric, Sphere, Torus
-from reference_rt.shapes.brute_force_table import intersect_row
+from reference_rt.shapes.brute_force import intersect_row
 from reference_rt.shapes.curved.quadrics import Quadrics
 from reference_rt.shapes.curved.torus import Tori
 from reference_rt.shapes.shape import Shape, TabulationContext

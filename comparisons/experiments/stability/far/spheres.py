@@ -6,10 +6,18 @@ import numpy as np
 
 from comparisons.experiments.methods.errors import U
 from comparisons.experiments.methods.setting import across, unit_vectors
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.core import (
+    MITSUBA,
+    OURS,
+    Columns,
+    Draw,
+    FloatArray,
+    Outcome,
+    outcome,
+    plain,
+)
 from comparisons.experiments.stability.harness.mitsubas import traced
-from comparisons.experiments.stability.harness.outcomes import Columns, outcome, plain
-from comparisons.experiments.stability.harness.rays import Rays
+from comparisons.experiments.stability.harness.steps import Rays
 from comparisons.geometry.exact import KINDS, first_of
 from comparisons.geometry.exact.dyadic import (
     FRACTION,
@@ -20,7 +28,7 @@ from comparisons.geometry.exact.dyadic import (
     dot,
     nearest,
 )
-from comparisons.geometry.float32 import round32
+from comparisons.geometry.frame import round32
 from comparisons.mitsuba.backend import scalar
 from reference_rt import textbook
 from reference_rt.core.vec3 import row

@@ -6,8 +6,7 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.core import Draw, FloatArray, Outcome
-from comparisons.experiments.stability.harness.outcomes import outcome
+from comparisons.experiments.stability.harness.core import Draw, FloatArray, Outcome, outcome
 from comparisons.geometry.exact.dyadic import BoolArray
 
 

@@ -1,14 +1,21 @@
 """The vocabulary of all families: contestants, the context of a sweep point, and its outcome."""
 
+import dataclasses
+import json
 import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+
+from comparisons.experiments.methods.errors import U
+from comparisons.geometry.exact.dyadic import BoolArray
+from comparisons.geometry.frame import UNIT_ROUNDOFF as U32
+from reference_rt.util.files import read_text, replacing
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -89,3 +96,127 @@ def pixel_grid(pixels: int, half: float) -> tuple[FloatArray, FloatArray]:
     ticks = (np.arange(pixels) + 0.5) / pixels * (2.0 * half) - half
     x, y = np.meshgrid(ticks, -ticks)
     return x.ravel(), y.ravel()
+
+
+# ---- outcomes out of arrays: which cases failed, and the first failures word for word ------------
+
+
+Columns = dict[str, Any]
+"""The keys and values of the examples of failures: see `outcome`."""
+
+
+def unit_of(contestant: str) -> float:
+    """The unit roundoff that a contestant works in."""
+    return U32 if contestant == MITSUBA else U
+
+
+def outcome(
+    wrong: BoolArray,
+    columns: Columns,
+    undecided: BoolArray | None = None,
+    worst: float | None = None,
+) -> Outcome:
+    """wrong (n,): which cases fail;  undecided (n,): which are left open, wrong or not.
+
+    columns: what the examples show, by key: of an array its row, floats as hex; of a function what
+    it returns for the number of the case; anything else as it is.
+    """
+    count = len(wrong)
+    if undecided is not None:
+        wrong, count = wrong & ~undecided, count - int(np.count_nonzero(undecided))
+    which = np.flatnonzero(wrong)
+    examples = tuple(
+        {key: _shown(column, k) for key, column in columns.items()}
+        for k in which[:EXAMPLES].tolist()
+    )
+    return Outcome(count, len(which), worst, len(wrong) - count, examples)
+
+
+def _shown(column: Any, k: int) -> Any:
+    if isinstance(column, np.ndarray):
+        return hexed(column[k])
+    return column(k) if callable(column) else column
+
+
+def of_errors(errors: FloatArray, allowed: FloatArray | float, columns: Columns) -> Outcome:
+    """errors (n,): above `allowed` is a failure, and so is NaN, which counts as inf."""
+    errors = np.where(np.isnan(errors), np.inf, errors)
+    return outcome(errors > allowed, columns, worst=float(errors.max(initial=0.0)))
+
+
+def one_case(failed: bool, error: float | None, example: Mapping[str, Any]) -> Outcome:
+    """A single case;  error: of `Outcome.worst`, where NaN counts as inf."""
+    worst = np.inf if error is not None and np.isnan(error) else error
+    return Outcome(1, int(failed), worst, examples=(example,) if failed else ())
+
+
+def hexed(values: Any) -> Any:
+    """Floats as `float.hex`, which rounds nothing; whole numbers and texts as they are."""
+    array = np.asarray(values)
+    show = float.hex if array.dtype.kind == "f" else lambda x: x
+    return [show(x) for x in array.ravel().tolist()] if array.ndim else show(array.item())
+
+
+def plain(values: Any) -> Callable[[int], Any]:
+    """A column of numbers that are rounded for people, as JSON has them."""
+    return lambda k: values[k].tolist()
+
+
+def relative(value: FloatArray, exact: FloatArray) -> FloatArray:
+    """|value - exact| / |exact|; 0 where both are 0, inf where one alone is."""
+    off = np.abs(value - exact)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(off == 0.0, 0.0, off / np.abs(exact))
+
+
+def together(found: Iterable[Mapping[str, Outcome]]) -> dict[str, Outcome]:
+    """Outcomes added up, contestant by contestant."""
+    total: dict[str, Outcome] = {}
+    for part in found:
+        for name, one in part.items():
+            total[name] = total[name] + one if name in total else one
+    return total
+
+
+# The result of one sweep point, stored in a file of its own, so that it is not measured again.
+
+
+@dataclass(frozen=True)
+class Found:
+    """outcomes: by contestant;  seconds: that it took, compiling included;  broken: why there are
+    no outcomes, "" where there are."""
+
+    family: str
+    series: str
+    x: float
+    outcomes: dict[str, Outcome]
+    seconds: float
+    broken: str = ""
+
+    @property
+    def ours(self) -> Outcome | None:
+        return self.outcomes.get(OURS)
+
+    def write(self, path: Path, key: str) -> None:
+        """Store it, atomically."""
+        document = dataclasses.asdict(self) | {"key": key}
+        with replacing(path) as temporary:
+            # Infinity is no JSON: only this file, which nobody else reads, has it.  NumPy's
+            # numbers become Python's.
+            text = json.dumps(document, indent=1, default=lambda value: value.item())
+            temporary.write_text(text, encoding="utf-8")
+
+    @classmethod
+    def read(cls, path: Path, key: str) -> "Found | None":
+        """The stored result, None where there is none of this key."""
+        try:
+            document: dict[str, Any] = json.loads(read_text(path))
+            if document.pop("key") != key:
+                return None
+            outcomes = {
+                name: Outcome(**(some | {"examples": tuple(some["examples"])}))
+                for name, some in document.pop("outcomes").items()
+            }
+            return cls(outcomes=outcomes, **document)
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+            return None

@@ -2,8 +2,7 @@
 
 from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS
-from comparisons.experiments.stability.harness.result import Found
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Found
 from reference_rt.util.console import Bar
 
 

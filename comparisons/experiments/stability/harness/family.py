@@ -1,9 +1,10 @@
 """Families of stability, their series, and the sweeps that series measure along."""
 
+import importlib
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from comparisons.experiments.stability.harness.core import Draw, Effort, Outcome, Shot
 
@@ -101,3 +102,33 @@ class Family:
 def decades(first: int, last: int, step: int = 1) -> tuple[float, ...]:
     """10^first, ..., 10^last, each the float nearest to it."""
     return tuple(float(f"1e{k}") for k in range(first, last + 1, step))
+
+
+# ---- all families, in order ----------------------------------------------------------------------
+#
+# To add one: a module beside `harness`, or a folder, that states its law, ranges, counts and what
+# passes at its top and defines a `FAMILY`, and a line here.
+
+
+MODULES = {
+    "F1": "far",
+    "F2": "leaving",
+    "F3": "watertight",
+    "F4": "slivers",
+    "F5": "hierarchy",
+    "F6": "hostile",
+    "F7": "solids",
+    "F8": "roots",
+    "F9": "metamorphic",
+    "F10": "furnaces",
+    "F11": "bsdfs",
+    "F12": "radiometry",
+    "F13": "contact",
+    "F14": "determinism",
+}
+
+
+def family(name: str) -> Family:
+    """The `FAMILY` of its module, which is imported only when it is needed."""
+    module = importlib.import_module(f"comparisons.experiments.stability.{MODULES[name]}")
+    return cast(Family, module.FAMILY)

@@ -1,24 +1,78 @@
 """One page about the families: a single file that needs no network and runs no script."""
 
 import base64
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
 
-from comparisons.experiments.stability.harness import charts, table
-from comparisons.experiments.stability.harness.core import Effort
-from comparisons.experiments.stability.harness.families import family
-from comparisons.experiments.stability.harness.result import Found
+from comparisons.experiments.stability.harness import table
+from comparisons.experiments.stability.harness.core import Effort, Found
+from comparisons.experiments.stability.harness.family import family
 from comparisons.experiments.stability.harness.results_json import again
 from comparisons.experiments.stability.harness.run import Picture
-from comparisons.experiments.stability.harness.summary import (
-    SeriesSummary,
-    contestants,
-    named,
-)
+from comparisons.experiments.stability.harness.table import SeriesSummary, contestants, named
+from comparisons.report.plots import Curve, log_log
 from comparisons.report.templates import template, write
+from comparisons.report.values import typeset
+
+# ---- the curves of a series: failure rate and worst error against the extreme --------------------
+
+
+SIZE = (4.8, 3.7)
+"""Inches."""
+
+LEAST, MOST = 1e-2, 1e30
+"""Limits of the axis of worst errors, in the series' unit: a logarithmic axis has no zero, and
+where a textbook's 1 - R gives 1e-16 in place of 0, the error is some 1e297."""
+
+
+def of_series(one: SeriesSummary) -> list[str]:
+    """SVG plots; none where there is one point alone, or no failure and no error."""
+    if not one.series.axis or len(one.found) < 2:
+        return []
+    names = contestants(one.found)
+    ends = {}
+    if not math.isinf(one.series.holds_to):
+        ends["float64 ends"] = one.series.holds_to
+    plots = []
+    axis = typeset(one.series.axis)
+    if any(some.failures for f in one.found for some in f.outcomes.values()):
+        seen = _least(one)
+        curves = [_rates(one, name, k) for k, name in enumerate(names)]
+        level = {"none seen": seen}
+        plots.append(log_log(curves, axis, "share of cases", "Failures", level, SIZE, ends))
+    if any(some.worst is not None for f in one.found for some in f.outcomes.values()):
+        curves = [_errors(one, name, k) for k, name in enumerate(names)]
+        plots.append(log_log(curves, axis, _error(one), "Worst error", None, SIZE, ends))
+    return plots
+
+
+def _error(one: SeriesSummary) -> str:
+    """What the axis of errors shows: "error / the law's bound"."""
+    unit = typeset(one.series.unit) or "error"
+    return f"error / {unit.removeprefix('of ')}" if unit.startswith("of ") else unit
+
+
+def _rates(one: SeriesSummary, name: str, colour: int) -> Curve:
+    some = [(f.x, f.outcomes[name]) for f in one.found if name in f.outcomes]
+    y = [max(o.failures / max(o.cases, 1), _least(one)) for _, o in some]
+    return Curve(named(name), [x for x, _ in some], y, colour=colour)
+
+
+def _least(one: SeriesSummary) -> float:
+    """The rate at which no failure is drawn: half a case of the most cases of any point."""
+    return 0.5 / max(1, *(some.cases for f in one.found for some in f.outcomes.values()))
+
+
+def _errors(one: SeriesSummary, name: str, colour: int) -> Curve:
+    some = [(f.x, f.outcomes[name].worst) for f in one.found if name in f.outcomes]
+    known = [(x, worst) for x, worst in some if worst is not None and math.isfinite(worst)]
+    shown = [min(max(worst, LEAST), MOST) for _, worst in known]
+    return Curve(named(name), [x for x, _ in known], shown, colour=colour)
+
 
 _LOOKS = ("", "more", "count more", "count more", "more", "", "", "")
 """CSS classes of the table's columns after the family: "more" is left out on small screens."""
@@ -55,7 +109,7 @@ def _series(
         "summary": one,
         "cells": table.cells(name, one)[1:],
         "definition": one.series,
-        "plots": [Markup(svg) for svg in charts.of_series(one)],  # our own, not from outside
+        "plots": [Markup(svg) for svg in of_series(one)],  # our own, not from outside
         "pictures": [
             (p.contestant, p.x, _url(p.path), p.caption)
             for p in pictures

@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Effort, Outcome
-from comparisons.experiments.stability.harness.families import family
-from comparisons.experiments.stability.harness.result import Found
-from comparisons.experiments.stability.harness.summary import (
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Effort, Found, Outcome
+from comparisons.experiments.stability.harness.family import family
+from comparisons.experiments.stability.harness.table import (
     SeriesSummary,
     contestants,
     found_of,

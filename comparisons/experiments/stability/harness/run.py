@@ -10,15 +10,13 @@ from typing import NamedTuple
 
 from PIL import Image
 
-from comparisons.experiments.stability.harness.core import OURS, Effort
-from comparisons.experiments.stability.harness.families import family
-from comparisons.experiments.stability.harness.family import Family, Series
-from comparisons.experiments.stability.harness.result import Found
-from comparisons.experiments.stability.harness.summary import contestants, summarise
+from comparisons.experiments.stability.harness.core import OURS, Effort, Found
+from comparisons.experiments.stability.harness.family import Family, Series, family
+from comparisons.experiments.stability.harness.table import contestants, summarise
 from comparisons.experiments.stability.harness.worker import Request
 from comparisons.mitsuba.backend import backend
-from comparisons.runs.fingerprint import everything_fingerprint
 from comparisons.runs.processes import pool
+from comparisons.runs.provenance import everything_fingerprint
 from reference_rt.util.errors import ReferenceUnavailableError
 from reference_rt.util.workers import Workers
 

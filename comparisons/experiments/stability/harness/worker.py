@@ -16,9 +16,8 @@ from typing import ClassVar
 from PIL import Image
 from pydantic import BaseModel, ConfigDict
 
-from comparisons.experiments.stability.harness.core import OURS, Draw, Effort, generator
-from comparisons.experiments.stability.harness.families import family
-from comparisons.experiments.stability.harness.result import Found
+from comparisons.experiments.stability.harness.core import OURS, Draw, Effort, Found, generator
+from comparisons.experiments.stability.harness.family import family
 from comparisons.runs.processes.protocol import carry_out, private_stdout
 from reference_rt.util.errors import SceneWarning
 from reference_rt.util.files import replacing

@@ -55,7 +55,7 @@ from comparisons.experiments.stability.hostile.damage import (
     with_structure,
 )
 from comparisons.experiments.stability.hostile.mitsuba import judged as judged_of_mitsuba
-from comparisons.experiments.stability.hostile.pool import Answer, answers
+from comparisons.experiments.stability.hostile.worker import Answer, answers
 from reference_rt.core.diagnosis import MOST
 
 # ---- the series ----------------------------------------------------------------------------------

@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.core import Outcome
-from comparisons.experiments.stability.harness.outcomes import outcome
-from comparisons.experiments.stability.hostile.pool import answers
-from comparisons.experiments.stability.hostile.worker import SAMPLES, SIZE, serve
+from comparisons.experiments.stability.harness.core import Outcome, outcome
+from comparisons.experiments.stability.hostile.worker import SAMPLES, SIZE, answers, serve
 
 
 def judged(scenes: Sequence[Path]) -> Outcome:

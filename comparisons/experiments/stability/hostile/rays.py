@@ -11,9 +11,8 @@ from functools import cache
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Outcome, outcome
 from comparisons.experiments.stability.harness.family import Series, Sweep, alone
-from comparisons.experiments.stability.harness.outcomes import outcome
 from comparisons.experiments.stability.hostile.bases import BASES, write_files
 from comparisons.experiments.stability.hostile.damage import NUMBERS, as_text
 from comparisons.geometry.exact.dyadic import BoolArray

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from comparisons.experiments.methods.setting import FloatArray
-from comparisons.experiments.stability.harness.core import EXAMPLES, Outcome
+from comparisons.experiments.stability.harness.core import EXAMPLES, Outcome, hexed
 from comparisons.experiments.stability.harness.leaving import CONTACT
-from comparisons.experiments.stability.harness.outcomes import hexed
 from comparisons.experiments.stability.leaving.shapes import KINDS, Placed, Rays
 from comparisons.experiments.stability.leaving.tracer import Departures, Subject, scene_of
 from comparisons.geometry.exact import all_hits, first_of

@@ -16,7 +16,7 @@ from comparisons.experiments.stability.harness.core import Draw
 from comparisons.experiments.stability.harness.leaving import bound
 from comparisons.experiments.stability.harness.meshes import write_obj
 from comparisons.experiments.stability.harness.steps import matrix, vector
-from comparisons.geometry.float32 import round32
+from comparisons.geometry.frame import round32
 
 
 class Extent(NamedTuple):

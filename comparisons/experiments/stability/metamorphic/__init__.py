@@ -38,9 +38,8 @@ import reference_rt as rt
 from comparisons.experiments.methods.setting import unit_rows
 from comparisons.experiments.stability.harness import scenes
 from comparisons.experiments.stability.harness.bits import same_bits
-from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Shot
+from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Shot, together
 from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
-from comparisons.experiments.stability.harness.outcomes import together
 from comparisons.experiments.stability.metamorphic import light, rays
 from comparisons.experiments.stability.metamorphic.motion import (
     MIRRORS,
@@ -55,7 +54,7 @@ from comparisons.experiments.stability.metamorphic.motion import (
 from comparisons.experiments.stability.metamorphic.rays import Outcomes
 from comparisons.experiments.stability.metamorphic.rearranged import nested, rearranged
 from comparisons.geometry.exact.dyadic import BoolArray
-from comparisons.geometry.float32 import round32
+from comparisons.geometry.frame import round32
 from reference_rt.shapes.csg.anchor import FAR
 
 # ---- images of F9's failures, 192 pixels wide ----------------------------------------------------

@@ -15,7 +15,7 @@ from comparisons.experiments.stability.harness.mitsubas import rendered
 from comparisons.experiments.stability.harness.scenes import SIZE
 from comparisons.experiments.stability.metamorphic.motion import Motion, moved
 from comparisons.geometry.exact.dyadic import BoolArray
-from comparisons.geometry.float32 import UNIT_ROUNDOFF as U32
+from comparisons.geometry.frame import UNIT_ROUNDOFF as U32
 from comparisons.mitsuba.backend import scalar
 from reference_rt.core.ray import UNIT_ROUNDOFF
 

@@ -8,16 +8,23 @@ import numpy.typing as npt
 
 import reference_rt as rt
 from comparisons.experiments.methods.setting import unit_rows
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, FloatArray, Outcome
+from comparisons.experiments.stability.harness.core import (
+    MITSUBA,
+    OURS,
+    Columns,
+    FloatArray,
+    Outcome,
+    hexed,
+    outcome,
+)
 from comparisons.experiments.stability.harness.mitsubas import traced
-from comparisons.experiments.stability.harness.outcomes import Columns, hexed, outcome
 from comparisons.experiments.stability.harness.scenes import GRID
 from comparisons.experiments.stability.harness.solids import Truth, truths
 from comparisons.experiments.stability.metamorphic.motion import Motion
 from comparisons.geometry.exact.dyadic import BoolArray, nearest
 from comparisons.geometry.exact.referee import Referee
 from comparisons.geometry.exact.referee import Truth as First
-from comparisons.geometry.float32 import round32
+from comparisons.geometry.frame import round32
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.backend import scalar
 from comparisons.rungs.rays.arbiter import directions

@@ -8,9 +8,8 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.core import OURS, Draw, Outcome
+from comparisons.experiments.stability.harness.core import OURS, Draw, Outcome, together
 from comparisons.experiments.stability.harness.meshes import write_obj
-from comparisons.experiments.stability.harness.outcomes import together
 from comparisons.experiments.stability.harness.steps import matrix
 from comparisons.experiments.stability.metamorphic import light, rays
 from comparisons.experiments.stability.metamorphic.rays import Identities

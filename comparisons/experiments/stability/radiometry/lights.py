@@ -8,19 +8,22 @@ from flint import arb, ctx
 
 import reference_rt as rt
 from comparisons.experiments.methods.setting import unit_vectors
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
-from comparisons.experiments.stability.harness.family import Series, Sweep, decades
-from comparisons.experiments.stability.harness.outcomes import (
+from comparisons.experiments.stability.harness.core import (
+    MITSUBA,
+    OURS,
+    Draw,
+    FloatArray,
+    Outcome,
     hexed,
     of_errors,
     plain,
     together,
     unit_of,
 )
-from comparisons.experiments.stability.harness.rooms import closed
+from comparisons.experiments.stability.harness.family import Series, Sweep, decades
 from comparisons.experiments.stability.harness.steps import at, scaled, turned
-from comparisons.experiments.stability.harness.worlds import World, grey, measure
-from comparisons.geometry.float32 import round32
+from comparisons.experiments.stability.harness.worlds import World, closed, grey, measure
+from comparisons.geometry.frame import round32
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from reference_rt.core.vec3 import Vec3

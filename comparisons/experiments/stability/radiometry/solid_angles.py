@@ -8,18 +8,22 @@ import numpy as np
 from flint import arb, ctx
 
 from comparisons.experiments.methods.setting import unit_vectors
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
-from comparisons.experiments.stability.harness.family import Series, Sweep, decades
-from comparisons.experiments.stability.harness.meshes import mitsuba_mesh
-from comparisons.experiments.stability.harness.outcomes import (
+from comparisons.experiments.stability.harness.core import (
+    MITSUBA,
+    OURS,
     Columns,
+    Draw,
+    FloatArray,
+    Outcome,
     of_errors,
     plain,
     relative,
     together,
     unit_of,
 )
-from comparisons.geometry.float32 import round32
+from comparisons.experiments.stability.harness.family import Series, Sweep, decades
+from comparisons.experiments.stability.harness.meshes import mitsuba_mesh
+from comparisons.geometry.frame import round32
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from reference_rt.core.vec3 import row

@@ -33,10 +33,10 @@ from comparisons.experiments.stability.harness.core import (
     Outcome,
     Shot,
     pixel_grid,
+    together,
 )
 from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.harness.mitsubas import traced
-from comparisons.experiments.stability.harness.outcomes import together
 from comparisons.experiments.stability.slivers.judge import (
     SHAPES,
     Judge,

@@ -45,11 +45,13 @@ from comparisons.experiments.stability.harness.core import (
     FloatArray,
     Outcome,
     Shot,
+    hexed,
+    outcome,
     pixel_grid,
+    together,
 )
 from comparisons.experiments.stability.harness.family import Family, Series, Sweep, alone
 from comparisons.experiments.stability.harness.meshes import write_smallest_ball
-from comparisons.experiments.stability.harness.outcomes import hexed, outcome, together
 from comparisons.experiments.stability.harness.solids import INSIDE_TESTS, INTERVALS, LISTS, Truth
 from comparisons.experiments.stability.harness.steps import at, scaled, turned, vector
 from comparisons.experiments.stability.solids.trees import (

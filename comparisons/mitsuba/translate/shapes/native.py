@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.geometry.float32 import UNIT_ROUNDOFF
+from comparisons.geometry.frame import UNIT_ROUNDOFF
 from comparisons.mitsuba.hits import CURVED, Plugin, same_uv
 from comparisons.mitsuba.plugins.exact_coordinates import Round
 from comparisons.mitsuba.translate.shapes.meshes import Soup

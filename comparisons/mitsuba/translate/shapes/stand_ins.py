@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.geometry.float32 import round32
+from comparisons.geometry.frame import round32
 from comparisons.geometry.sizes import heights_of
 from comparisons.mitsuba.hits import Plugin, StandIn
 from comparisons.mitsuba.plugins.exact_coordinates import Coordinates, derivatives_at
