@@ -59,7 +59,7 @@ def accept(
     """Accept pictures as a baseline for `gate --baseline`; refused in CI."""
     with compare_extra("accepting"):
         from comparisons.gate import baselines as store
-        from comparisons.gate.baselines import scene_digest
+        from comparisons.gate.digest import scene_digest
         from comparisons.gate.pictures_in import read_candidates
         from comparisons.gate.reference import check_sizes, is_noise_free
         from comparisons.runs.provenance import ours
@@ -128,7 +128,8 @@ def _too_noisy(pictures: "FloatArray", limit: float) -> str:
 
 def _described(record: "Record", folder: Path) -> str:
     """A baseline in one line."""
-    from comparisons.gate.baselines import scene_digest, scene_of
+    from comparisons.gate.baselines import scene_of
+    from comparisons.gate.digest import scene_digest
 
     of = "no scene"
     if record.scene is not None:

@@ -10,7 +10,7 @@ from comparisons.compare import diagnosis
 from comparisons.compare.judge import Lights, despite, likeliest_cause
 from comparisons.compare.looks import Looks, level_of
 from comparisons.compare.path_length import Lengths
-from comparisons.gate.baselines import Copies
+from comparisons.gate.digest import Copies
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes, size_of, stacked
 from comparisons.gate.rim import without_rim, without_rim_later

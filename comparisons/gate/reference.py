@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import platformdirs
 
-from comparisons.gate.baselines import fingerprint, scene_digest, source_digest
+from comparisons.gate.digest import fingerprint, scene_digest, source_digest
 from comparisons.gate.pictures_in import Picture, variance_of
 from comparisons.results.files import read_arrays, write_arrays
 from reference_rt.core.arrays import FloatArray

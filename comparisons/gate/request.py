@@ -9,7 +9,7 @@ from comparisons.compare.compare import single_lights
 from comparisons.compare.judge import Lights
 from comparisons.compare.path_length import path_lengths
 from comparisons.gate import baselines, reference
-from comparisons.gate.baselines import scene_digest
+from comparisons.gate.digest import scene_digest
 from comparisons.gate.gate import LIMIT, gate_pictures
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes

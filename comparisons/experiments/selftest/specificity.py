@@ -14,7 +14,7 @@ from comparisons.compare.compare import Say
 from comparisons.compare.looks import level_of
 from comparisons.experiments.selftest.fault import CAUGHT
 from comparisons.experiments.selftest.pools import POOL, Pools, of_mitsuba, of_ours, of_scene
-from comparisons.gate.baselines import fingerprint
+from comparisons.gate.digest import fingerprint
 from comparisons.gate.gate import LIMIT, gate_pictures, look
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference

@@ -14,7 +14,8 @@ import pytest
 from typer.testing import CliRunner
 
 import reference_rt as rt
-from comparisons.gate.baselines import scene_digest, used_in
+from comparisons.gate.baselines import used_in
+from comparisons.gate.digest import scene_digest
 from comparisons.gate.pictures_in import read_candidate, variance_of
 from comparisons.report.templates import around
 from comparisons.results.stored_case import CASE, read_stored_case

@@ -11,7 +11,7 @@ from typer.testing import CliRunner, Result
 
 from comparisons.commands.accept import accept
 from comparisons.gate import baselines
-from comparisons.gate.baselines import scene_digest
+from comparisons.gate.digest import scene_digest
 from comparisons.gate.errors import BaselineEditedError, BaselineMissingError
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.exr import write_exr

@@ -12,7 +12,8 @@ from junitparser import JUnitXml
 from typer.testing import CliRunner
 
 from comparisons.commands.accept import accept
-from comparisons.gate.baselines import MOST_KEPT, Copies, fingerprint
+from comparisons.gate.baselines import MOST_KEPT
+from comparisons.gate.digest import Copies, fingerprint
 from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import of_files
