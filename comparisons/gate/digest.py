@@ -1,0 +1,131 @@
+"""Digests that say what has not changed: of a scene, of our sources, and of pictures."""
+
+import hashlib
+import json
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+
+import reference_rt
+from comparisons.gate.pictures_in import Picture
+from reference_rt.core.arrays import FloatArray
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.files import read_input
+
+_URI = re.compile(rb'"uri"\s*:\s*"([^"]+)"')
+
+
+def scene_digest(scene: Scene) -> str:
+    """SHA-256 of all that the expected picture depends on: the files that the scene names, and its
+    description, without fields that do not change the expected value."""
+    description = json.loads(scene.to_json())
+    for key in ("description", "hierarchy"):
+        description.pop(key, None)
+    if not scene.integrator.deterministic:
+        description.pop("sampler", None)
+    digest = hashlib.sha256(json.dumps(description, sort_keys=True).encode())
+    for path in _files(description, scene.folder):
+        with suppress(OSError):  # the loader reports a missing file
+            digest.update(hashlib.sha256(read_input(path)).digest())
+    return digest.hexdigest()
+
+
+def _files(part: Any, folder: Path) -> Iterator[Path]:
+    """The files that a description names, and those that glTF files among them name."""
+    if isinstance(part, dict):
+        if isinstance(part.get("file"), str):
+            path = folder / part["file"]
+            yield path
+            if path.suffix.lower() == ".gltf":
+                with suppress(OSError):
+                    for uri in _URI.findall(read_input(path)):
+                        if not uri.startswith(b"data:"):
+                            yield path.parent / unquote(uri.decode("utf-8", "replace"))
+        for value in part.values():
+            yield from _files(value, folder)
+    elif isinstance(part, list):
+        for value in part:
+            yield from _files(value, folder)
+
+
+@cache
+def source_digest() -> str:
+    """SHA-256 of the sources of `reference_rt` and of NumPy's version."""
+    package = Path(reference_rt.__file__).parent
+    digest = hashlib.sha256(np.__version__.encode())
+    for source in sorted(package.rglob("*.py")):
+        digest.update(source.relative_to(package).as_posix().encode())
+        digest.update(source.read_bytes())
+    return digest.hexdigest()
+
+
+# ---- candidates that are bit for bit pictures of the reference: nothing has changed --------------
+#
+# A renderer whose seeds are fixed makes the pictures of its baseline again as long as its result is
+# the same. Such pictures are no independent sample, and need none: their difference is known, and
+# is zero. If only some are copies, the others are compared with the reference.
+
+
+def fingerprint(picture: FloatArray) -> str:
+    """SHA-256 of the values of (height, width, 3) as float32, in which pictures are stored."""
+    with np.errstate(over="ignore"):
+        values = picture.astype("<f4") + np.float32(0.0)  # -0 and 0 are the same radiance
+    digest = hashlib.sha256(str(values.shape).encode())
+    digest.update(np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()
+
+
+@dataclass
+class Copies:
+    """Sorts candidates into copies of the reference's pictures and others.  left: the fingerprints
+    of pictures that no candidate is a copy of yet: each may be copied once, since replicates that
+    are all the same picture are wrong."""
+
+    left: Counter[str]
+    total: int
+    count: int = 0
+
+    @classmethod
+    def of(cls, fingerprints: Sequence[str]) -> "Copies":
+        """fingerprints: those of the reference's pictures; none if it cannot be copied."""
+        return cls(Counter(fingerprints), len(fingerprints))
+
+    def others(self, candidates: Sequence[Picture]) -> list[Picture]:
+        """The candidates that are no copies; the copies are counted."""
+        found = []
+        for candidate in candidates:
+            name = fingerprint(candidate.radiance) if self.total else ""
+            if self.left[name] > 0:
+                self.left[name] -= 1
+                self.count += 1
+            else:
+                found.append(candidate)
+        return found
+
+    def note(self, others: int) -> str:
+        """About copies among candidates of which so many are none; "" without copies."""
+        if not self.count:
+            return ""
+        are = "is a copy" if self.count == 1 else "are copies"
+        return (
+            f"{self.count} of {self.count + others} candidates {are} of the reference's pictures, "
+            "bit for bit, as the same seeds make them; they are left out, and the others compared"
+        )
+
+    @property
+    def words(self) -> str:
+        """That all candidates are copies."""
+        each = "the candidate is" if self.count == 1 else f"each of the {self.count} candidates is"
+        return (
+            f"{each} one of the reference's "
+            + (f"{self.total} pictures" if self.total > 1 else "picture")
+            + ", bit for bit: nothing has changed"
+        )
