@@ -1,7 +1,7 @@
 """The rung of whole pictures: every image metric against its threshold.
 
 Without noise each metric has a fixed threshold.  With noise the threshold is the metric's value
-from noise alone (`comparisons.statistics.metrics`) plus an allowance.
+from noise alone (`comparisons.statistics.metric_null`) plus an allowance.
 """
 
 import math
@@ -11,15 +11,15 @@ import numpy as np
 from scipy import stats
 
 from comparisons.results.case import FloatArray, Images, Metrics, RungResult
-from comparisons.statistics.metrics import (
+from comparisons.statistics.metric_null import (
     LEVEL,
     NOISE_LIMIT,
     can_draw,
-    decibels,
     is_known,
     noise_alone,
     noise_ratio,
 )
+from comparisons.statistics.metrics import decibels
 from comparisons.statistics.shared_noise import excess_by_sharing
 
 MEAN_BIAS = 0.001

@@ -61,7 +61,8 @@ add a scale: a level and a margin in `scales` (the levels must still sum to 1e-3
 from comparisons.statistics.advice import noise_free_candidate, shortfall
 from comparisons.statistics.decide import compare, read
 from comparisons.statistics.places import standard_error, worst_regions
-from comparisons.statistics.sides import CHANNELS, Known, Margins
+from comparisons.statistics.scales import CHANNELS, Margins
+from comparisons.statistics.sides import Known
 
 __all__ = [
     "CHANNELS",

@@ -12,7 +12,8 @@ import numpy as np
 from scipy import stats
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.sides import IMAGE_LEVEL, Known, Margins, known_side, side_of
+from comparisons.statistics.scales import IMAGE_LEVEL, Margins
+from comparisons.statistics.sides import Known, known_side, side_of
 from comparisons.statistics.welch import MOST_DOF, BiasTest, image_test, quantiles
 from comparisons.statistics.wording import percent
 

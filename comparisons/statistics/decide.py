@@ -9,16 +9,8 @@ from comparisons.results.case import FloatArray, RungResult, Status
 from comparisons.statistics.advice import noise_free_candidate, wanted
 from comparisons.statistics.metrics import count_nonfinite
 from comparisons.statistics.rare import Unseen, unseen, worse
-from comparisons.statistics.sides import (
-    IMAGE_LEVEL,
-    POWER,
-    TILE,
-    Known,
-    Margins,
-    known_side,
-    picture_array,
-    side_of,
-)
+from comparisons.statistics.scales import IMAGE_LEVEL, POWER, TILE, Margins
+from comparisons.statistics.sides import Known, known_side, picture_array, side_of
 from comparisons.statistics.single import single_factor, single_tests
 from comparisons.statistics.uniformity import Uniformity, uniformity
 from comparisons.statistics.welch import BiasTest, image_test, pixel_test, tile_test

@@ -6,18 +6,8 @@ import numpy.typing as npt
 from comparisons.results.case import FloatArray, ImageRegion
 from comparisons.statistics.decide import findings, read
 from comparisons.statistics.metrics import ratio
-from comparisons.statistics.sides import (
-    CHANNELS,
-    DARK,
-    ROUNDING,
-    TILE,
-    Known,
-    Margins,
-    cell_means,
-    known_side,
-    neighbourhood,
-    side_of,
-)
+from comparisons.statistics.scales import CHANNELS, DARK, ROUNDING, TILE, Margins, cell_means
+from comparisons.statistics.sides import Known, known_side, neighbourhood, side_of
 from comparisons.statistics.welch import BiasTest, pixel_test
 from comparisons.statistics.wording import percent
 

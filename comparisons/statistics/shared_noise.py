@@ -11,7 +11,7 @@ from scipy import ndimage, stats
 from scipy.linalg import helmert
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.sides import HALF, cell_means, cell_sums, tile_sums
+from comparisons.statistics.scales import HALF, cell_means, cell_sums, tile_sums
 
 # ---- replicates without noise, or the same as others bit for bit: an error, or chance ------------
 #

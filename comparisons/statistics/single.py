@@ -24,21 +24,17 @@ import numpy as np
 
 from comparisons.results.case import FloatArray
 from comparisons.statistics.metrics import ratio
-from comparisons.statistics.sides import (
+from comparisons.statistics.scales import (
     DARK,
     IMAGE_LEVEL,
-    NEIGHBOURS,
     PIXEL_LEVEL,
     TILE_LEVEL,
-    Known,
     Margins,
     cell_means,
     cell_pixels,
     cell_sums,
-    known_side,
-    neighbourhood,
-    side_of,
 )
+from comparisons.statistics.sides import NEIGHBOURS, Known, known_side, neighbourhood, side_of
 from comparisons.statistics.welch import BiasTest, Error, bias_test
 
 BLOCK = 4

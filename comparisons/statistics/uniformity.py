@@ -25,15 +25,9 @@ from scipy import stats
 from scipy.linalg import hadamard
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.rare import Events
-from comparisons.statistics.sides import (
-    DARK,
-    UNIFORMITY_LEVEL,
-    Margins,
-    Side,
-    cell_means,
-    cell_pixels,
-)
+from comparisons.statistics.scales import DARK, UNIFORMITY_LEVEL, Margins, cell_means, cell_pixels
+from comparisons.statistics.sides import Side
+from comparisons.statistics.unmet import Events
 from comparisons.statistics.welch import are_unequal, noise_ratio
 
 BLOCK = 4

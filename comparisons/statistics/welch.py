@@ -10,8 +10,7 @@ from scipy import stats
 
 from comparisons.results.case import FloatArray
 from comparisons.statistics.metrics import ratio
-from comparisons.statistics.rare import Events, unmet_variance
-from comparisons.statistics.sides import (
+from comparisons.statistics.scales import (
     DARK,
     IMAGE_LEVEL,
     PIXEL_LEVEL,
@@ -19,12 +18,11 @@ from comparisons.statistics.sides import (
     ROUNDING,
     TILE_LEVEL,
     Margins,
-    Noise,
-    Side,
     cell_means,
     cell_pixels,
-    neighbourhood,
 )
+from comparisons.statistics.sides import Noise, Side, neighbourhood
+from comparisons.statistics.unmet import Events, unmet_variance
 
 MOST_DOF = 1000
 """Cap on degrees of freedom: beyond it the quantile is the normal one within 1 %."""

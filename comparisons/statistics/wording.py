@@ -7,7 +7,7 @@ import numpy as np
 
 from comparisons.results.case import FloatArray
 from comparisons.statistics.rare import Unseen
-from comparisons.statistics.sides import CHANNELS, POWER
+from comparisons.statistics.scales import CHANNELS, POWER
 from comparisons.statistics.uniformity import Uniformity
 from comparisons.statistics.welch import BiasTest
 

@@ -26,7 +26,8 @@ scene; a row in the tests' tuple.  Step by step: docs/extending.md.
 
 from reference_rt.core.arrays import IntArray
 from reference_rt.shapes.box import Box
-from reference_rt.shapes.brute_force import Packets, nearest, nearest_of_ray, nearest_of_rays
+from reference_rt.shapes.brute_force import nearest, nearest_of_ray, nearest_of_rays
+from reference_rt.shapes.brute_force_table import Packets
 from reference_rt.shapes.curved.cone import Cone
 from reference_rt.shapes.curved.cylinder import Cylinder
 from reference_rt.shapes.curved.quadric import Quadric

@@ -8,7 +8,7 @@ from reference_rt.core.ray import BLOCK, Crossing, Hit, Ray, no_hit
 from reference_rt.core.ray_block import HitBlock, RayBlock, hit_of, put_hit, ray_of
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.simd import VECTOR_WIDTH
-from reference_rt.shapes.brute_force import (
+from reference_rt.shapes.brute_force_table import (
     KIND,
     found_at,
     nearer_boxes,

@@ -12,7 +12,7 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 FOREIGN = {"mitsuba", "drjit", "comparisons"}
 ALLOWED = {
     *("numpy", "numba", "llvmlite", "lazy_loader", "pydantic", "yaml", "OpenEXR", "Imath", "PIL"),
-    *("trimesh", "typer", "rich", "platformdirs", "reference_rt"),
+    *("trimesh", "mapbox_earcut", "typer", "rich", "platformdirs", "reference_rt"),
     *sys.stdlib_module_names,
 }
 

@@ -4,9 +4,9 @@ import numpy as np
 
 from comparisons.experiments.methods.setting import Draw, Family, Trial, Truth, powers
 from comparisons.experiments.methods.vectors import unit_vectors
+from comparisons.geometry.exact.crossings import where
 from comparisons.geometry.exact.curved import Slabs
 from comparisons.geometry.exact.dyadic import NEVER, Dyadic
-from comparisons.geometry.exact.referee import where
 from reference_rt.core.arrays import FloatArray
 from reference_rt.textbook import BoxParameters
 

@@ -10,8 +10,9 @@ import reference_rt as rt
 from comparisons.experiments.methods.setting import Draw, Family, Trial, Truth, powers
 from comparisons.experiments.methods.vectors import unit_vectors
 from comparisons.geometry.exact import first_hit
+from comparisons.geometry.exact.crossings import IntArray
 from comparisons.geometry.exact.dyadic import NEVER, BoolArray
-from comparisons.geometry.exact.referee import MARGIN, IntArray
+from comparisons.geometry.exact.referee import MARGIN
 from reference_rt.accel import bvh
 from reference_rt.core.arrays import FloatArray
 from reference_rt.textbook import SceneParameters

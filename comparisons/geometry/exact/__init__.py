@@ -26,8 +26,8 @@ import numpy as np
 import numpy.typing as npt
 
 from comparisons.geometry.exact import curved, flat
+from comparisons.geometry.exact.crossings import Crossings, IntArray, Row
 from comparisons.geometry.exact.dyadic import NEVER, BoolArray, Dyadic, Fixed, FloatArray, nearest
-from comparisons.geometry.exact.referee import Crossings, IntArray, Row
 
 KINDS: dict[str, Callable[[Row, Dyadic, Dyadic], Crossings]] = {
     "spheres": curved.spheres,

@@ -6,6 +6,7 @@ from typing import Any
 import flint
 import numpy as np
 
+from comparisons.geometry.exact.crossings import Crossings, Row, column, in_local, ordered, where
 from comparisons.geometry.exact.dyadic import (
     CERTAIN,
     FRACTION,
@@ -18,7 +19,6 @@ from comparisons.geometry.exact.dyadic import (
     roots,
     tied,
 )
-from comparisons.geometry.exact.referee import Crossings, Row, column, in_local, ordered, where
 
 
 def spheres(row: Row, o: Dyadic, d: Dyadic) -> Crossings:

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from comparisons.geometry.exact.crossings import Crossings, Row, column, ordered, where
 from comparisons.geometry.exact.dyadic import BoolArray, Dyadic, Fixed, cross, dot, quotient
-from comparisons.geometry.exact.referee import Crossings, Row, column, ordered, where
 
 
 class PlaneCrossing(NamedTuple):

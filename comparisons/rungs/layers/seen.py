@@ -15,7 +15,8 @@ from comparisons.mitsuba.translate.cameras import translate_filter
 from comparisons.mitsuba.translate.textures import TranslationContext, translate_texture
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.camera import camera_rays, ends
-from comparisons.rungs.rays.rays import KINDS, Comparer, Rays
+from comparisons.rungs.rays.comparer import KINDS, Comparer
+from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.rays.resolution import slide
 from reference_rt.cameras.filters import Filter
 from reference_rt.core.arrays import FloatArray, IdArray, IntArray

@@ -11,7 +11,8 @@ from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.hits import BoolArray, MitsubaHits, rows_of
 from comparisons.rungs.rays import arbiter
-from comparisons.rungs.rays.rays import DISCRETE, KINDS, Comparer, Rays
+from comparisons.rungs.rays.comparer import DISCRETE, KINDS, Comparer
+from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.rays.resolution import slide
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.transform import Translate

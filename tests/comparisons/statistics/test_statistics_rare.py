@@ -8,13 +8,14 @@ from scipy import stats
 from comparisons.compare.judge import Evidence, judge, of_replicates
 from comparisons.statistics import Known, compare
 from comparisons.statistics.decide import findings
-from comparisons.statistics.rare import around, met_once, share_unmet, unseen, worse
+from comparisons.statistics.rare import met_once, unseen, worse
 from comparisons.statistics.sides import side_of
+from comparisons.statistics.unmet import around, share_unmet
 
 SIDE = 48
 BASE = 0.1
 
-# ---- the family: a side that finds a lamp by scattered rays alone, and one that samples it -------
+# The family: a side that finds a lamp by scattered rays alone, and one that samples it.
 
 
 def lamp_light():
@@ -82,7 +83,7 @@ def test_a_known_mean_with_a_lamp_found_by_scattered_rays_alone():
         assert not found.pixels.differs.any()
 
 
-# ---- what it costs -------------------------------------------------------------------------------
+# What it costs
 
 
 @pytest.mark.parametrize("factor", [0.0, 0.3, 3.0, 30.0])
@@ -121,7 +122,7 @@ def test_noise_without_rare_light_loses_no_power():
         assert reach < 1.15 * ordinary * (critical + 2.33 * np.sqrt(1 + critical**2 / 2 / min(dof)))
 
 
-# ---- the parts -----------------------------------------------------------------------------------
+# The parts
 
 
 def test_energy_met_once():
@@ -189,7 +190,7 @@ def test_pixels_that_rare_light_has_not_met():
     assert share_unmet(side_of(1.3 * sampled_light(rng, 16)), sampled) < 0.002
 
 
-# ---- what is said --------------------------------------------------------------------------------
+# What is said
 
 
 def test_agreement_is_refused_where_light_may_be_missing():

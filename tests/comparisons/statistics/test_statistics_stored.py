@@ -6,7 +6,7 @@ from planted import LAMP, STILL, replicates, scene
 
 from comparisons.rungs.input import COMMON
 from comparisons.statistics import Known, compare
-from comparisons.statistics.metrics import noise_ratio
+from comparisons.statistics.metric_null import noise_ratio
 from comparisons.statistics.shared_noise import common_noise
 
 SIDE = 48

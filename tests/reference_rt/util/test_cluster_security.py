@@ -23,7 +23,9 @@ pytestmark = [
 def started(tmp_path, monkeypatch):
     """started(options) is a cluster of a Slurm that runs its jobs at once, and its description."""
     for name, text in {
-        "sbatch": f'setsid sh "$1" > {tmp_path}/log 2>&1 & echo job $!',
+        # As Slurm does, it copies the script, which is deleted when this returns.
+        "sbatch": f'cp "$1" {tmp_path}/$$; setsid sh {tmp_path}/$$ > {tmp_path}/log 2>&1 & '
+        "echo job $!",
         "scancel": 'kill -- "-$1"',
     }.items():
         (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")

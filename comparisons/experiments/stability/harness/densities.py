@@ -20,7 +20,7 @@ from scipy import stats
 
 from comparisons.experiments.stability.harness.bsdfs import Bsdf
 from comparisons.experiments.stability.harness.core import FloatArray
-from comparisons.geometry.exact.referee import IntArray
+from comparisons.geometry.exact.crossings import IntArray
 
 CELLS = 16
 """Along t and along phi."""

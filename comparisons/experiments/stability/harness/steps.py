@@ -6,7 +6,7 @@ import numpy as np
 
 from comparisons.experiments.methods.setting import unit_vectors
 from comparisons.experiments.stability.harness.core import FloatArray
-from comparisons.geometry.exact.referee import Row
+from comparisons.geometry.exact.crossings import Row
 from reference_rt.core.transform import Matrix, Rotate, Scale, Translate, Turn
 
 # ---- rays, each at a row of a table of its own ---------------------------------------------------
