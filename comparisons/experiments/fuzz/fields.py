@@ -230,7 +230,7 @@ def _value(
         return _object(root["$defs"][part["$ref"].rsplit("/", 1)[1]], draw, names, key, root)
     if "anyOf" in part:
         return _any_of(part["anyOf"], draw, names, own, key, root)
-    if known is not None and part.get("type") in ("number", "integer"):
+    if known is not None and part.get("type") in ("number", "integer", "string"):
         return known(draw)
     match part.get("type"):
         case "number":
@@ -325,6 +325,8 @@ def _light(draw: Draw) -> float:
 
 
 RANGES: dict[str, Callable[[Draw], Any]] = {
+    # `radiance` is for .hdr alone, and no drawn file is one.
+    "encoding": lambda draw: draw.pick(("auto", "srgb", "raw")),
     "interior_ior": _ior,
     "exterior_ior": lambda draw: draw.pick((1.0, 1.0, 1.33, 1.1)),
     "principled.eta": _ior,
