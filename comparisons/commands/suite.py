@@ -17,7 +17,7 @@ from comparisons.commands.options import (
     Scheduler,
     compare_extra,
 )
-from comparisons.results.case import COMPARED
+from comparisons.results.rungs import COMPARED
 from reference_rt.cli.adjusted import Defaults, by_name
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import UsageError

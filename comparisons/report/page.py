@@ -20,9 +20,10 @@ from comparisons.report.plots import histograms
 from comparisons.report.templates import encoded, template, write
 from comparisons.report.thumbnails import Thumbnail, Thumbnails, flip_map, thumbnails
 from comparisons.report.values import shown
-from comparisons.results.case import RUNGS, Case, Images, Metrics, Status, how_many
+from comparisons.results.case import Case, Images, Metrics, Status, how_many
 from comparisons.results.files import named
 from comparisons.results.headline import headline
+from comparisons.results.rungs import RUNGS
 
 # ---- limits the size of the page: reduces or omits the float pictures of some cases --------------
 

@@ -6,20 +6,6 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-# ---- the names of the rungs, in their order ------------------------------------------------------
-
-
-RUNGS = (
-    *("scene", "run", "input", "film", "geometry"),
-    *("direct", "whitted", "layers", "statistics", "images"),
-)
-"""The ladder, in order: a failure is reported at the first rung that breaks.  `scene` exists only
-if the scene or one of its files is invalid, `run` only if the case could not be completed; `input`
-checks the pictures themselves."""
-
-COMPARED = RUNGS[3:]
-"""The rungs that compare the two renderers: those a suite can be limited to."""
-
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from comparisons.results.case import RUNGS, Case, Metrics, RungResult, Status
+from comparisons.results.case import Case, Metrics, RungResult, Status
+from comparisons.results.rungs import RUNGS
 
 _FAILURES: tuple[Status, ...] = (
     "invalid",  # makes every other result meaningless

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from comparisons.results.case import RUNGS, RungResult
+from comparisons.results.case import RungResult
+from comparisons.results.rungs import RUNGS
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.resolution import Resolution
 

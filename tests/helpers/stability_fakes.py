@@ -75,7 +75,7 @@ def install():
     """Let the fakes stand for the families."""
     module = sys.modules[__name__]
     for name, one in FAMILIES.items():
-        fake = type(module)(f"comparisons.experiments.stability.{name}.family")
+        fake = type(module)(f"comparisons.experiments.stability.{name}")
         fake.FAMILY = one
         sys.modules[fake.__name__] = fake
     family.MODULES.clear()

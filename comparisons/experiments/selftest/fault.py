@@ -8,7 +8,8 @@ from typing import Any
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, gather
 from comparisons.compare.judge import judge
-from comparisons.results.case import COMPARED, RUNGS, Case, FloatArray
+from comparisons.results.case import Case, FloatArray
+from comparisons.results.rungs import COMPARED, RUNGS
 from reference_rt.rendering.scene import Scene
 
 # ---- without work after the first difference ----------------------------------------------------

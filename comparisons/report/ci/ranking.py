@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from comparisons.results.case import RUNGS, Case, Status
+from comparisons.results.case import Case, Status
+from comparisons.results.rungs import RUNGS
 
 SEVERITY: tuple[Status, ...] = (
     "invalid",

@@ -9,7 +9,8 @@ from junitparser import Error, Failure, JUnitXml, Skipped
 
 from comparisons.report.ci import github, junit
 from comparisons.report.ci.ranking import SEVERITY, ranked
-from comparisons.results.case import RUNGS, Case, Cause, RungResult
+from comparisons.results.case import Case, Cause, RungResult
+from comparisons.results.rungs import RUNGS
 from reference_rt.util.errors import ImageError
 
 NASTY = "<a href='x'>&amp;]]>\x00\x1b[31m\ud800 | `code` % \r\n::error::x,y:z *b* @me é"

@@ -4,8 +4,9 @@ import typing
 
 import pytest
 
-from comparisons.results.case import RUNGS, Case, Cause, RungResult, Status
+from comparisons.results.case import Case, Cause, RungResult, Status
 from comparisons.results.headline import headline
+from comparisons.results.rungs import RUNGS
 
 STATUSES = typing.get_args(Status)
 CAUSE = Cause("half-pixel shift in x", "by 0.5, 0 pixels", 0.99)
