@@ -10,6 +10,8 @@ from scipy import ndimage
 
 from comparisons.compare import diagnosis
 from comparisons.compare.diagnosis import likeliest
+from comparisons.compare.diagnosis.brightness import hypotheses
+from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.results.case import FloatArray, Images, RungResult
 from reference_rt.rendering.image import srgb
 from reference_rt.rendering.render import render
@@ -270,3 +272,19 @@ def test_no_broken_rung_has_no_cause() -> None:
     assert diagnosis([RungResult("geometry", "agree", "", {})]) is None
     camera = RungResult("geometry", "differ", "the camera: 5 of 9 rays differ", {})
     assert diagnosis([camera]) is None
+
+
+@pytest.mark.parametrize(("gain", "is_named"), [(2.015, True), (2.05, False), (1.9, False)])
+def test_a_factor_is_named_within_one_percent(gain, is_named):
+    reference = np.random.default_rng(1).uniform(0.1, 1.0, (24, 24, 3))
+    found = next(h for h in hypotheses(Misfit(Images(gain * reference, reference)), {}))
+    assert ("what it should be" in found.evidence) == is_named
+
+
+def test_pictures_of_8_bits_are_told_by_how_many_values_they_have():
+    """However many of the 256 there are; not with more."""
+    reference = np.random.default_rng(1).uniform(0.0, 1.0, (64, 64, 3))
+    for levels, is_possible in ((200, True), (255, True), (300, False)):
+        candidate = np.round(levels * reference) / levels
+        causes = {h.family for h in hypotheses(Misfit(Images(candidate, reference)), {})}
+        assert ("8 bits" in causes) == is_possible

@@ -10,6 +10,7 @@ import pytest
 from comparisons.compare import compare, ray_starts
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, compare_scene
+from comparisons.compare.judge import Evidence, judge, of_replicates
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.plugins.base import is_wide
 from comparisons.mitsuba.scene import picture
@@ -158,3 +159,19 @@ lights:
     usual = picture(counterpart.mi_scene, 256, 0)
     assert np.abs(effect.mean).max() < 0.002 * usual.mean()
     assert (np.abs(effect.mean) < 5.0 * effect.error).all()
+
+
+@pytest.mark.parametrize("status", ["agree", "differ"])
+def test_they_are_not_measured_where_another_rung_differs(status):
+    """It renders for minutes, and the verdict is known."""
+    rng, asked = np.random.default_rng(1), []
+    a, b = (rng.normal(mean, 0.01, (16, 24, 24, 3)) for mean in (1.0, 1.2))
+
+    def explained(rung, replicates):
+        asked.append(replicates)
+        return rung
+
+    geometry = RungResult("geometry", status, "rays", {})
+    rendered = of_replicates(a, b, {})
+    case = judge(Evidence("x", (geometry,), rendered, {}, ray_starts=explained), 0.005)
+    assert (case.verdict, len(asked)) == ("differ", int(status == "agree"))

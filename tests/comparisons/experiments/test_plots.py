@@ -117,3 +117,10 @@ def test_formulas_in_print():
 def test_ticks():
     ticks = [power_of_ten(x) for x in (0.001, 0.5, 1.0, 2000.0, 1e4, 1e-5, 2e-4, 5e6)]
     assert ticks == ["0.001", "0.5", "1", "2000", "10⁴", "10⁻⁵", "2 × 10⁻⁴", "5 × 10⁶"]
+
+
+def test_there_is_room_for_levels_near_the_curves():
+    """Within a factor of ten; others would flatten the curves."""
+    levels = {"a limit": 12.0, "a floor": 0.2, "far away": 1e4}
+    drawn = log_log([Curve("ours", [1.0, 10.0], [1.0, 2.0])], "x", "y", levels=levels)
+    assert [name in drawn for name in levels] == [True, True, False]

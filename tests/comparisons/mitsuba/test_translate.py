@@ -1,15 +1,18 @@
 """Every public type, translated to Mitsuba: rays show that conventions agree."""
 
+import re
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
+import reference_rt as rt
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import trace
 from comparisons.mitsuba.scene import render
 from comparisons.mitsuba.translate import UntranslatableError, load, to_mitsuba
+from comparisons.mitsuba.translate.lights import ambient_of
 from comparisons.rungs import geometry
 from reference_rt.cameras.camera import Camera
 from reference_rt.cameras.film import AnyFilter, BoxFilter, Film, GaussianFilter, TentFilter
@@ -214,3 +217,38 @@ def test_a_missing_mesh_is_an_error_of_the_scene() -> None:
 
 def test_the_plugin_is_registered() -> None:
     assert mitsuba().load_dict({"type": "whitted", "max_depth": 3}).max_depth == 3
+
+
+def test_ambient_lights_add_up() -> None:
+    lights = (rt.Ambient(radiance=(1.0, 0.2, 0.0)), Point(position=(0, 0, 0), intensity=9.0))
+    assert ambient_of((*lights, rt.Ambient(radiance=0.5))) == [1.5, 0.7, 0.5]
+    assert ambient_of(lights[1:]) == [0.0, 0.0, 0.0]
+
+
+def test_a_number_in_place_of_absent_vertex_colours_is_their_luminance() -> None:
+    scene = Scene.parse(
+        """
+        textures: {c: {type: vertex_colours, without: [0.9, 0.4, 0.1]}}
+        materials: {m: {type: mask, opacity: c, base: g}, g: {type: diffuse, reflectance: c}}
+        shapes: [{type: sphere, material: m}]
+        """
+    )
+    translated = str(to_mitsuba(scene))
+    # Rec. 709's weights.
+    number = 0.2126 * 0.9 + 0.7152 * 0.4 + 0.0722 * 0.1
+    found = [float(x) for x in re.findall(r"'opacity': .*?'value': ([0-9.e-]+)", translated)]
+    assert found == [pytest.approx(number, abs=1e-4)]
+
+
+@pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0, 0, -1), (0.3, -0.9, 0.3)])
+def test_a_spot_along_any_axis_lights_what_lies_there(axis: tuple[float, float, float]) -> None:
+    """Mitsuba's map of a light has no inverse where `up` is along its axis."""
+    spot = rt.Spot(origin=(0, 0, 0), target=axis, intensity=1.0, cutoff_angle=20)
+    scene = Scene(shapes=(Sphere(center=(9, 9, 9)),), lights=(spot,))
+    mi = mitsuba()
+    (light,) = load(scene).mi_scene.emitters()
+    it = mi.SurfaceInteraction3f()
+    direction = np.array(axis) / np.linalg.norm(axis)
+    it.p = mi.Point3f(*(2.0 * direction).tolist())
+    _, weight = light.sample_direction(it, mi.Point2f(0.5, 0.5))
+    np.testing.assert_allclose(np.ravel(weight), 0.25, rtol=1e-5)

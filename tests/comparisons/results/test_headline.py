@@ -49,6 +49,12 @@ def statistics(status="differ", biases=(0.01, 0.011, 0.012), image=True, tiles=0
             ("o", "m"),
             "1,200 of 16,384 pixels differ, the worst by +200 %",
         ),
+        (
+            statistics(biases=(float("inf"), float("inf"), 0.01)),
+            ("ours", "m"),
+            "our picture is of another brightness than m: R an unbounded amount, G an unbounded "
+            "amount, B +1.0 %",
+        ),
         (statistics(image=False), ("o", "m"), "numbers"),
         (RungResult("statistics", "differ", "of others; x"), ("o", "m"), "of others"),
         (RungResult("geometry", "differ", "9 of 10 rays; x"), ("o", "m"), "9 of 10 rays"),

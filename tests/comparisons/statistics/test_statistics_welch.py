@@ -8,9 +8,12 @@ from planted import HEIGHT, LAMP, MARGINS, NONE, WIDTH, replicates, scene
 from scipy import stats
 
 from comparisons.statistics import Known, compare
+from comparisons.statistics.advice import _known
+from comparisons.statistics.scales import IMAGE_LEVEL
 from comparisons.statistics.sides import known_side, side_of
 from comparisons.statistics.uniformity import uniformity
 from comparisons.statistics.welch import (
+    BiasTest,
     Error,
     bias_test,
     chance_of_parting,
@@ -244,3 +247,32 @@ def test_too_few_replicates_have_no_ranks():
 def test_nothing_is_ranked_where_there_is_no_noise():
     still = side_of(np.stack([scene()] * 8))
     assert uniformity(still, still, MARGINS) is None
+
+
+def biases(difference, error, dof=15.0):
+    """Of a reference of 1, without a margin."""
+    shape = np.shape(difference)
+    each = Error(np.broadcast_to(error, shape), np.full(shape, dof))
+    ones, zeros = np.ones(shape), np.zeros(shape)
+    return BiasTest(np.asarray(difference), ones, (each,), zeros, 3.0 * each.value, ones, zeros)
+
+
+def test_the_worst_of_equal_strengths_is_the_largest_bias():
+    """Without noise all strengths are infinite."""
+    assert biases(np.array([[0.1, 0.0], [-0.5, 0.3]]), 0.0).worst == (1, 0)
+    assert biases(np.array([0.1, 0.2]), np.array([0.01, 0.05])).worst == (0,)
+
+
+def test_the_known_part_of_an_error_is_a_lower_bound_at_95_percent():
+    """Of 20,000 standard errors of 3 degrees of freedom each, whose truth is 1."""
+    dof, rng = 3.0, np.random.default_rng(5)
+    estimates = np.sqrt(rng.chisquare(dof, 20_000) / dof)
+    above = (_known(biases(np.zeros(20_000), estimates, dof)) > 1.0).mean()
+    assert above == pytest.approx(0.05, abs=6.0 * np.sqrt(0.05 * 0.95 / 20_000))
+
+
+@pytest.mark.parametrize("level", [1.0, 0.25])
+def test_the_stated_confidence_is_that_of_the_look(level):
+    rng = np.random.default_rng(2)
+    a, b = rng.normal(1.0, 0.01, (2, 16, 16, 16, 3))
+    assert compare(a, b, level=level).numbers["confidence"] == 1.0 - level * IMAGE_LEVEL
