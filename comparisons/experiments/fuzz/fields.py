@@ -326,7 +326,8 @@ def _light(draw: Draw) -> float:
 
 RANGES: dict[str, Callable[[Draw], Any]] = {
     # `radiance` is for .hdr alone, and no drawn file is one.
-    "encoding": lambda draw: draw.pick(("auto", "srgb", "raw")),
+    "bitmap.encoding": lambda draw: draw.pick(("auto", "srgb", "raw")),
+    "environment_map.encoding": lambda _draw: "auto",
     "interior_ior": _ior,
     "exterior_ior": lambda draw: draw.pick((1.0, 1.0, 1.33, 1.1)),
     "principled.eta": _ior,

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from comparisons.compare import diagnosis
-from comparisons.compare.diagnosis import likeliest
+from comparisons.compare.diagnosis import likeliest, of_rungs
 from comparisons.compare.diagnosis.brightness import hypotheses
 from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.results.case import FloatArray, Images, RungResult
@@ -264,14 +263,14 @@ def geometry(mismatches: int, **kinds: int) -> RungResult:
     ],
 )  # fmt: skip
 def test_of_rungs(rung: RungResult, name: str | None) -> None:
-    found = diagnosis([RungResult("input", "agree", ""), rung, RungResult("images", "differ", "")])
+    found = of_rungs([RungResult("input", "agree", ""), rung, RungResult("images", "differ", "")])
     assert (found.name if found else None) == name
 
 
 def test_no_broken_rung_has_no_cause() -> None:
-    assert diagnosis([RungResult("geometry", "agree", "", {})]) is None
+    assert of_rungs([RungResult("geometry", "agree", "", {})]) is None
     camera = RungResult("geometry", "differ", "the camera: 5 of 9 rays differ", {})
-    assert diagnosis([camera]) is None
+    assert of_rungs([camera]) is None
 
 
 @pytest.mark.parametrize(("gain", "is_named"), [(2.015, True), (2.05, False), (1.9, False)])
