@@ -19,6 +19,7 @@ def test_the_same_bits(series, x, tmp_path):
     assert found.failures == 0, found.examples
 
 
+@pytest.mark.slow
 def test_sums_in_another_order_are_seen(tmp_path, monkeypatch):
     """A band that leaves the last bits to chance."""
     honest = determinism._band

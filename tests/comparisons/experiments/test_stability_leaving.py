@@ -42,6 +42,7 @@ def planted(kind, fault, tmp_path):
     return tally
 
 
+@pytest.mark.slow
 def test_departures_are_right_as_they_are(tmp_path):
     for kind in ("sphere", "rectangle", "torus", "box"):
         assert planted(kind, lambda found, _: found, tmp_path).failures == 0

@@ -47,6 +47,7 @@ def slow(*setting):
 # ---- faults that must be seen -------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_an_epsilon_is_seen_by_rays(tmp_path, monkeypatch):
     """Hits closer than 1e-4 passed over, as where t_min is a constant."""
     honest = f09_rays.ours

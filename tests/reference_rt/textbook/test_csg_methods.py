@@ -204,7 +204,7 @@ def check_random_trees(depth, seeds, mesh):
     return hits / len(seeds)
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", range(1, 7))
 def test_random_trees(depth, mesh):
     assert check_random_trees(depth, range(4), mesh) > 0.05 * N
