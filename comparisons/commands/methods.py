@@ -23,12 +23,11 @@ def methods(
     ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random shapes and rays.")] = 1,
 ) -> None:
-    """Measure the textbook's intersection methods: error against nanoseconds per ray."""
+    """Time the textbook's intersection methods, in nanoseconds per ray."""
     with compare_extra("measuring"):
-        from comparisons.experiments.methods.page import write_page
-        from comparisons.experiments.methods.run import FAMILIES, FULL, QUICK, run
-        from comparisons.experiments.methods.terminal import tables
-        from comparisons.experiments.methods.written import write
+        from comparisons.experiments.methods.outputs import table, write, write_page
+        from comparisons.experiments.methods.run import FULL, QUICK, run
+        from comparisons.experiments.methods.trials import FAMILIES
         from comparisons.runs.provenance import ours
 
         import_module("matplotlib")  # before minutes of measuring that the page then cannot show
@@ -45,14 +44,13 @@ def methods(
     rows = []
     with ProgressLine() as progress:
         for name in names:
-            rows += run(FAMILIES[name], effort, seed, progress)
+            rows += run(name, effort, seed, progress)
             write(out, rows, effort, seed, about)
         progress("page", 0.0)
         write_page(page, rows, effort, seed, about)
         progress("page", 1.0)
     console = terminal.console()
     for name in names:
-        for table in tables([row for row in rows if row.family == name], console.width):
-            console.print(table)
-            console.print()
+        console.print(table([row for row in rows if row.family == name], console.width))
+        console.print()
     say(f"{out / 'results.json'}, results.csv, methods.html", err=True)

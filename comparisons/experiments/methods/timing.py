@@ -3,11 +3,10 @@
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.methods.setting import FloatArray, Trial
+from comparisons.experiments.methods.trials import Trial
 from reference_rt.textbook import Method
 
 LONGEST = 15e6
@@ -21,41 +20,27 @@ class Prepared:
     """A method with its precomputed data for some trials, to be run repeatedly."""
 
     def __init__(self, method: Method, trials: list[Trial]) -> None:
-        self.method = method
+        self.run, self.trials = method.run, trials
         with np.errstate(all="ignore"):
-            self.parts = [[method.prepare(part) for part in trial.parts] for trial in trials]
-        self.trials = trials
+            self.parts = [method.prepare(trial.part) for trial in trials]
         self._t = np.empty(max(len(trial.o) for trial in trials))
 
-    def answer(self, trial: Trial, rays: int) -> FloatArray:
-        """t (n,) of the first n rays: the nearest hit over all parts, inf for a miss."""
-        (number,) = (k for k, other in enumerate(self.trials) if other is trial)
-        o, d, t = trial.o[:rays], trial.d[:rays], np.empty(rays)
-        closest = np.full(rays, np.inf)
-        with np.errstate(all="ignore"):
-            for part in self.parts[number]:
-                self.method.run(part, o, d, t)
-                np.fmin(closest, t, out=closest)
-        return closest
-
     def nanoseconds(self, rays: int) -> float:
-        """Time one run over the first `rays` rays of all trials: nanoseconds per ray and part."""
-        traced, jobs = 0, list[tuple[Any, FloatArray, FloatArray, FloatArray]]()
-        for trial, parts in zip(self.trials, self.parts, strict=True):
-            o, d = trial.o[:rays], trial.d[:rays]
-            jobs += [(part, o, d, self._t[: len(o)]) for part in parts]
-            traced += len(o) * len(parts)
-        run = self.method.run
+        """Time one run over the first `rays` rays of all trials: nanoseconds per ray."""
+        jobs = [
+            (part, trial.o[:rays], trial.d[:rays], self._t[: min(rays, len(trial.o))])
+            for trial, part in zip(self.trials, self.parts, strict=True)
+        ]
         with np.errstate(all="ignore"):
             begin = time.perf_counter_ns()
             for job in jobs:
-                run(*job)
-            return (time.perf_counter_ns() - begin) / traced
+                self.run(*job)
+            return (time.perf_counter_ns() - begin) / sum(len(o) for _, o, _, _ in jobs)
 
 
 @dataclass(frozen=True)
 class Time:
-    """Nanoseconds per ray and shape: median and quartiles of `runs` runs of `rays` rays."""
+    """Nanoseconds per ray: median and quartiles of `runs` runs of `rays` rays."""
 
     median: float
     low: float
@@ -84,6 +69,5 @@ def _affordable(method: Prepared) -> int:
     """How many rays of each trial take LONGEST; the first runs compile or load the kernel."""
     method.nanoseconds(1)
     expected = method.nanoseconds(PROBE)
-    shapes = sum(map(len, method.parts))
     longest = max(len(trial.o) for trial in method.trials)
-    return int(min(max(LONGEST / (expected * shapes), PROBE), longest))
+    return int(min(max(LONGEST / (expected * len(method.trials)), PROBE), longest))

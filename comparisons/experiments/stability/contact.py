@@ -26,14 +26,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.methods.errors import U
-from comparisons.experiments.methods.setting import FloatArray
 from comparisons.experiments.stability.harness.core import (
     MITSUBA,
     OURS,
     Draw,
     Outcome,
     Shot,
+    U,
     outcome,
     together,
 )
@@ -45,7 +44,7 @@ from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.mitsuba import translate
 from comparisons.mitsuba.backend import scalar
 from reference_rt.accel.geometry import Geometry, closest_hit, owner, surface
-from reference_rt.core.arrays import IntArray
+from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Ray, ray_from
 from reference_rt.core.vec3 import row
 from reference_rt.integrators.scene_tables import SceneTables

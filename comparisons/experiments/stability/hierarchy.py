@@ -27,7 +27,6 @@ from typing import Any
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.methods.setting import unit_vectors
 from comparisons.experiments.stability.harness.core import (
     OURS,
     Draw,
@@ -40,6 +39,7 @@ from comparisons.experiments.stability.harness.family import Family, Series, Swe
 from comparisons.experiments.stability.harness.meshes import cube, write
 from comparisons.experiments.stability.harness.steps import any_turn, at, scaled
 from comparisons.geometry.exact.dyadic import BoolArray
+from comparisons.geometry.vectors import unit_vectors
 from reference_rt import shapes as any_shape
 from reference_rt.accel import bvh
 from reference_rt.core import transform

@@ -28,13 +28,19 @@ from typing import Any, NamedTuple
 import flint
 import numpy as np
 
-from comparisons.experiments.methods.errors import U
-from comparisons.experiments.methods.setting import across, unit_vectors
-from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Outcome, outcome
+from comparisons.experiments.stability.harness.core import (
+    OURS,
+    Draw,
+    FloatArray,
+    Outcome,
+    U,
+    outcome,
+)
 from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.harness.steps import Rays
 from comparisons.geometry.exact.curved import torus_quartic
 from comparisons.geometry.exact.dyadic import CERTAIN, BoolArray, Dyadic
+from comparisons.geometry.vectors import across, unit_vectors
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import entry_kernel

@@ -26,7 +26,6 @@ from typing import Any
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.methods.setting import unit_vectors
 from comparisons.experiments.stability.harness.core import (
     MITSUBA,
     OURS,
@@ -52,6 +51,7 @@ from comparisons.experiments.stability.harness.meshes import (
 from comparisons.experiments.stability.harness.mitsubas import traced
 from comparisons.experiments.stability.harness.steps import any_turn, at
 from comparisons.geometry.exact.dyadic import BoolArray
+from comparisons.geometry.vectors import unit_vectors
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from reference_rt import textbook

@@ -8,12 +8,11 @@ import pytest
 import stability_runs
 
 import reference_rt as rt
-from comparisons.experiments.methods.errors import U
 from comparisons.experiments.stability import hierarchy, watertight
 from comparisons.experiments.stability import slivers as f04
 from comparisons.experiments.stability import watertight as f03
 from comparisons.experiments.stability.harness import meshes
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, U
 from comparisons.experiments.stability.slivers.judge import DISTANCES, RING, Judge, Question
 from comparisons.experiments.stability.watertight import by_method, crossings
 from reference_rt import textbook

@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.experiments.methods.setting import across, unit_vectors
 from comparisons.experiments.stability.far.spheres import (
     RAYS,
     SCENES,
@@ -27,6 +26,7 @@ from comparisons.experiments.stability.harness.core import (
 from comparisons.experiments.stability.harness.steps import Rays, matrix
 from comparisons.geometry.exact.dyadic import Dyadic
 from comparisons.geometry.frame import round32
+from comparisons.geometry.vectors import across, unit_vectors
 from comparisons.mitsuba.backend import scalar
 from reference_rt.core.arrays import IntArray
 from reference_rt.core.transform import Transform, rotate

@@ -4,8 +4,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from comparisons.experiments.methods.errors import U
-from comparisons.experiments.methods.setting import across, unit_vectors
 from comparisons.experiments.stability.harness.core import (
     MITSUBA,
     OURS,
@@ -13,6 +11,7 @@ from comparisons.experiments.stability.harness.core import (
     Draw,
     FloatArray,
     Outcome,
+    U,
     outcome,
     plain,
 )
@@ -29,6 +28,7 @@ from comparisons.geometry.exact.dyadic import (
     nearest,
 )
 from comparisons.geometry.frame import round32
+from comparisons.geometry.vectors import across, unit_vectors
 from comparisons.mitsuba.backend import scalar
 from reference_rt import textbook
 from reference_rt.core.vec3 import row

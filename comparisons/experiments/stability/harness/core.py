@@ -12,10 +12,16 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from comparisons.experiments.methods.errors import U
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.frame import UNIT_ROUNDOFF as U32
 from reference_rt.util.files import read_text, replacing
+
+U = 2.0**-53
+"""Unit roundoff: half a unit in the last place of 1."""
+
+PIXEL = 1e-3
+"""A hit is misplaced if it is off by more than this share of the shape's size: a pixel, where the
+shape fills a picture 1000 pixels wide."""
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.methods.errors import U
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, FloatArray
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, FloatArray, U
 from comparisons.experiments.stability.harness.mitsubas import loaded
 from comparisons.mitsuba.backend import scalar
 from reference_rt.accel.geometry import Geometry, closest_hit, occluded, surface

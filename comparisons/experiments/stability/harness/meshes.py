@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.methods.setting import unit_vectors
 from comparisons.experiments.stability.harness.core import FloatArray
+from comparisons.geometry.vectors import unit_vectors
 from comparisons.mitsuba.backend import mitsuba
 from reference_rt.core.arrays import IntArray
 

@@ -4,9 +4,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.experiments.methods.setting import unit_vectors
 from comparisons.experiments.stability.harness.core import FloatArray
 from comparisons.geometry.exact.crossings import Row
+from comparisons.geometry.vectors import unit_vectors
 from reference_rt.core.transform import Matrix, Rotate, Scale, Translate, Turn
 
 # ---- rays, each at a row of a table of its own ---------------------------------------------------

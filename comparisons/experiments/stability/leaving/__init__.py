@@ -42,7 +42,6 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.methods.setting import FloatArray
 from comparisons.experiments.stability.harness.core import (
     MITSUBA,
     OURS,
@@ -66,6 +65,7 @@ from comparisons.experiments.stability.leaving.shapes import (
 )
 from comparisons.experiments.stability.leaving.tracer import Ways, depart, scene_of, subjects
 from comparisons.mitsuba.backend import scalar
+from reference_rt.core.arrays import FloatArray
 
 # ---- a shape in sunlight: shadows where there are none are seen as speckle -----------------------
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.methods.setting import FloatArray
 from comparisons.experiments.stability.harness.core import EXAMPLES, Outcome, hexed
 from comparisons.experiments.stability.harness.leaving import CONTACT
 from comparisons.experiments.stability.leaving.shapes import KINDS, Placed, Rays
@@ -15,7 +14,7 @@ from comparisons.geometry.exact import all_hits, first_of
 from comparisons.geometry.exact.dyadic import NEVER, BoolArray, nearest
 from comparisons.geometry.exact.referee import Referee
 from comparisons.geometry.sizes import ShapeSizes
-from reference_rt.core.arrays import IntArray
+from reference_rt.core.arrays import FloatArray, IntArray
 
 CLOSE = 0.01
 """Sizes: how near a neighbour is that others than ours must not lose."""

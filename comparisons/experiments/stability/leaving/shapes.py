@@ -11,12 +11,13 @@ import numpy as np
 import trimesh
 
 import reference_rt as rt
-from comparisons.experiments.methods.setting import FloatArray, unit_vectors
 from comparisons.experiments.stability.harness.core import Draw
 from comparisons.experiments.stability.harness.leaving import bound
 from comparisons.experiments.stability.harness.meshes import write_obj
 from comparisons.experiments.stability.harness.steps import matrix, vector
 from comparisons.geometry.frame import round32
+from comparisons.geometry.vectors import unit_vectors
+from reference_rt.core.arrays import FloatArray
 
 
 class Extent(NamedTuple):

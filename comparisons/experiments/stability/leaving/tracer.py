@@ -6,12 +6,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.methods.setting import FloatArray
 from comparisons.experiments.stability.harness.leaving import ray_leaving
 from comparisons.experiments.stability.leaving.shapes import GROUPS, WHOLE, Placed, Rays
 from reference_rt import shapes as any_shape
 from reference_rt.accel.geometry import Geometry, closest_hit, surface
-from reference_rt.core.arrays import IntArray
+from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Hit, Ray, SurfacePoint
 from reference_rt.core.vec3 import Vec3, dot, frame_from_normal, row, to_world
 from reference_rt.jit.kernel import entry_kernel, kernel

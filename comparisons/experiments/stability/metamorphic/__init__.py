@@ -35,7 +35,6 @@ import numpy as np
 import numpy.typing as npt
 
 import reference_rt as rt
-from comparisons.experiments.methods.setting import unit_rows
 from comparisons.experiments.stability.harness import scenes
 from comparisons.experiments.stability.harness.bits import same_bits
 from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Shot, together
@@ -55,6 +54,7 @@ from comparisons.experiments.stability.metamorphic.rays import Outcomes
 from comparisons.experiments.stability.metamorphic.rearranged import nested, rearranged
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.frame import round32
+from comparisons.geometry.vectors import unit_rows
 from reference_rt.shapes.csg.anchor import FAR
 
 # ---- images of F9's failures, 192 pixels wide ----------------------------------------------------

@@ -7,7 +7,6 @@ import numpy as np
 import numpy.typing as npt
 
 import reference_rt as rt
-from comparisons.experiments.methods.setting import unit_rows
 from comparisons.experiments.stability.harness.core import (
     MITSUBA,
     OURS,
@@ -26,6 +25,7 @@ from comparisons.geometry.exact.referee import Referee
 from comparisons.geometry.exact.referee import Truth as First
 from comparisons.geometry.frame import round32
 from comparisons.geometry.sizes import ShapeSizes
+from comparisons.geometry.vectors import unit_rows
 from comparisons.mitsuba.backend import scalar
 from comparisons.rungs.rays.arbiter import directions
 from reference_rt.core.arrays import IntArray

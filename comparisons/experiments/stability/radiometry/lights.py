@@ -7,7 +7,6 @@ import numpy as np
 from flint import arb, ctx
 
 import reference_rt as rt
-from comparisons.experiments.methods.setting import unit_vectors
 from comparisons.experiments.stability.harness.core import (
     MITSUBA,
     OURS,
@@ -24,6 +23,7 @@ from comparisons.experiments.stability.harness.family import Series, Sweep, deca
 from comparisons.experiments.stability.harness.steps import at, scaled, turned
 from comparisons.experiments.stability.harness.worlds import World, closed, grey, measure
 from comparisons.geometry.frame import round32
+from comparisons.geometry.vectors import unit_vectors
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from reference_rt.core.vec3 import Vec3

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from flint import arb, ctx
 
-from comparisons.experiments.methods.setting import unit_vectors
 from comparisons.experiments.stability.harness.core import (
     MITSUBA,
     OURS,
@@ -24,6 +23,7 @@ from comparisons.experiments.stability.harness.core import (
 from comparisons.experiments.stability.harness.family import Series, Sweep, decades
 from comparisons.experiments.stability.harness.meshes import mitsuba_mesh
 from comparisons.geometry.frame import round32
+from comparisons.geometry.vectors import unit_vectors
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from reference_rt.core.vec3 import row

@@ -20,13 +20,19 @@ import numpy as np
 import numpy.typing as npt
 
 import reference_rt as rt
-from comparisons.experiments.methods.errors import PIXEL, U
-from comparisons.experiments.methods.setting import unit_rows
-from comparisons.experiments.stability.harness.core import FloatArray, Outcome, hexed, outcome
+from comparisons.experiments.stability.harness.core import (
+    PIXEL,
+    FloatArray,
+    Outcome,
+    U,
+    hexed,
+    outcome,
+)
 from comparisons.experiments.stability.harness.steps import any_turn, scaled
 from comparisons.geometry.exact import first_hit
 from comparisons.geometry.exact.dyadic import BoolArray, Dyadic, cross
 from comparisons.geometry.frame import round32
+from comparisons.geometry.vectors import unit_rows
 from reference_rt.core import transform
 
 # ---- random slivers, and rays that graze ---------------------------------------------------------

@@ -37,7 +37,6 @@ import numpy as np
 import numpy.typing as npt
 
 import reference_rt as rt
-from comparisons.experiments.methods.setting import unit_vectors
 from comparisons.experiments.stability.harness import solids
 from comparisons.experiments.stability.harness.core import (
     OURS,
@@ -63,6 +62,7 @@ from comparisons.experiments.stability.solids.trees import (
     placed,
     rewritten,
 )
+from comparisons.geometry.vectors import unit_vectors
 from reference_rt.core import transform
 from reference_rt.shapes.meshes.files import read_mesh
 

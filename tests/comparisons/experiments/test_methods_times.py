@@ -1,0 +1,114 @@
+"""`reference-rt methods`: the command, and what it writes."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from comparisons.commands import register
+from comparisons.experiments.methods import outputs, run
+from comparisons.experiments.methods.run import Effort
+from comparisons.experiments.methods.trials import FAMILIES, SERIES, Draw, methods
+from reference_rt import textbook
+
+TINY = Effort(rays=256, runs=3)
+
+
+def nothing(_what, _fraction):
+    pass
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return [r for name in ("sphere", "polygon") for r in run.run(name, TINY, 5, nothing)]
+
+
+@pytest.fixture
+def program(monkeypatch):
+    """The command with a small effort."""
+    monkeypatch.setattr(run, "QUICK", TINY)
+    app = register.typer.Typer()
+    register.register(app)
+    return lambda *words: CliRunner().invoke(app, ["methods", *words])
+
+
+@pytest.mark.parametrize("series", SERIES, ids=lambda series: series.name)
+def test_all_methods_find_the_same_hits(series, tmp_path):
+    """Else their times are not those of the same work.  Some rays hit and some miss."""
+    rng = np.random.default_rng(2)
+    (trial, *_) = series.make(Draw(rng, 512, tmp_path), series.values[:3][-1])
+    found = []
+    for method in methods(series.family).values():
+        t = np.empty(len(trial.o))
+        with np.errstate(all="ignore"):
+            method.run(method.prepare(trial.part), trial.o, trial.d, t)
+        found.append(np.isfinite(t))
+    assert 0.05 < found[0].mean() < 0.95
+    assert all((hit == found[0]).all() for hit in found)
+
+
+def test_every_method_of_the_textbook_is_timed():
+    assert {m for family in FAMILIES for m in methods(family)} == {
+        *textbook.METHODS,
+        "csg.renderer",
+    }
+
+
+def test_json_and_csv_agree(rows, tmp_path):
+    outputs.write(tmp_path, rows, TINY, 5, {"machine": "here"})
+    document = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
+    assert (document["schema"], document["seed"]) == (2, 5)
+    assert document["effort"] == {"rays": 256, "runs": 3}
+    with (tmp_path / "results.csv").open(encoding="utf-8", newline="") as file:
+        lines = list(csv.DictReader(file))
+    assert len(lines) == len(document["rows"]) == len(rows) == 3 + 5 * 3
+    assert set(document["meaning"]) <= set(lines[0])
+    for line, row in zip(lines, document["rows"], strict=True):
+        assert line == {name: "" if v is None else str(v) for name, v in row.items()}
+        assert 0.0 < row["ns_low"] <= row["ns"] <= row["ns_high"]
+
+
+def test_the_page_stands_alone(rows, tmp_path, check_page):
+    outputs.write_page(tmp_path / "methods.html", rows, TINY, 5, {"machine": "<here>"})
+    page = (tmp_path / "methods.html").read_text(encoding="utf-8")
+    for text in ("&lt;here&gt;", "13 +, 16 ×, 2 /, 1 sqrt", "gears, 16 vertices"):
+        assert text in page
+    assert "<script" not in page
+    assert 'src="http' not in page
+    assert page.count("<svg") == 1
+    check_page(tmp_path / "methods.html")
+
+
+def test_costs_are_those_of_the_docstrings():
+    assert outputs.stated("triangle.moller_trumbore")["fails"] == "as cramer does."
+    assert outputs.stated("hierarchy.sah") == {}
+    with_cost = [n for n in textbook.names() if "cost" in outputs.stated(n)]
+    assert len(with_cost) == len(textbook.names()) - len(textbook.names("hierarchy"))
+
+
+def test_the_command(program, tmp_path):
+    result = program("--family", "box", "-o", str(tmp_path / "out"), "--seed", "2")
+    assert result.exit_code == 0, result.output
+    names = {"results.json", "results.csv", "methods.html"}
+    assert {p.name for p in (tmp_path / "out").iterdir()} == names
+    assert "six planes" in result.output
+    result = program("--family", "cube", "-o", str(tmp_path))
+    assert result.exit_code == 2
+    assert f"expected one of {', '.join(FAMILIES)}, got 'cube'" in result.output
+
+
+def test_interrupted_it_keeps_what_is_finished(program, tmp_path, monkeypatch):
+    measure_all = run.run
+
+    def until_box(family, *rest):
+        if family == "box":
+            raise KeyboardInterrupt
+        return measure_all(family, *rest)
+
+    monkeypatch.setattr(run, "run", until_box)
+    result = program("--family", "sphere", "--family", "box", "-o", str(tmp_path))
+    assert result.exit_code == 130
+    document = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
+    assert {row["family"] for row in document["rows"]} == {"sphere"}
