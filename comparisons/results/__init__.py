@@ -4,8 +4,8 @@
   image metrics, the likeliest cause.  Radiance is in W/sr/m², times in seconds, places in pixels.
 - `verdict`: from rungs to the verdict of a case, from verdicts to the exit code of a run.
 - `stored_case`: one case, `case.json` and `pictures.exr`, read back exactly or refused.
-- `sealed`: files with checksums for anything else that a later run continues from.
-- `json_values`, `files`: values in JSON's types; JSON and CSV files, written whole or not at all.
+- `files`: files with checksums for anything else that a later run continues from; values in JSON's
+  types; JSON and CSV files, written whole or not at all.
 
 None means that a case does not have the item; NaN that a metric is undefined.  To add a field to
 `Case`: give it a default, and raise `stored_case.SCHEMA` if older files would be misread.

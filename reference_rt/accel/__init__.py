@@ -42,7 +42,7 @@ Who decides:
 - `block_query.py`, `array_query.py`: block, packet or single ray, as in the diagram.  What a scene
   lacks is None, so all but "coherent" is decided while the caller is compiled.
 - `rendering/query/tracing.py`: FEW, because packets and streams take longer to compile.  All
-  queries call operations on a geometry through a link (`rendering/query/linked.py`).
+  queries call operations on a geometry through a link (`rendering/query/tracing.py`).
 - `rendering/kernels.py`: whether a picture's kernels are linked, or specialised for its tables; in
   the latter, whether the stream traversal is compiled separately and called through the function
   pointer `Geometry.tracer` (path, with a BVH, without instances) or is inlined.
@@ -71,7 +71,7 @@ Tests, all bit for bit: `test_ways` (every way, every kind of BVH and none) and
 `test_properties_of_rays`.
 
 To add a way: a branch in `block_query` or `array_query`, leaves by `leaf.nearest_of_leaf`, and a
-line in `same_by_every_way` of `test_ways`.
+line in the table of `test_ways`.
 """
 
 # Operations are numbered as they are defined, and cached kernels contain the numbers: whatever is

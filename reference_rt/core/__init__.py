@@ -3,8 +3,7 @@
 For kernels (compiled; NamedTuples of float64, world units, nothing allocated):
 
 - `vec3.py` (`Vec3`, `Frame`), `ray.py` (`Ray`, `Hit`, `SurfacePoint`, and the one policy for
-  leaving a surface), `ray_block.py` (SoA blocks of rays and hits), `scaled_ray.py` (directions of
-  any length)
+  leaving a surface), `ray_block.py` (SoA blocks of rays and hits)
 
 For Python:
 

@@ -5,14 +5,14 @@
 - `by_code.py`: `ByCode`, a choice by a number among shapes, materials, ..., as generated kernels.
 - `links.py`: `Link`, through which a kernel reaches tables and operations without being compiled
   for their types; `Linkable`, operations on one table.
-- `table_words.py`, `operation_types.py`, `function_pointer.py`, `generated.py`: what these are made
-  of, that is tables in memory, types of annotations, calls through function pointers, generated
-  text.
+- `operation_types.py`, `function_pointer.py`: what these are made of, that is types of annotations
+  and calls through function pointers.
 - `compiler.py`: our pipeline of Numba's passes.
-- `numba_codegen.py`: what code generation takes from inside Numba (docs/numba.md).
+- `numba_codegen.py`: what code generation takes from inside Numba (docs/numba.md), and kernels from
+  generated text.
 - `kernel_cache.py`: compiled kernels on disk.
 - `parallel_compile.py`: kernels compiled in several processes.
-- `simd.py`, `simd_kernels.py`: functions that become vector instructions.
+- `simd.py`: functions that become vector instructions.
 
 With NUMBA_DISABLE_JIT=1 all kernels run as plain Python, with the same bits.  `kernel.py` says what
 rules they must follow for that.  Nothing here knows about scenes.

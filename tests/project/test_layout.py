@@ -1,6 +1,8 @@
 """The layout: folders on floors, no import from a lower floor to a higher one, no import circle."""
 
 import ast
+import re
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -131,3 +133,49 @@ def test_the_longest_tests_exist():
     assert set(names) <= set(files)
     assert len(set(names)) == len(names)
     assert len(set(files)) == len(files)
+
+
+def test_contracts_name_what_exists():
+    """The names between backticks in the docstrings of packages: files and folders exist, names
+    occur in the code of the package, or of a module beside it."""
+    missing = [
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in SOURCES.values()
+        if path.name == "__init__.py"
+        for name in BACKTICKED.findall(ast.get_docstring(ast.parse(path.read_text("utf-8"))) or "")
+        if not exists_for(path.parent, name)
+    ]
+    assert missing == []
+
+
+BACKTICKED = re.compile(r"`((?:[\w/]+\.)*[\w/]+)`")
+
+
+def exists_for(folder: Path, name: str) -> bool:
+    """Whether a package in `folder` may speak of `name`: a file, a folder, a module, or a word of
+    the code of the module that the name begins with, or of the package itself."""
+    places = (folder, folder.parent, ROOT / folder.relative_to(ROOT).parts[0], ROOT)
+    if "/" in name or name.endswith(".py"):
+        return any((place / name).exists() for place in places)
+    if name.startswith("test_"):
+        return any((ROOT / "tests").rglob(f"{name}.py"))
+    if name.rpartition(".")[2] in ("json", "jinja", "exr"):  # what a program writes
+        return True
+    parts = name.split(".")
+    for n in range(len(parts), 0, -1):
+        for place in places:
+            inner = place.joinpath(*parts[:n])
+            found = [inner.with_suffix(".py")] if inner.with_suffix(".py").exists() else []
+            found += inner.rglob("*.py") if inner.is_dir() else []
+            if found:
+                return any(set(parts[n:]) <= words_in(path) for path in found)
+    return any(set(parts) <= words_in(path) for path in folder.rglob("*.py"))
+
+
+@cache
+def words_in(path: Path) -> frozenset[str]:
+    """The words of a source without those of its docstring."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return frozenset(
+        re.findall(r"\w+", "\n".join(map(ast.unparse, tree.body[bool(ast.get_docstring(tree)) :])))
+    )

@@ -1,12 +1,13 @@
 """Differential fuzzing: random scenes through both renderers, and cases reduced to a few lines.
 
-- `types.py`: the types of the scene schema, and which of them occur in a scene;
-- `fields.py`, `assets.py`: random values of fields, meshes, and files;
+- `fields.py`, `assets.py`: the types of the scene schema; random values of fields, meshes, and
+  files;
 - `parts.py`, `generate.py`: random parts, and the scene that is made of them;
 - `check.py`: one scene through the rungs, `identities/` through changes that must not matter;
-- `finding.py`: what is asked for, with how much effort, and what is found;
+- `finding.py`: what is asked for, with how much effort, what is found, and results that a run
+  resumes;
 - `reduce.py`: a failing scene made small while it fails in the same way;
-- `worker.py`, `run.py`, `stored.py`: processes that may crash, and results that a run resumes;
+- `worker.py`, `run.py`: processes that may crash;
 - `summary.py`: what was covered and found, for people and programs;
 - `planted.py`: how soon faults that are planted in the source are found.
 

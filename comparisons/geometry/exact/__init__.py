@@ -7,7 +7,7 @@ as there are rays), and rays (n, 3) with directions of any length:
     hits = first_hit("spheres", row, origins, directions)
     hits.t          # (n,) the float nearest to the exact smallest t > 0, inf for a miss
     hits.low, hits.high   # floats that enclose the exact t: its neighbours
-    hits.code       # (n,) the face, as the shape's `face_of` numbers it
+    hits.code       # (n,) the face, as the shape numbers its faces
     hits.touching   # (n,) the line passes exactly through an edge, or touches: hit or miss is right
 
     all_hits("tori", row, origins, directions)   # every crossing, of any sign of t: `Crossings`

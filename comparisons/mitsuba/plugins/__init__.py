@@ -1,9 +1,9 @@
 """Plugins for Mitsuba: materials, views and integrators that it lacks or approximates.
 
 Each module has `register(mi)`, which defines a class and registers it with Mitsuba: the classes
-derive from classes of a variant, so this runs after every `set_variant`.  Plugins follow Mitsuba's
-interface (`sample`, `eval`, `pdf`; local directions, float32) and must work in scalar and in llvm
-variants.  BSDFs share the class of `base`.  To add a plugin: a module with `register`, its name in
+derive from classes of a variant, so this runs after every change of the variant.  Plugins follow
+Mitsuba's interface (`sample`, `eval`, `pdf`; local directions, float32) and must work in scalar and
+in llvm variants.  BSDFs share the class of `base`.  To add a plugin: a module with `register`, its name in
 `register` below, and a `translate_*` function that uses it.
 """
 

@@ -8,7 +8,7 @@ makes a binary BVH, `Nodes` in world space, by one of four methods: `sah.py` wit
 
 To add a method: a module with build(boxes (n, 6)) -> (Nodes, references), deterministic, no deeper
 than STACK_SIZE allows, leaves of at most LEAF_SIZE; a name in `Method` and a branch in `build`; the
-method's name in the scene's `hierarchy` and in METHODS of the tests.
+method's name in the field of the scene, and in METHODS of the tests.
 """
 
 from typing import Literal

@@ -1,7 +1,7 @@
 """The light sampler: which light a shadow ray is sent to.
 
 `choice.py` picks among all lights: by power if there are few, or else by the light tree for lights
-that have bounds (`tree.py`, built by `tree_build.py`) and by power for the rest, which are
+that have bounds (`tree.py`) and by power for the rest, which are
 infinitely far away.  `bounds.py` has the boxes, cones of normals and intensities of lights.
 
 Contract: `pick(choice, tree, p, n, u)` takes a point and the unit normal there on the side that

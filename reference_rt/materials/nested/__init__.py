@@ -7,6 +7,6 @@ replaces its frame.  What the material scatters is the sum of its leaves times t
 weight 0 means that a leaf has no part here.
 
 To add one: its description (a `Wrapper`) here; a code of its step and a case in `paths.py`; a
-branch in `_layer` of `flattened.py`, and a table there if the step has parameters; a member of
-`AnyMaterial`.
+branch in `flattened.py`, and a table there if the step has parameters; a member of
+the union of all materials.
 """

@@ -2,9 +2,9 @@
 
 `hits`: first hits, occlusion, and all crossings along a ray;  `bsdf`: evaluate and sample a
 material;  `light`: light samples and densities;  `radiance`: any integrator along given rays;
-`tracing`: the entry kernels, and which of them traces how many rays;  `linked`: a scene's tables
-behind links;  `rays`: checks, broadcasting, threads; camera rays.
-`Scene` has the queries as methods; most functions here take the scene's tables instead.
+`tracing`: the entry kernels, which take a scene's tables behind links, and which of them traces how
+many rays;  `rays`: checks, broadcasting, threads; camera rays.
+A scene has the queries as methods; most functions here take the scene's tables instead.
 
 Contract: all arrays are float64 or int64.  Origins and directions are (..., 3) in world coordinates
 and scene units, and broadcast.  Directions may have any length; t counts in units of |d|.  A ray
@@ -12,9 +12,9 @@ misses if one of its numbers is not finite, if its direction is 0, or if its hit
 or t beyond float64's range.  Arrays of other shapes, and arrays that are not numeric, raise
 ValueError.
 
-To add a query: a function here with its entry kernel, exported below; a line in `Scene`.  The
+To add a query: a function here with its entry kernel, exported below; a line in `scene.py`.  The
 kernel takes links with the operations that it calls (`link_to_geometry`, `link_to_scene` or
-`linked.linked`), so that all scenes share it.
+`tracing.linked`), so that all scenes share it.
 """
 
 from reference_rt.rendering.query.bsdf import Bsdf, BsdfSamples

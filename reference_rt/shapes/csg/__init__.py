@@ -1,8 +1,7 @@
 """Constructive solid geometry: union, intersection and difference of solids, nested to any depth.
 
-`sphere & box - cylinder` in Python; in a scene file a tree of `union`, `intersection` and
-`difference`, whose `of` lists the operands.  Operands are primitives with `spans` and closed
-meshes.
+`sphere & box - cylinder` in Python; in a scene file a tree of unions, intersections and
+differences, whose `of` lists the operands.  Operands are primitives with spans and closed meshes.
 
 - `description.py`: the tree, its operands from left to right, and its postfix program;
 - `tables.py`: operands and programs of all solids of a scene;

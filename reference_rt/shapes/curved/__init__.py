@@ -2,7 +2,7 @@
 
 The contract is that of `shapes`.  All are solids, so that they have `spans`, except a quadric whose
 table says that it is not capped: that is a surface alone, seen from both sides.  Quadrics and tori
-are intersected in their own coordinates (`placement.py`); `quadratic_form.py` puts a quadric into
+are intersected in their own coordinates (`placement.py`); `quadric.py` puts a quadric into
 coordinates where floats serve it best, exactly, when the scene is built.
 
 To add a quadric: a description whose `tabulate` calls `quadric.tabulate` with its ten coefficients

@@ -15,7 +15,7 @@ Counts.  11,000 scenes and files in the full run (values 4500, structure 1600, g
 
 Passes.  No failure.
 
-How.  Scenes go to child processes (`pool`, `worker`; Mitsuba's: `mitsuba`), which do as
+How.  Scenes go to child processes (`worker`; Mitsuba's: `mitsuba`), which do as
 `reference-rt render` does (8 x 8 pixels, one sample), so that one that dies takes no other with it.
 Values change in a few fixed scenes (`bases`), whose compiled kernels stay the same; where they do
 not, and where the structure changes (`damage`), plain Python runs the same code

@@ -5,7 +5,7 @@ Law.  Along each ray:
   commutativity, associativity, distribution, De Morgan, complements) have the same list of
   crossings, bit for bit: the operands' crossings are the same numbers.  A - A, A - (A | B) and
   (A & B) - A have none;
-- crossings of operands further apart than the sum of the widths that `csg.all_crossings` states
+- crossings of operands further apart than the sum of the widths that the query states
   (the error of the surface and of the ray's arithmetic, over the cosine) are told apart: between
   them the list says inside where exact arithmetic on the tables does.  No narrower stretch is
   reported;
@@ -20,8 +20,8 @@ Counts.  2 x 10^4 rays a depth, 3000 a shift and an offset, with the exact arbit
 
 Passes.  No failure.
 
-Contestants.  Ours: `csg.all_crossings`; the textbook's: interval lists (Roth 1982), inside tests
-(Tilove 1980), which give the first crossing alone.  Mitsuba has no solids and takes no part: what
+Contestants.  Ours: the query of all crossings; the textbook's: interval lists (Roth 1982), inside
+tests (Tilove 1980), which give the first crossing alone.  Mitsuba has no solids and takes no part: what
 stands in for it elsewhere (`comparisons/mitsuba/csg.py`) is a program of this project on Mitsuba's
 hits.
 
