@@ -3,9 +3,8 @@
 Each module has `register(mi)`, which defines a class and registers it with Mitsuba: the classes
 derive from classes of a variant, so this runs after every change of the variant.  Plugins follow
 Mitsuba's interface (`sample`, `eval`, `pdf`; local directions, float32) and must work in scalar and
-in llvm variants.  BSDFs share the class of `base`.  To add a plugin: a module with `register`, its name in
-`register` below, and a `translate_*` function that uses it.
-"""
+in llvm variants.  BSDFs share the class of `base`.  To add a plugin: a module with `register`, its
+name in `register` below, and a `translate_*` function that uses it."""
 
 from typing import Any
 

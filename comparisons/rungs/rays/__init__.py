@@ -1,6 +1,7 @@
 """Rays that both renderers trace, and the error bounds that their hits must keep.
 
-- Which rays: `rays` (camera, random, secondary), `camera`; those aimed at edges are in `rungs/geometry.py`.
+- Which rays: `rays` (camera, random, secondary), `camera`; those aimed at edges are in
+  `rungs/geometry.py`.
 - Shadow rays: `any_hit`.
 - How large an error float32 explains: `resolution`, `light_error`, and slopes in `coincidence`.
 - What a difference means: `comparer` (error over bound), `arbiter` (hits of neighbouring rays),

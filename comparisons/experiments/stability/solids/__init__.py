@@ -20,10 +20,10 @@ Counts.  2 x 10^4 rays a depth, 3000 a shift and an offset, with the exact arbit
 
 Passes.  No failure.
 
-Contestants.  Ours: the query of all crossings; the textbook's: interval lists (Roth 1982), inside
-tests (Tilove 1980), which give the first crossing alone.  Mitsuba has no solids and takes no part: what
-stands in for it elsewhere (`comparisons/mitsuba/csg.py`) is a program of this project on Mitsuba's
-hits.
+Contestants. Ours: the query of all crossings; the textbook's: interval lists (Roth 1982), inside
+tests (Tilove 1980), which give the first crossing alone. Mitsuba has no solids and takes no part:
+what stands in for it elsewhere (`comparisons/mitsuba/csg.py`) is a program of this project on
+Mitsuba's hits.
 
 `trees` draws and rewrites trees; crossings and the exact truth are in
 `harness.solids`."""
