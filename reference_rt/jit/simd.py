@@ -8,7 +8,7 @@ rounds once, by IEEE's rules, in the order written: all results have the same bi
 with narrower vectors LLVM splits the instructions.
 
 A generic function has no branches.  It uses `select`, `smaller` and `larger` instead, the square
-root and the sign functions below, and &, | and ~ for conditions.  `simd_kernels.py` makes such a
+root and the sign functions below, and &, | and ~ for conditions.  `simd_kernel` makes such a
 function callable from kernels."""
 
 import functools

@@ -46,7 +46,7 @@ def reading(path: Path, encoding: Encoding) -> Iterator[ImageFile]:
     try:
         image = open_image(path, radiance=encoding == "radiance")
         if encoding == "radiance" and not isinstance(image, HdrFile):
-            raise ValueError("is no Radiance image, which `encoding: radiance` is for")
+            raise ValueError("is no Radiance image; expected one with `encoding: radiance`")
         yield image
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {error.strerror}; expected an image") from None

@@ -1,6 +1,8 @@
 """Scenes, tables and meshes that tests are made of."""
 
+import importlib
 import os
+import pkgutil
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -333,3 +335,11 @@ def _written(path: Path, text: str) -> Path:
     Image.fromarray(pixels).save(path.parent / "image.png")
     path.write_text(text)
     return path
+
+
+def import_everything():
+    """Import every module of reference_rt: what a test enumerates then does not depend on which
+    others have run."""
+    for module in pkgutil.walk_packages(rt.__path__, "reference_rt."):
+        if not module.name.endswith("__main__"):
+            importlib.import_module(module.name)

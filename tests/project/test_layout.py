@@ -179,3 +179,16 @@ def words_in(path: Path) -> frozenset[str]:
     return frozenset(
         re.findall(r"\w+", "\n".join(map(ast.unparse, tree.body[bool(ast.get_docstring(tree)) :])))
     )
+
+
+def test_files_that_are_named_exist():
+    """Sources and documents name files of Python between backticks."""
+    texts = [*SOURCES.values(), *(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")]
+    missing = [
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in texts
+        if path.name != "CHANGELOG.md"
+        for name in set(re.findall(r"`((?:\w+/)*\w+\.py)`", path.read_text(encoding="utf-8")))
+        if not (ROOT / name).exists() and next(ROOT.glob(f"*/**/{name}"), None) is None
+    ]
+    assert missing == ["comparisons/experiments/fuzz/finding.py: renderer.py"]  # a user's

@@ -78,7 +78,7 @@ _PACKAGES = ("numpy", "numba", "mitsuba", "drjit")
 @dataclass
 class Outcome:
     """rows: in the order of the table;  not_measured: reasons, by group;  machine: see
-    `comparisons.experiments.bench.machine`."""
+    `machine`."""
 
     rows: list[Row] = field(default_factory=list)
     not_measured: dict[str, str] = field(default_factory=dict)

@@ -89,7 +89,7 @@ def bands(draw: Draw, x: float) -> Outcomes:
 CARRY_ON = """
 import sys
 from pathlib import Path
-from comparisons.experiments.stability.determinism.parts import carry_on
+from comparisons.experiments.stability.determinism import carry_on
 carry_on(Path(sys.argv[1]), float.fromhex(sys.argv[2]), float.fromhex(sys.argv[3]))
 """
 
@@ -131,7 +131,7 @@ def interrupted(draw: Draw, x: float) -> Outcomes:
 PLAIN = """
 import sys
 from pathlib import Path
-from comparisons.experiments.stability.determinism.parts import plainly
+from comparisons.experiments.stability.determinism import plainly
 plainly(Path(sys.argv[1]), int(sys.argv[2]))
 """
 

@@ -1,6 +1,6 @@
 """First hits and crossings of arrays of rays: the entry kernels, and which of them trace how many.
 
-They take a geometry, or a link to one with the operations that are named here (`linked.py`)."""
+They take a geometry, or a link to one with the operations that are named here."""
 
 import math
 import os

@@ -107,5 +107,5 @@ def test_radiances_own_decoding_is_an_option(tmp_path):
 @pytest.mark.parametrize("kind", [rt.Bitmap, rt.EnvironmentMap])
 def test_it_is_refused_for_other_files(tmp_path, kind):
     np.save(tmp_path / "a.npy", np.ones((4, 4, 3)))
-    with pytest.raises(ValueError, match=r"a\.npy: is no Radiance image"):
+    with pytest.raises(ValueError, match=r"a\.npy: is no Radiance image; expected one"):
         kind(file="a.npy", encoding="radiance").tabulate(tmp_path)

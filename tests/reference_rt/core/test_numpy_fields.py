@@ -5,12 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import import_everything
 
 import reference_rt as rt
 from reference_rt.core import transform
 from reference_rt.core.model import Description
 from reference_rt.shapes.csg import Solid
 from reference_rt.textures.texture import UvMap
+
+import_everything()
 
 BASES = {
     *("Camera", "CentralCamera", "Filter", "Shape", "Solid", "Texture"),

@@ -6,6 +6,7 @@ from typing import Annotated, Any, NamedTuple
 import numba
 import numpy as np
 import pytest
+from builders import import_everything
 from numba import types
 
 import reference_rt.rendering  # noqa: F401 -- imports all operations
@@ -15,6 +16,8 @@ from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.links import LINK, Group, Link
 from reference_rt.jit.operation_types import declare, type_of
 from reference_rt.shapes import Shapes
+
+import_everything()
 
 
 class Mixed(NamedTuple):
