@@ -116,6 +116,7 @@ def show(browser, window, tmp_path):
             page = contexts[0].new_page()
         for event, listener in listeners.items():
             page.on(event, listener)
+        page.emulate_media(media="screen")  # another test may have left it on paper
         page.goto(path.as_uri())
         return page
 

@@ -183,8 +183,14 @@ def test_blinking(show):
     page = show(case(Images(grey(0.25), grey(1.0))))
     page.keyboard.press("3")
     for kind in ("reference", "candidate"):
-        page.wait_for_selector(f"body[data-which={kind}]")
-        assert shown(page) == [kind]
+        # Read with the state itself: half a second later it is the other one.
+        seen = page.wait_for_function(
+            """(kind) => document.body.dataset.which === kind
+                && [...document.querySelectorAll("#case-1 .row figure")]
+                    .filter((e) => e.checkVisibility()).map((e) => e.dataset.kind)""",
+            arg=kind,
+        )
+        assert seen.json_value() == [kind]
     page.keyboard.press("1")
     assert shown(page) == ["candidate", "reference", "difference", "flip"]
 
