@@ -145,6 +145,7 @@ def _kernels() -> int:
 
 
 _begun: dict[str, tuple[float, int]] = {}
+_files_begun: set[Path] = set()
 _costs: dict[str, float] = {}
 
 
@@ -156,8 +157,12 @@ def pytest_runtest_logstart(nodeid: str) -> None:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Iterator[pytest.TestReport]:
-    """Write the cost of a test into its last report."""
+    """Write the cost of a test into its last report.  The first test of a file sets up what others
+    share, such as a browser: that is not its own cost."""
     report = yield
+    if call.when == "setup" and item.path not in _files_begun and item.nodeid in _begun:
+        _files_begun.add(item.path)
+        _begun[item.nodeid] = _cpu(), _begun[item.nodeid][1]
     if call.when == "teardown" and item.nodeid in _begun:
         cpu, kernels = _begun.pop(item.nodeid)
         report.cpu = _cpu() - cpu
