@@ -304,14 +304,13 @@ def parse_file(path: Path, defaults: Mapping[str, str]) -> Parsed:
     resolver.prepend(str(folder))
     with tempfile.TemporaryDirectory() as copies:
         start = path
-        if check.old:  # Mitsuba's parser finds the copies first
+        if check.is_old:  # Mitsuba's parser finds the copies first
             resolver.prepend(copies)
-            for name, (_, content) in check.old.items():
+            for name, (_, content) in check.copied.items():
                 copy = Path(copies, name)
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 copy.write_bytes(OLD_ELEMENT.sub(rb"\1lookat", content))
-            if path.name in check.old:
-                start = Path(copies, path.name)
+            start = Path(copies, path.name)
         before = len(resolver)
         mi.set_file_resolver(resolver)
         try:
@@ -323,14 +322,14 @@ def parse_file(path: Path, defaults: Mapping[str, str]) -> Parsed:
         except SceneError as error:
             inside = error.file is not None and Path(error.file).is_relative_to(copies)
             name = str(Path(error.file or "").relative_to(copies)) if inside else ""
-            file = str(check.old[name][0]) if inside else error.file
+            file = str(check.copied[name][0]) if inside else error.file
             message = error.message.replace(copies, str(folder))
             raise SceneError(message, file=file, line=error.line) from None
         finally:
             mi.set_file_resolver(old)
-        own = {str(Path(copies, name)): str(place) for name, (place, _) in check.old.items()}
+        own = {str(Path(copies, name)): str(place) for name, (place, _) in check.copied.items()}
         state.files = [own.get(str(file), str(file)) for file in state.files]
-    if check.old:
+    if check.is_old:
         notes.insert(0, (0, "<lookAt> of Mitsuba 0.x is read as <lookat>, on both sides"))
     return Parsed(state, str(path), folder, paths, defaults, {}, notes)
 
@@ -385,13 +384,15 @@ class _TooDeepError(Exception):
 class _Included:
     """What `read` has found in a file and all that it includes.
 
-    old: the files with spellings of Mitsuba 0.x by the name under which they are included.
+    is_old: whether one has spellings of Mitsuba 0.x;  copied: the files, in whose place copies are
+    parsed then, by the name under which they are included.
     """
 
     def __init__(self, folder: Path, values: dict[str, str]) -> None:
         self.folders, self.values = [folder], values
         self.files = self.bytes = 0
-        self.old: dict[str, tuple[Path, bytes]] = {}
+        self.is_old = False
+        self.copied: dict[str, tuple[Path, bytes]] = {}
 
     def read(self, path: Path, name: str, around: tuple[Path, ...], depth: int) -> None:
         """Check that a file and its includes are regular, of limited size and number, in UTF-8, do
@@ -416,8 +417,17 @@ class _Included:
                 file=str((*around, path)[0]),
             )
         _check_utf8(path, content)
+        is_inside = not Path(name).is_absolute() and ".." not in Path(name).parts
+        if is_inside:
+            self.copied[name] = path, content
         if OLD_ELEMENT.search(content):
-            self.old[name] = path, content
+            self.is_old = True
+            if not is_inside:  # its copy would be written beside the folder of copies
+                raise SceneError(
+                    f"has <lookAt> of Mitsuba 0.x and is included as '{name}'; expected <lookat>, "
+                    "or a name within the scene's folder",
+                    file=str(path),
+                )
         parser = xml.parsers.expat.ParserCreate()
         level, includes = 0, list[tuple[str, int, int]]()
 

@@ -74,6 +74,34 @@ def test_spellings_of_mitsuba_0(tmp_path):
     )
 
 
+@pytest.mark.parametrize("how", ["beside", "absolute", "through a folder", "link"])
+def test_copies_of_old_files_stay_in_their_folder(how, tmp_path):
+    """No file of the user's is written to, whatever name includes it."""
+    inner = '<shape type="sphere"><transform name="to_world"><lookAt origin="1,0,0" '
+    inner += 'target="1,2,0" up="0,0,1"/></transform></shape>'
+    for folder in ("scene", "other"):
+        (tmp_path / folder).mkdir()
+    other = tmp_path / "other" / "ball.xml"
+    other.write_text(f'<scene version="0.6.0">{inner}</scene>')
+    before = other.read_bytes()
+    name = {
+        "beside": "../other/ball.xml",
+        "absolute": str(other),
+        "through a folder": "a/../../other/ball.xml",
+        "link": "link.xml",
+    }[how]
+    (tmp_path / "scene" / "a").mkdir()
+    (tmp_path / "scene" / "link.xml").symlink_to(other)
+    content = f'{SENSOR}<include filename="{name}"/>{LIGHT}'
+    if how == "link":
+        scene_of(tmp_path / "scene", content)
+    else:
+        message = refusal(tmp_path / "scene", content)
+        assert f"is included as '{name}'; expected <lookat>" in message
+    assert other.read_bytes() == before
+    assert {path.name for path in tmp_path.iterdir()} == {"scene", "other"}
+
+
 @pytest.mark.parametrize("plugin", PRIMAL)
 def test_integrators_for_derivatives(plugin, tmp_path):
     words = f'<integrator type="{plugin}"><integer name="sppi" value="0"/>'
