@@ -29,7 +29,9 @@ def _evaluate_rows(table, wo, wi, values, densities):
     at = At(None, 0.0, 0.0, Vec3(-1.0, -1.0, -1.0))
     for i in range(len(wo)):
         a, b = Vec3(wo[i, 0], wo[i, 1], wo[i, 2]), Vec3(wi[i, 0], wi[i, 1], wi[i, 2])
-        values[i], densities[i] = _eval_pdf_one(table, 0, at, a, b)
+        # One by one: a slice would compile Numba's messages about shapes, 0.3 s in every kernel.
+        value, densities[i] = _eval_pdf_one(table, 0, at, a, b)
+        values[i, 0], values[i, 1], values[i, 2] = value
 
 
 def _sample_rows(table, wo, u, wi, weights, others):
@@ -37,9 +39,10 @@ def _sample_rows(table, wo, u, wi, weights, others):
     for i in range(len(u)):
         v = Vec3(wo[i, 0], wo[i, 1], wo[i, 2])
         found = _sample_one(table, 0, at, v, u[i, 0], u[i, 1], u[i, 2])
-        wi[i] = found.wi
-        weights[i] = found.weight
-        others[i] = found.pdf, found.eta, 1.0 if found.is_delta else 0.0
+        wi[i, 0], wi[i, 1], wi[i, 2] = found.wi
+        weights[i, 0], weights[i, 1], weights[i, 2] = found.weight
+        others[i, 0], others[i, 1] = found.pdf, found.eta
+        others[i, 2] = 1.0 if found.is_delta else 0.0
 
 
 _compiled = entry_kernel(_evaluate_rows), entry_kernel(_sample_rows)

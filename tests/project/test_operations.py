@@ -64,7 +64,7 @@ def test_numbers_count_from_one(usual: dict[str, dict[str, int]]) -> None:
         assert sorted(group.values()) == list(range(1, len(group) + 1))
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "order", ["reversed", *"0123", "Scene", "render", "query", "build_tables", "Box", "textbook"]
 )

@@ -161,6 +161,7 @@ def test_no_child_outlives_its_parent(tmp_path, start, number):
     assert not (tmp_path / "out.png").exists()
 
 
+@pytest.mark.slow
 @linux
 def test_nohup_goes_on(tmp_path):
     """Who has SIGHUP ignored, keeps that."""

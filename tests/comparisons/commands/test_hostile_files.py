@@ -219,7 +219,7 @@ COMMANDS = (
 )
 
 
-@pytest.mark.cases(26)
+@pytest.mark.cases(10)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
 def test_every_command_and_every_name(tmp_path, monkeypatch, command, name):

@@ -143,7 +143,7 @@ CASES = [
 ]
 
 
-@pytest.mark.cases(24)
+@pytest.mark.cases(8)
 @pytest.mark.parametrize(("command", "option", "file", "how"), CASES)
 @pytest.mark.usefixtures("fake_runners", "idle")
 def test_an_output_that_cannot_be_written_is_refused_before_work_begins(

@@ -95,7 +95,7 @@ PLANTED = {
 }
 
 
-@pytest.mark.cases(10)
+@pytest.mark.cases(3)
 @pytest.mark.parametrize(
     "name",
     [
@@ -132,6 +132,7 @@ def rimmed(width: int, loss: float) -> Callable[[FloatArray], FloatArray]:
     return change
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     ("name", "width", "loss"),
     [
@@ -151,6 +152,7 @@ def test_the_rim(name: str, width: int, loss: float) -> None:
     assert pixels in range(1, width + 1) or pixels == 8  # 8 where only blocks show it
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     ("factor", "told"), [(np.pi, "pi times"), (0.5, "half"), (2.0, "twice"), (1 / np.pi, "1/pi")]
 )
@@ -174,6 +176,7 @@ def test_rounded() -> None:
     assert found.name == "rounded to 8 bits (sRGB)"
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("amount", "name"),
     [(-1.0, "lost light: lamp"), (1.0, "light counted twice: lamp"), (0.4, "light of another")],

@@ -90,6 +90,7 @@ def test_defaults_are_those_of_the_reading(tmp_path):
     assert bright > 1.1 * dark
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*its moments are left out")
 def test_a_camera_without_a_translation_is_compared_by_its_picture(tmp_path):
     """Our translator has no lens off the axis; the user's file has."""
@@ -210,7 +211,7 @@ SUMMED = """<scene version="3.0.0">
 """
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "samples",
     [

@@ -154,6 +154,7 @@ def told(tmp_path_factory):
     return headline, page, json.loads((folder / "results.json").read_text()), curves
 
 
+@pytest.mark.slow
 def test_the_page_can_be_read_by_everybody(told, tmp_path, check_page):
     (tmp_path / "page.html").write_text(told[1], encoding="utf-8")
     check_page(tmp_path / "page.html")

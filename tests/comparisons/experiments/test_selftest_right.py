@@ -48,7 +48,7 @@ def test_synthetic_pictures_are_pictures_and_new_for_each_seed(case: RightCase):
     assert not np.array_equal(candidate, other)
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("case", of(case for case in CASES if not case.rendered))
 def test_right_synthetic_pictures_are_not_called_wrong(case: RightCase):
     """A few seeds; a thousand in the slow test."""
@@ -63,6 +63,7 @@ def test_false_alarms_of_a_right_renderer(case: RightCase):
     assert found.holds, found.reasons
 
 
+@pytest.mark.slow
 def test_wrong_pictures_are_counted_as_alarms_of_a_case_that_should_be_right():
     """The count is not blind: a gain of 5 % in a case that claims to be right."""
     right = next(case for case in CASES if case.name == "background and lamp without noise")

@@ -96,6 +96,7 @@ def test_failures_of_ours_fail_and_are_told(fakes, tmp_path):
     assert "--at 100000000.0" not in told
 
 
+@pytest.mark.slow
 def test_a_setting_that_kills_its_process(fakes, tmp_path):
     code, told = stability(tmp_path, "--family", "T2")
     assert code == 1

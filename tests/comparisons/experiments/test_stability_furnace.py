@@ -73,7 +73,7 @@ def planted(fault: str) -> Callable[..., Iterator[tuple[str, Bsdf]]]:
     return contestants
 
 
-@pytest.mark.cases(2)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "family", "series", "fault", "x", "cases"),
     [

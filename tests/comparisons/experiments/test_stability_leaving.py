@@ -48,6 +48,7 @@ def test_departures_are_right_as_they_are(tmp_path):
         assert planted(kind, lambda found, _: found, tmp_path).failures == 0
 
 
+@pytest.mark.slow
 def test_a_surface_that_is_met_again_is_seen(tmp_path):
     def again(found, outer):
         k = np.flatnonzero(outer)[:3]

@@ -63,6 +63,7 @@ def test_an_epsilon_is_seen_by_rays(tmp_path, monkeypatch):
     assert measured("shrunk", 1e6, tmp_path, cases=30)[OURS].failures > 50
 
 
+@pytest.mark.slow
 def test_an_epsilon_is_seen_in_pictures(tmp_path, monkeypatch):
     """The eye moved by a constant: what an offset of a shadow ray does to the point it leaves."""
     honest = light.colours
@@ -87,6 +88,7 @@ def test_rounded_arithmetic_is_seen(tmp_path, monkeypatch):
     assert measured("translated", 1e8, tmp_path)[OURS].failures > 100
 
 
+@pytest.mark.slow
 def test_exact_arithmetic_judges_both_answers(tmp_path):
     """A name exchanged for another is wrong, whatever rounding may do."""
     bench = f09_rays.Bench(scenes.things(tmp_path), 60, np.random.default_rng(1))
@@ -100,6 +102,7 @@ def test_exact_arithmetic_judges_both_answers(tmp_path):
     assert hits > 40
 
 
+@pytest.mark.slow
 def test_solids_are_judged_by_what_is_resolved(tmp_path):
     """What ours finds passes; another operand, nothing, what is behind, and a t that is off do
     not; of two walls that rounding cannot tell apart either may be first, of others one."""
@@ -153,6 +156,7 @@ RAY_SERIES += [slow("grown", 1e9), ("powers of two", 3.0), ("rearranged", 2.0), 
 RAY_SERIES += [slow("turned", 2.0)]
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(("series", "x"), RAY_SERIES)
 def test_missing_triangles_are_seen_by_rays(series, x, tmp_path, monkeypatch):
     """Half of each mesh, in what is transformed alone."""
@@ -194,6 +198,7 @@ def test_a_colour_is_seen(series, x, tmp_path, monkeypatch):
     assert measured(series, x, tmp_path)[OURS].failures > 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("series", "x"), LIGHT_SERIES)
 def test_a_missing_triangle_is_seen_in_pictures(series, x, tmp_path, monkeypatch):
     """So few pixels that they are looked at again."""

@@ -176,6 +176,7 @@ def test_the_text_book_fails_on_slivers_and_under_grazing_rays(tmp_path):
     assert max(sliver[OURS].worst, grazing[OURS].worst) < 3.0  # of 144
 
 
+@pytest.mark.slow
 def test_pictures():
     ours = f04.FAMILY.by_name["grazing"].shoot(OURS, 1e6)
     assert "0 lost (white), 0 false (orange), 0 elsewhere (red)" in ours.caption

@@ -114,6 +114,7 @@ def test_a_damaged_cache_is_not_believed(
     assert calls.count > 0
 
 
+@pytest.mark.slow
 def test_work_has_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reference, "MOST_SAMPLES", 1)
     found = of_scene(Scene.parse(SCENE), 1e-6)

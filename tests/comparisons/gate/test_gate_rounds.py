@@ -64,7 +64,7 @@ def looks(case: Case) -> list[int]:
     return list(found.numbers["replicates_at_looks"])
 
 
-@pytest.mark.cases(5)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("together", [False, True])
 @pytest.mark.parametrize(
     ("noise", "gain", "verdict", "counts"),

@@ -40,6 +40,7 @@ def accepted(pictures: FloatArray, *more: str) -> list[str]:
     return names
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("count", [1, 2, 4, MOST_KEPT, MOST_KEPT + 1, 2 * MOST_KEPT, 20])
 def test_the_files_that_it_was_made_from(count: int) -> None:
     names = accepted(noisy(count))
@@ -52,6 +53,7 @@ def test_the_files_that_it_was_made_from(count: int) -> None:
     assert '<span aria-hidden="true">=</span> unchanged' in Path("out/report.html").read_text()
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("chosen", [[3], [5, 2], [7, 6, 5, 4, 3, 2, 1, 0], [11, 0]])
 @pytest.mark.parametrize("count", [8, 12])
 def test_some_of_the_files_in_any_order(chosen: list[int], count: int) -> None:

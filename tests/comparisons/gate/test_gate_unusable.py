@@ -57,7 +57,7 @@ BAD = (
 )
 
 
-@pytest.mark.cases(13)
+@pytest.mark.cases(6)
 @pytest.mark.parametrize("name", BAD)
 @pytest.mark.parametrize("replicated", [False, True])
 def test_bad_pictures_have_their_message(right: FloatArray, name: str, replicated: bool) -> None:

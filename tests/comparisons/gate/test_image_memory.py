@@ -90,7 +90,7 @@ MEMORY = [
 sums: two more for what is freed between them but not given back."""
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="asks Linux for the most memory so far")
 @pytest.mark.parametrize(("place", "number", "name", "most"), MEMORY)
 def test_memory_of_textures_and_of_an_environment(tmp_path, place, number, name, most):

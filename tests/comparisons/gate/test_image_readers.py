@@ -186,7 +186,7 @@ def test_other_kinds_in_scenes(tmp_path, name):
         gate_of(tmp_path / name)
 
 
-@pytest.mark.cases(18)
+@pytest.mark.cases(8)
 @pytest.mark.parametrize("name", [*KINDS, *AS_TEXTURES])
 def test_damaged_files_in_every_place(tmp_path, name, capfd):
     """Truncated anywhere, or with bytes of others: one line of ours, or a picture; nothing printed

@@ -197,7 +197,7 @@ SAMPLED: tuple[Material, ...] = (
 )
 
 
-@pytest.mark.cases(6)
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("material", SAMPLED, ids=lambda m: m.type)
 def test_counterparts_draw_what_they_say(material: Material) -> None:
     """The mean of the weights of those that are written here is the integral of what they give."""

@@ -80,6 +80,7 @@ LAWS = (
 )
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(("one", "other"), LAWS)
 def test_laws_hold_of_the_counterpart(one: str, other: str) -> None:
     o, d = rays(3000)
@@ -156,6 +157,7 @@ def instanced_group(step: float = 1.0) -> Scene:
     return Scene.parse(GROUPS.replace("ROW", line("egg", 0)).replace("SHEET", line("row", 1)))
 
 
+@pytest.mark.slow
 def test_a_crowd_of_instances() -> None:
     scene = instanced_group()
     counterpart = load(scene)
@@ -175,6 +177,7 @@ def test_a_crowd_of_instances() -> None:
     )
 
 
+@pytest.mark.cases(2)
 @pytest.mark.usefixtures("coarse", "scalar")
 @pytest.mark.parametrize(
     "shapes",
@@ -207,7 +210,7 @@ def mapped(shape: str, mirrored: bool) -> str:
     return f"{shape[:-1]}, transform: [{steps}]}}"
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("operand", "mirrored"),
     [(MESH, k) for k in range(16)]

@@ -134,7 +134,7 @@ def agrees(scene: Scene, rays: int = 80) -> list[float]:
 # ---- shapes, maps, materials --------------------------------------------------------------------
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("placed", MAPS)
 @pytest.mark.parametrize("shape", SHAPES)
 def test_light_on_shapes_under_maps(shape: str, placed: str, image_folder: Path) -> None:
@@ -155,14 +155,14 @@ def test_light_on_shapes_under_maps(shape: str, placed: str, image_folder: Path)
     assert max(agrees(scene), default=0.0) < 1e-3
 
 
-@pytest.mark.cases(6)
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("around", AROUND)
 @pytest.mark.parametrize("material", MATERIALS)
 def test_every_material_under_a_bump(material: str, around: str, image_folder: Path) -> None:
     agrees(scene_of(image_folder, one("frustum", "sheared"), material, around, height=1))
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["frustum", "cone", "hyperboloid", "saddle"])
 def test_mitsubas_own_tangents_differ(
     name: str, image_folder: Path, monkeypatch: pytest.MonkeyPatch
@@ -185,7 +185,7 @@ WITH_UV = ("cylinder", "cone", "frustum", "torus", "ball", "paraboloid", "saddle
 """Shapes whose meshes have our uv, between vertices too."""
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("placed", MAPS)
 @pytest.mark.parametrize("name", WITH_UV)
 def test_uv_are_ours(name: str, placed: str, image_folder: Path) -> None:
@@ -256,7 +256,7 @@ def test_in_a_moved_frame(
     agrees(scene)
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("operation", ["difference", "intersection", "union"])
 def test_bumps_on_a_solid(operation: str, image_folder: Path) -> None:
     parts = f"{{{SHAPES['torus']}}}, {{{SHAPES['cone']}, transform: [{{scale: 0.8}}]}}"
@@ -286,7 +286,7 @@ def copies_of(shape: str, count: int) -> str:
     return "\n  - ".join(places) + f"\ngroups: {{g: [{one(shape)}]}}"
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["torus", "frustum", "saddle"])
 def test_copies_of_a_group(name: str, image_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Meshes, not instances, in which the place of a surface is not known: with fewer triangles

@@ -280,7 +280,7 @@ def test_lamps(name: str) -> None:
     assert agree(by_ours(scene), theirs, 0.03)
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["path", "direct"])
 @pytest.mark.parametrize("lamp", HIDDEN)
 def test_hidden_lamps(lamp: str, integrator: str) -> None:
@@ -423,13 +423,14 @@ def test_first_hits(operation: str, of: tuple[str, ...], map_: str) -> None:
         check_hits(solid(operation, of, map_), 4000)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(("operation", "of"), SOLIDS)
 def test_first_hits_in_the_scalar_variant(operation: str, of: tuple[str, ...]) -> None:
     with scalar(), coarse_meshes(64, 32):
         check_hits(solid(operation, of, MAPS[1]), 100)
 
 
-@pytest.mark.cases(5)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("material", ["coat", "glass", "grey", "silver", "glow"])
 @pytest.mark.parametrize("operation", ["union", "intersection", "difference"])
 def test_light_on_solids(operation: str, material: str) -> None:

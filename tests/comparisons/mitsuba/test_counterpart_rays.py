@@ -71,7 +71,7 @@ shapes:
 """  # noqa: E501
 
 
-@pytest.mark.cases(5)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("shear", [3e-15, 3.3e-15, 5e-15, 7e-15, 1e-10])
 @pytest.mark.parametrize("name", ROUND)
 def test_maps_that_are_nearly_similarities(name: str, shear: float) -> None:

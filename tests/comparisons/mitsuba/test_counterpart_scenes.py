@@ -116,7 +116,7 @@ def whole(image_folder: Path) -> dict[str, Scene]:
     return {name: Scene.parse(text, folder=image_folder) for name, text in WHOLE.items()}
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WHOLE)
 def test_light_in_whole_scenes(name: str, whole: dict[str, Scene]) -> None:
     scene = whole[name]
@@ -238,6 +238,7 @@ lights: [{type: point, position: [5, 3, 2], intensity: 9}]
 """
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("law", ["", "flip_invalid_normals: true, use_shadowing_function: true"])
 @pytest.mark.parametrize(
     ("image", "uv", "alpha"),
@@ -274,7 +275,7 @@ def test_bumps_that_mitsuba_gets_wrong(
     assert uv or "Mitsuba's [0. 0. 0.]" in own.reason
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("around", WRAPPERS)
 @pytest.mark.parametrize("coat", COATS)
 def test_plastics_with_colours_of_vertices(coat: str, around: str, image_folder: Path) -> None:

@@ -118,6 +118,7 @@ def slots() -> list[tuple[type[Material], str]]:
     ]
 
 
+@pytest.mark.cases(20)
 @pytest.mark.parametrize(("cls", "field"), slots())
 def test_every_texture_in_every_material(
     cls: type[Material], field: str, image_folder: Path

@@ -56,6 +56,7 @@ COATS = [
 ]
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("material", COATS)
 def test_the_note_of_a_coat_is_what_mitsuba_does(material):
     """Native material over twin, in the directions that the note is about."""
@@ -122,7 +123,7 @@ def test_documented_smooth_coats():
     assert base_error(2.4)[0] == pytest.approx(0.028, abs=5e-4)
 
 
-@pytest.mark.cases(6)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("distribution", ["ggx", "beckmann"])
 @pytest.mark.parametrize("cosine", [0.9, 0.4, -0.7, -0.9])
 def test_weights_of_rough_dielectrics(distribution, cosine):

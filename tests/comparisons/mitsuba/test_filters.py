@@ -39,7 +39,7 @@ def test_values(film_filter: AnyFilter) -> None:
     assert not ours[np.abs(x) > radius * 1.001].any()
 
 
-@pytest.mark.cases(5)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("film_filter", FILTERS, ids=str)
 def test_the_rung_of_the_film(film_filter: AnyFilter) -> None:
     rung = film(film_filter, film_filter)

@@ -132,7 +132,7 @@ def difference(scene: Scene) -> tuple[float, float]:
     return float(off[worst]), float(errors[worst])
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @FAST
 @pytest.mark.filterwarnings("ignore::reference_rt.util.errors.SceneWarning")
 @pytest.mark.parametrize("material", MATERIALS)
@@ -145,7 +145,7 @@ def test_the_exact_material_has_the_files_own_parameters(material: str, tmp_path
     assert error < 3e-3  # a twelfth of what a blend with a mirror is off
 
 
-@pytest.mark.cases(5)
+@pytest.mark.cases(2)
 @FAST
 @pytest.mark.parametrize("material", FAR_OFF)
 def test_mitsubas_own_differs(

@@ -171,6 +171,7 @@ def test_a_failure_keeps_the_older_files(folder):
         write_scene(scene, folder / "file" / "scene.yaml")
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("kind", ["file", "folder", "name of a file"])
 @pytest.mark.parametrize("converted", [False, True])
 def test_files_of_others_are_not_lost(folder, kind, converted):

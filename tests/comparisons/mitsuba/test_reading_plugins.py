@@ -54,7 +54,7 @@ def fast() -> None:
         pytest.skip("needs a variant of Mitsuba that takes many rays at once")
 
 
-@pytest.mark.cases(17)
+@pytest.mark.cases(9)
 @pytest.mark.parametrize("kind", ["sphere", "rectangle"])
 @pytest.mark.parametrize("name", BSDFS)
 def test_light_of_bsdfs_is_that_of_mitsuba(name, kind, images):
@@ -73,6 +73,7 @@ def test_light_of_bsdfs_is_that_of_mitsuba(name, kind, images):
     assert abs(found.mean()) * np.sqrt(found.size / 3) < MOST
 
 
+@pytest.mark.cases(8)
 @pytest.mark.parametrize("name", EMITTERS)
 def test_light_of_emitters_is_that_of_mitsuba(name, images):
     fast()

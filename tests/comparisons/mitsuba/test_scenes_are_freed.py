@@ -104,6 +104,7 @@ def test_files_of_users(tmp_path: Path) -> None:
     assert objects(mi) == before
 
 
+@pytest.mark.slow
 def test_what_stays_is_seen() -> None:
     mitsuba()
     with scalar() as mi:

@@ -78,7 +78,7 @@ LAMPS = {
 }
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("lamp", LAMPS)
 def test_edges_of_texels_on_lamps(lamp: str, tmp_path: Path) -> None:
     """float32 takes either texel; a shift by a tenth of a texel elsewhere is found."""
@@ -137,6 +137,7 @@ IN_ONE_PLACE = {
 }
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("which", IN_ONE_PLACE)
 def test_surfaces_in_one_place(which: str) -> None:
     """Of which each renderer may report another one, or another side."""
@@ -202,6 +203,7 @@ LEVEL = {
 }
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("name", LEVEL)
 def test_rays_in_the_plane_in_which_they_begin(name: str) -> None:
     """Mitsuba's scalar variants let them hit that plane; ours goes on to what lies beyond."""

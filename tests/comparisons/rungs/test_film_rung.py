@@ -37,7 +37,7 @@ RINGING = ("mitchell", "catmull_rom", "lanczos", "long lanczos")
 """Filters with negative values."""
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", FILTERS)
 def test_filters_agree_with_themselves(name: str) -> None:
     found = film(FILTERS[name], FILTERS[name])
@@ -45,7 +45,7 @@ def test_filters_agree_with_themselves(name: str) -> None:
     assert 0.0 < found.numbers["max_error_over_bound"] < 1.0
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", FILTERS)
 def test_points_of_another_filter_differ(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The filter's function is right, its points are a fiftieth too far out."""
@@ -59,6 +59,7 @@ def test_points_of_another_filter_differ(name: str, monkeypatch: pytest.MonkeyPa
     assert "points that we draw" in found.reason
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", RINGING)
 def test_points_without_their_signs_differ(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(RUNG, "film_offset", lambda setup, u: (film_offset(setup, u)[0], 1.0))
@@ -81,7 +82,7 @@ def blurred(x: Any) -> Any:
     return 0.8 * x + 0.1 * (np.roll(x, 1, axis=1) + np.roll(x, -1, axis=1))
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("layer", ["colour", "albedo", "normal"])
 @pytest.mark.parametrize("name", ["tent", "lanczos"])
 @pytest.mark.parametrize(

@@ -66,7 +66,7 @@ def gaussian(rng: np.random.Generator, picture: FloatArray, count: int) -> Float
     return picture * (1.0 + 0.1 * rng.normal(size=(count, *picture.shape)))
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("noise", [gaussian, skewed, shared])
 @pytest.mark.parametrize("counts", [(2, 2), (4, 4), (5, 16), (16, 16)])
 def test_noise_alone_agrees(picture, noise, counts) -> None:
@@ -102,6 +102,7 @@ def test_a_lamp_that_few_samples_met_agrees(size: int, met: int, side: int) -> N
         assert result.status == "agree", result.reason
 
 
+@pytest.mark.slow
 def test_what_noise_gives_is_what_is_found(picture: FloatArray) -> None:
     """The expectation, given the noise, is that of new pictures: within its own scatter."""
     rng = np.random.default_rng(2)
@@ -136,7 +137,7 @@ def test_faults_are_seen(picture: FloatArray, fault: str) -> None:
     assert judged(candidate, reference).status == "differ"
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", GATES)
 def test_each_metric_has_a_threshold_that_some_fault_passes(picture, name) -> None:
     clean, noisy = (

@@ -124,7 +124,7 @@ def test_replicates_that_are_the_same() -> None:
     assert input_rung(same, picture()).status == "invalid"
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("background", [0.0, 1.0])
 @pytest.mark.parametrize("pixels", [1, 2, 4, 8, 64, 512])
 def test_pictures_with_few_noisy_pixels(pixels: int, background: float) -> None:

@@ -119,7 +119,7 @@ FAULTS: dict[str, tuple[str, Callable[[Any], Any]]] = {
 }  # fmt: skip
 
 
-@pytest.mark.cases(5)
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("fault", FAULTS)
 def test_faults_are_found_and_named(
     scene: Scene, tables: Any, counterpart: Any, fault: str, monkeypatch: pytest.MonkeyPatch
@@ -155,7 +155,7 @@ def test_ray_casting(
     assert fault is None or CAST_FAULTS[fault][0] in found.reason
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["display_modes", "mesh_colours", "transforms", "csg_nested"])
 def test_scenes_of_ray_casting_agree(name: str) -> None:
     scene = Scene.load(SCENES / f"{name}.yaml")

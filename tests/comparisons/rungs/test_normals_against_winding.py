@@ -55,7 +55,7 @@ MATERIALS = {
 UV = "uv: [[0.98, 1.7], [1.5, 1.2], [1.25, 1.4], [0, 0.6], [0.1, 0.9], [1.95, 0.5]]"
 
 
-@pytest.mark.cases(6)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("y", [0.8, -0.8])
 @pytest.mark.parametrize("uv", ["", UV], ids=["without uv", "with uv"])
 @pytest.mark.parametrize("faces", FACES)

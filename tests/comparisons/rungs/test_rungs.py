@@ -63,6 +63,7 @@ def scene() -> Scene:
     return Scene.parse(SCENE)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("rung", [geometry, direct, whitted])
 def test_the_same_scene_agrees(
     rung: Rung, scene: Scene, tables: SceneTables, counterpart: Any
@@ -150,6 +151,7 @@ def test_rungs_that_a_scene_does_not_have(scene: Scene) -> None:
         assert (result.status, result.reason) == ("not-applicable", "the scene has no light")
 
 
+@pytest.mark.slow
 def test_coincident_surfaces_are_explained() -> None:
     text = """
 camera: {type: perspective, eye: [1, 2, -6]}

@@ -34,7 +34,7 @@ CEILINGS = {
 }
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("light", ["point, position", "spot, cutoff_angle: 80, target: {}, origin"])
 @pytest.mark.parametrize("ceiling", CEILINGS)
 def test_lamps_on_a_ceiling(ceiling: str, light: str) -> None:

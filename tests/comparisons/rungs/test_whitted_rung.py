@@ -51,7 +51,7 @@ def test_every_material_that_can_be_nested_is_there(scene: Scene) -> None:
     assert {*MATERIALS, "lamp"} == set(scene.materials)
 
 
-@pytest.mark.cases(7)
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("wrapper", ["mask", "blend"])
 @pytest.mark.parametrize("name", MATERIALS)
 def test_what_lies_behind_is_seen_through_it(scene: Scene, name: str, wrapper: str) -> None:
@@ -77,7 +77,7 @@ def test_what_lies_behind_is_seen_through_it(scene: Scene, name: str, wrapper: s
 OPAQUE = ("silver", "gold", "grey", "floor", "brushed", "cast", "coat", "dull", "dents", "tiles")
 
 
-@pytest.mark.cases(8)
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("back", OPAQUE)
 @pytest.mark.parametrize("front", ["silver", "floor", "dull", "mirrors"])
 def test_the_back_of_two_sides(scene: Scene, front: str, back: str) -> None:
@@ -122,6 +122,7 @@ LIGHTS = {
 }
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("light", LIGHTS)
 def test_projected_images(light: str, tmp_path: Path) -> None:
     """Whose slopes amplify the error of a point, though the materials are flat."""
@@ -166,7 +167,7 @@ lights: [{{type: point, position: [1, -3, 4], intensity: 3}}]
 """
 
 
-@pytest.mark.cases(5)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("how", MAPS)
 @pytest.mark.parametrize("lamp", LAMPS)
 def test_lamps_of_every_shape(lamp: str, how: str) -> None:
@@ -192,7 +193,7 @@ lights: [{{type: point, position: [1, -3, 4], intensity: 3}}]
 """
 
 
-@pytest.mark.cases(7)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("height", [0.03, 0.1, 0.3])
 @pytest.mark.parametrize("lamp", ["sphere", "disk", "rectangle", "box", "triangle"])
 def test_lamps_low_above_the_ground(lamp: str, height: float) -> None:

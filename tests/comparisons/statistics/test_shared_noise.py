@@ -33,7 +33,7 @@ def wrong_rungs(name: str, seed: int, counts: tuple[int, int], same: bool, side:
     return [f"{r.name}: {r.reason}" for r in rungs if r.status in ("differ", "invalid")]
 
 
-@pytest.mark.cases(7)
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("same", [False, True], ids=["independent reference", "its own kind"])
 @pytest.mark.parametrize("name", RENDERERS)
 def test_pixels_may_share_random_numbers(name: str, same: bool) -> None:

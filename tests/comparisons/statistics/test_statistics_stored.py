@@ -39,7 +39,7 @@ def pictures(rng, mean, noise, count):
     return mean * (1.0 + noise * rng.standard_normal((count, *mean.shape)))
 
 
-@pytest.mark.cases(13)
+@pytest.mark.cases(5)
 @pytest.mark.parametrize("counts", [(1, 16), (2, 2), (4, 16), (16, 16)])
 @pytest.mark.parametrize("noise", [0.0, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3])
 @pytest.mark.parametrize("stored", STORED)

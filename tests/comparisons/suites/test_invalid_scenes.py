@@ -131,6 +131,7 @@ def test_a_suite_runs_the_other_scenes(tmp_path, folder, program):
     assert "a: agree (done before)" in result.stderr
 
 
+@pytest.mark.slow
 def test_so_does_compare(tmp_path, folder, program):
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "a.yaml").write_text(RAY_CAST)
@@ -169,11 +170,13 @@ def test_the_command_line_changes_each_scene(tmp_path, program):
     assert program(*common, "--spp", 0).exit_code == 2
 
 
+@pytest.mark.slow
 def test_where_a_case_could_not_run_as_well_that_counts(tmp_path):
     folder = scenes(tmp_path / "scenes", "a", "raise", "scene_error")
     assert exit_code(run_in(tmp_path / "out", folder).cases) == 4
 
 
+@pytest.mark.slow
 def test_warnings_about_a_scene_are_reported_with_its_case(tmp_path, program):
     """The worker that reads the scene has no terminal."""
     folder = scenes(tmp_path / "scenes", "warn")

@@ -182,6 +182,7 @@ def test_an_old_results_file_is_read(tmp_path, program):
     assert processes(run_in(out, folder)) == processes(first)
 
 
+@pytest.mark.slow
 def test_a_page_of_no_case_at_all(tmp_path, program):
     """Of a run that was killed before its first case."""
     folder, out = scenes(tmp_path / "scenes", "unavailable"), tmp_path / "out"

@@ -258,6 +258,7 @@ def write_trees(_folder, file):
     np.savez(file, **trees())
 
 
+@pytest.mark.slow
 def test_plain_python_makes_the_same_bits(tmp_path):
     assert len(same_in_plain_python(write_trees, tmp_path).files) == 5 * len(METHODS) * 4
 

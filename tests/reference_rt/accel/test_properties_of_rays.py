@@ -101,6 +101,7 @@ def assert_same(one, two, factor=1.0, names=("shape", "primitive", "part", "inst
         assert np.array_equal(getattr(one, name), getattr(two, name)), name
 
 
+@pytest.mark.slow
 @few
 @given(seeds, st.integers(-150, 150))
 def test_a_power_of_two_larger(seed, k):

@@ -206,6 +206,7 @@ SCENES = {
 }  # fmt: skip
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("name", SCENES)
 def test_scenes(name):
     scene = rt.Scene(shapes=tuple(SCENES[name]))
@@ -319,6 +320,7 @@ def test_rays_that_do_not_belong():
     same_by_every_way(scene, o, d, methods=TREES)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("ratio", [0.5, 0.9])
 def test_deep_trees(ratio):
     """Each sphere is a share of the one before: the trees are as deep as trees become."""
@@ -352,6 +354,7 @@ def test_one_primitive_and_bounds_that_touch_infinity():
 # ---- beneath the law ----------------------------------------------------------------------------
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", ["two kinds", "spheres", "three kinds"])
 def test_brute_force_of_specialised_kernels(name):
     """Rays side by side against one shape, and one ray against shapes side by side."""

@@ -76,6 +76,7 @@ def seen(camera, integrator, depths):
     return rt.render(scene).layers
 
 
+@pytest.mark.cases(12)
 @pytest.mark.parametrize("integrator", INTEGRATORS.values(), ids=INTEGRATORS)
 @pytest.mark.parametrize("camera", CAMERAS.values(), ids=CAMERAS)
 def test_only_what_lies_between_the_planes_is_seen(camera, integrator):

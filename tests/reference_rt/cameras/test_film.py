@@ -185,7 +185,7 @@ def test_weights_are_even_but_for_the_sign(description):
     assert np.allclose(np.abs(drawn[large, 1]), size, rtol=0.08)
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     "description",
     [EVERY[0], EVERY[1], EVERY[3], rt.MitchellFilter(), rt.CatmullRomFilter(), rt.LanczosFilter()],

@@ -110,6 +110,7 @@ def test_whitted_on_a_grid():
     assert "ambient light" in used
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", ["display_modes", "instances", "many_lights", "textured_room"])
 def test_command(name):
     """Everything lands on standard output, whatever the width of the terminal."""

@@ -48,7 +48,7 @@ def test_a_reader_that_has_gone(arguments):
     assert done.returncode == 1
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "code"),
     [(["explain", "no.yaml"], 3), (["render", "no.yaml", "-o", "a.txt"], 2), (EXPLAIN, 3)],

@@ -63,7 +63,7 @@ def test_concentric_spheres(max_depth, seen, spp, power):
     assert_mean(scene, RADIANCE * left[0 if seen == "inside" else 1], power)
 
 
-@pytest.mark.cases(5)
+@pytest.mark.cases(2)
 @budgets
 @pytest.mark.parametrize("max_depth", [2, 3, 4, None])
 @pytest.mark.parametrize("seen", ["upper", "lower"])
@@ -89,6 +89,7 @@ def test_parallel_planes(max_depth, seen, spp, power):
     assert_mean(scene, RADIANCE * left[0 if seen == "lower" else 1], power)
 
 
+@pytest.mark.cases(2)
 @budgets
 @pytest.mark.parametrize("max_depth", [2, 3, 4, None])
 def test_inside_a_sphere(max_depth, spp, power):
@@ -118,6 +119,7 @@ def test_inside_a_sphere(max_depth, spp, power):
     assert_mean(scene, own * intensity / (math.pi * R**2) * series, power)
 
 
+@pytest.mark.cases(2)
 @budgets
 @pytest.mark.parametrize("max_depth", [2, 3, 4, None])
 def test_inside_a_sphere_off_its_middle(max_depth, spp, power):

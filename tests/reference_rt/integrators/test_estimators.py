@@ -232,6 +232,7 @@ def many_lamps():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("times", "power"), BUDGETS)
 def test_the_light_tree(times, power):
     """What the tree picks, and what scattered rays meet without it."""

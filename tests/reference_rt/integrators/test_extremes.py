@@ -53,7 +53,7 @@ def test_brightness_is_a_factor(factor):
 DISTANCES = 10.0 ** np.arange(-9, 10, 3)
 
 
-@pytest.mark.cases(16)
+@pytest.mark.cases(6)
 @pytest.mark.parametrize("distance", DISTANCES)
 @pytest.mark.parametrize("intensity", [1e-30, 1.0, 1e30])
 def test_point_and_spot_at_any_distance(distance, intensity):
@@ -101,7 +101,7 @@ def lamp_of(kind, size, height):
     return rt.Triangle(v0=v[0], v1=v[1], v2=v[2], material="lamp"), irradiance
 
 
-@pytest.mark.cases(18)
+@pytest.mark.cases(6)
 @pytest.mark.parametrize("kind", ["disk", "sphere", "rectangle", "triangle"])
 @pytest.mark.parametrize("size", SIZES)
 def test_lamps_of_any_area(kind, size):

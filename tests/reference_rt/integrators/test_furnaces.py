@@ -42,7 +42,7 @@ def test_closed_furnace_with_roulette(albedo, rr_depth, spp, power):
     assert_mean(scene, 1 / (1 - np.array(albedo)), power)
 
 
-@pytest.mark.cases(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("sampling", SAMPLING)
 @pytest.mark.parametrize("albedo", [0.5, pytest.param(0.9, marks=pytest.mark.slow)])
 def test_closed_furnace_by_each_way_of_sampling(albedo, sampling):
@@ -50,6 +50,7 @@ def test_closed_furnace_by_each_way_of_sampling(albedo, sampling):
     assert_mean(scene, 1 / (1 - albedo), power=7e-3)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("albedo", "depth"),
     [(0.5, 60), (0.99, 700), pytest.param(0.999, 7000, marks=pytest.mark.slow)],
@@ -61,7 +62,7 @@ def test_closed_furnace_without_roulette(albedo, depth):
     assert_mean(scene, (1 - albedo**depth) / (1 - albedo), power=5e-3)
 
 
-@pytest.mark.cases(6)
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("depth", range(7))
 def test_max_depth_counts_edges(depth):
     """By scattered rays alone every path brings the same, and `max_depth` is the number of
@@ -127,6 +128,7 @@ def body(material, environment, seed=4, spp=64, **path):
     )
 
 
+@pytest.mark.cases(5)
 @pytest.mark.parametrize("name", LOSSLESS)
 def test_lossless_bodies_vanish(name, sky):
     """Without roulette path by path; a conductor with eta = 1e-9 absorbs 4 eta / (eta² + k² + 1) of
@@ -137,6 +139,7 @@ def test_lossless_bodies_vanish(name, sky):
     assert np.allclose(rt.render(scene).colour, SKY, rtol=loss, atol=0)
 
 
+@pytest.mark.cases(5)
 @pytest.mark.parametrize("name", LOSSLESS)
 def test_roulette_leaves_them_invisible(name, sky):
     scene = body(LOSSLESS[name], sky, rr_depth=1)
@@ -166,7 +169,7 @@ ROUGH = {
 }
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", ROUGH)
 @pytest.mark.parametrize("roulette", [1, 4096])
 def test_rough_bodies_never_shine(name, roulette, sky):

@@ -47,6 +47,7 @@ def scene(lamps, integrator, hidden, lights=(), radiance=(3.0, 2.0, 1.0)):
     )
 
 
+@pytest.mark.cases(8)
 @pytest.mark.parametrize("integrator", INTEGRATORS.values(), ids=INTEGRATORS)
 @pytest.mark.parametrize("lamp", LAMPS.values(), ids=LAMPS)
 def test_what_is_behind_a_lamp_is_seen(lamp, integrator):

@@ -71,6 +71,7 @@ def test_an_operation_that_is_not_linked_stops_the_process(case):
     assert done.stdout == "before\n"
 
 
+@pytest.mark.slow
 def test_a_type_without_the_kernel_needs_no_link():
     done = process_that_calls("a type without the kernel")
     assert (done.returncode, done.stdout) == (0, "before\nafter\n")

@@ -43,7 +43,8 @@ _NODES = tuple(0.5 * x + (0.5, 0.0)[k] for k, x in enumerate(np.polynomial.legen
 def _draw(kind, alpha, v, u, out):
     m = Microfacets(kind, alpha[0], alpha[1])
     for i in range(len(u)):
-        out[i] = sample_visible(m, Vec3(v[0], v[1], v[2]), u[i, 0], u[i, 1])
+        n = sample_visible(m, Vec3(v[0], v[1], v[2]), u[i, 0], u[i, 1])
+        out[i, 0], out[i, 1], out[i, 2] = n
 
 
 @entry_kernel
@@ -52,7 +53,7 @@ def _densities(kind, alpha, v, h, out):
     towards = Vec3(v[0], v[1], v[2])
     for i in range(len(h)):
         normal = Vec3(h[i, 0], h[i, 1], h[i, 2])
-        out[i] = density(m, normal), visible_density(m, towards, normal)
+        out[i, 0], out[i, 1] = density(m, normal), visible_density(m, towards, normal)
 
 
 @entry_kernel
@@ -60,7 +61,7 @@ def _maskings(kind, alpha, v, out):
     m = Microfacets(kind, alpha[0], alpha[1])
     for i in range(len(v)):
         towards = Vec3(v[i, 0], v[i, 1], v[i, 2])
-        out[i] = g1(m, towards), g1_over_cos(m, towards)
+        out[i, 0], out[i, 1] = g1(m, towards), g1_over_cos(m, towards)
 
 
 def draw(m, v, u):

@@ -150,6 +150,7 @@ def test_plain_python_knows_no_difference(tmp_path):
         assert others == [first, first]
 
 
+@pytest.mark.slow
 @needs_jit
 def test_specialised_kernels_are_used_where_they_are_compiled(monkeypatch):
     scene = small("cornell_box")

@@ -53,7 +53,7 @@ def described(calls):
     return {(kernel.py_func.__code__.co_filename, kernel.__name__, str(s)) for kernel, s in calls}
 
 
-@pytest.mark.cases(9)
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_every_scene(file, known):
     """Its queries, and its pictures by its own integrator and by all others that may render it."""

@@ -95,7 +95,7 @@ def test_independent_samples_fall_as_the_root(name):
     assert slope(errors) == pytest.approx(-0.5, abs=0.05)
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_pixels_of_a_picture(name):
     """Of a view of the floor, over eight seeds.  What depends on the place in the pixel and on the

@@ -195,6 +195,7 @@ def write_crossings(_folder, file):
     np.savez(file, **{name: getattr(found, name) for name in (*FIELDS, "first")})
 
 
+@pytest.mark.slow
 def test_plain_python_gives_the_same_bits(tmp_path):
     compiled = same_in_plain_python(write_crossings, tmp_path)
     assert len(compiled["t"]) > 40

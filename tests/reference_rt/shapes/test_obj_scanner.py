@@ -67,6 +67,7 @@ def assert_same(found, expected):
             assert ours.dtype == theirs.dtype
 
 
+@pytest.mark.cases(6)
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 @pytest.mark.parametrize("form", ["v", "v/t", "v//n", "v/t/n", "v/t/nc", "vc"])
 def test_the_same_mesh(form, end):

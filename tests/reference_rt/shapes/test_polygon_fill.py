@@ -71,6 +71,7 @@ def test_duplicates_and_spikes_change_nothing():
     assert np.array_equal(seen_from_above(plain, points), seen_from_above(odd, points))
 
 
+@pytest.mark.slow
 def test_many_points():
     """1e5 corners: a disk to within their sagitta."""
     shape = rt.Polygon(rings=(regular(100_000),))

@@ -63,7 +63,7 @@ def test_hits_of_many(name, distance):
     hits_of(name, distance, 2000)
 
 
-@pytest.mark.cases(10)
+@pytest.mark.cases(4)
 @pytest.mark.parametrize(
     "sizes", [(1e3, 1.0, 1e-3), (1e3, 1e3, 1e-3), (1e3, 1e-3, 1e-3), (1e-3, 1e-3, 1e3)]
 )
@@ -229,7 +229,7 @@ def leave_of(name, spread, n):
     assert hits > least_hits(name, n)
 
 
-@pytest.mark.cases(8)
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("name", WELL_CONDITIONED)
 @pytest.mark.parametrize("spread", [0.3, 3.0])
 def test_leaving(name, spread):

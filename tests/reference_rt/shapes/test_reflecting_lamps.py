@@ -174,6 +174,7 @@ def test_means_are_those_of_scattered_rays_alone(tmp_path, seed):
     assert both.colour.mean() > 0.1
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("seed", range(4))
 def test_a_lamp_in_the_plane_of_a_floor_does_not_light_it(tmp_path, seed):
     """Of two surfaces in one plane rounding decides which is met; neither sees the other.

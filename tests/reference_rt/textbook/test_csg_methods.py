@@ -216,6 +216,7 @@ def test_many_random_trees(depth, mesh):
     assert check_random_trees(depth, range(100, 150), mesh) > 0.05 * N
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_operand(kind, mesh):
     """A tree of one, and no tree at all."""
@@ -240,7 +241,7 @@ def test_from_inside_of_the_solid(mesh):
 # ---- laws ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 def test_nothing_is_left_of_a_solid_without_itself(way, mesh):
     rng = np.random.default_rng(2)
@@ -251,7 +252,7 @@ def test_nothing_is_left_of_a_solid_without_itself(way, mesh):
             assert np.isinf(textbook.intersect(way, textbook.CsgParameters(empty), o, d)).all()
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 def test_de_morgan(way, mesh):
     rng = np.random.default_rng(3)

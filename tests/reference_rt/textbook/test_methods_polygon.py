@@ -68,6 +68,7 @@ INSIDE = {
 }
 
 
+@pytest.mark.cases(12)
 @pytest.mark.parametrize("frame", FRAMES)
 @pytest.mark.parametrize("figure", FIGURES)
 def test_polygon_is_exact(figure, frame):
