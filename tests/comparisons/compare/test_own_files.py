@@ -130,6 +130,7 @@ MIRRORED = """<scene version="3.0.0">
 """
 
 
+@pytest.mark.slow
 def test_a_camera_that_mirrors_sees_the_mirrored_scene(tmp_path):
     sky = np.random.default_rng(0).integers(0, 255, (4, 8, 3), dtype=np.uint8)
     Image.fromarray(sky).save(tmp_path / "sky.png")

@@ -26,7 +26,7 @@ def valid(data, files):
     return True
 
 
-@pytest.mark.cases(5)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("wanted", ["torus", "mesh", "difference", "instance", "bump", "emissive"])
 def test_what_fails_by_a_type_is_reduced_to_that_type(files, wanted):
     def fails(data):
@@ -105,6 +105,7 @@ def test_unused_parts_go():
     assert "lights" not in found
 
 
+@pytest.mark.slow
 def test_plain_scenes_have_no_textures(files):
     for number in range(8):
         scene = generate(4, number, Grammar(("textures", "bump", "principled")), files)

@@ -59,13 +59,13 @@ SMOKE = [
     ("F11", "grazing", 1e12, 150),
     ("F12", "flat lights", 1e20, 150),
     ("F13", "shells", 1e13, 80),
-    ("F14", "bands", 7.0, 1),
+    pytest.param("F14", "bands", 7.0, 1, marks=pytest.mark.slow),  # compiles for 15 s
 ]
 """One setting of each family, and of each kind of kernels; F6 is run in `test_stability_hostile`,
 F10's renderings take long."""
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(8)
 @pytest.mark.parametrize(("name", "series", "x", "cases"), SMOKE)
 def test_ours_holds(name, series, x, cases, tmp_path):
     found = measured(name, series, x, tmp_path, cases)[OURS]

@@ -59,6 +59,7 @@ def test_a_surface_that_is_met_again_is_seen(tmp_path):
         assert planted(kind, again, tmp_path).why == {"met again": 3}
 
 
+@pytest.mark.slow
 def test_a_far_wall_that_is_lost_is_seen(tmp_path):
     def lost(found, outer):
         found.again[np.flatnonzero(~outer)[:3]] = np.inf
@@ -68,6 +69,7 @@ def test_a_far_wall_that_is_lost_is_seen(tmp_path):
         assert planted(kind, lost, tmp_path).why == {"lost": 3}
 
 
+@pytest.mark.slow
 def test_an_offset_that_is_too_large_is_seen(tmp_path):
     def far(found, _):
         found.start[:3] += found.n[:3] * 1e-6
@@ -76,6 +78,7 @@ def test_an_offset_that_is_too_large_is_seen(tmp_path):
     assert planted("sphere", far, tmp_path).why == {"begins too far off": 3}
 
 
+@pytest.mark.slow
 def test_a_shape_that_is_not_met_is_seen(tmp_path):
     def missed(found, _):
         found.t[:3] = np.inf
@@ -84,6 +87,7 @@ def test_a_shape_that_is_not_met_is_seen(tmp_path):
     assert planted("sphere", missed, tmp_path).why == {"the shape is not met": 3}
 
 
+@pytest.mark.slow
 def test_a_start_on_the_wrong_side_is_seen_by_exact_arithmetic(tmp_path):
     """The tracer itself says nothing is wrong: the sample is asked about."""
 

@@ -84,6 +84,7 @@ def _parts(mesh):
     return mesh.vertices, mesh.faces
 
 
+@pytest.mark.slow
 def test_text_book_methods_leak():
     """At edges, where neighbours do not compute the same; the watertight one does not."""
     rng = np.random.default_rng(3)

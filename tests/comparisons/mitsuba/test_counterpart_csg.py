@@ -177,7 +177,7 @@ def test_a_crowd_of_instances() -> None:
     )
 
 
-@pytest.mark.cases(2)
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse", "scalar")
 @pytest.mark.parametrize(
     "shapes",
@@ -210,7 +210,7 @@ def mapped(shape: str, mirrored: bool) -> str:
     return f"{shape[:-1]}, transform: [{steps}]}}"
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("operand", "mirrored"),
     [(MESH, k) for k in range(16)]

@@ -134,7 +134,7 @@ def agrees(scene: Scene, rays: int = 80) -> list[float]:
 # ---- shapes, maps, materials --------------------------------------------------------------------
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("placed", MAPS)
 @pytest.mark.parametrize("shape", SHAPES)
 def test_light_on_shapes_under_maps(shape: str, placed: str, image_folder: Path) -> None:
@@ -185,7 +185,7 @@ WITH_UV = ("cylinder", "cone", "frustum", "torus", "ball", "paraboloid", "saddle
 """Shapes whose meshes have our uv, between vertices too."""
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("placed", MAPS)
 @pytest.mark.parametrize("name", WITH_UV)
 def test_uv_are_ours(name: str, placed: str, image_folder: Path) -> None:

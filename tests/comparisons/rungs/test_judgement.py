@@ -78,6 +78,7 @@ def test_a_fault_of_ours_is_ours(scene: Scene, right: str, wrong: str) -> None:
     assert rung.numbers["mitsuba_wrong"]
 
 
+@pytest.mark.slow
 def test_answers_that_are_made_up_are_seen_through(scene: Scene) -> None:
     sizes = ShapeSizes(scene)
     tables = build_tables(scene)

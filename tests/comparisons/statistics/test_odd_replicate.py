@@ -79,8 +79,11 @@ def test_too_little_to_tell() -> None:
 ALL = {**LAWS, **RENDERERS}
 
 
-@pytest.mark.cases(7)
-@pytest.mark.parametrize("name", ALL)
+DEAR = ("photon map, radius 20", "64 point lights")
+QUICK = [pytest.param(x, marks=pytest.mark.slow) if x in DEAR else x for x in ALL]
+
+
+@pytest.mark.parametrize("name", QUICK)
 def test_no_right_replicate_is_odd(name: str) -> None:
     """Heavy tails, and noise that pixels share."""
     for count in (6, 8, 16):

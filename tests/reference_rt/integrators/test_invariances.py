@@ -111,6 +111,7 @@ def test_all_light_times_a_power_of_two(scene, plain, k):
     assert np.array_equal(rt.render(other.changed(**WHITTED)).colour, factor * whitted)
 
 
+@pytest.mark.slow
 def test_nine_lights_in_one_place():
     """Picked by a tree, they are one of nine times the intensity: k_d I cos / r² without noise."""
     light = rt.Point(position=(1, 2, 2), intensity=(9, 18, 36))

@@ -204,7 +204,7 @@ def test_a_guide_finds_the_cell_that_a_search_of_the_whole_row_finds(width):
             assert distribution.blended_cell_of(sums, k, s, x, low, high) == whole
 
 
-@pytest.mark.parametrize("height", [2, 3, 5, 64, 4096])
+@pytest.mark.parametrize("height", [2, 3, 5, 64, pytest.param(4096, marks=pytest.mark.slow)])
 def test_the_place_in_a_row_of_cells_inverts_its_integral(height):
     """To 2^-31 of a cell: at the poles, beside black rows, for the largest and smallest numbers."""
     rng = np.random.default_rng(426)

@@ -95,6 +95,7 @@ def scene():
     return small("cornell_box")
 
 
+@pytest.mark.slow
 @forks
 def test_specialised_kernels_take_over_between_tiles(scene, monkeypatch):
     expected = render(scene, specialised=False)

@@ -98,6 +98,7 @@ def test_rays_find_what_they_find_in_plain_python(tmp_path):
     assert (compiled["1 solid.count"] > 0).any()
 
 
+@pytest.mark.slow
 def test_few_rays_of_every_kind_find_what_many_find(tmp_path):
     scene, rng = everything(tmp_path), np.random.default_rng(5)
     o = 6.0 * unit_vectors(rng, 200)
