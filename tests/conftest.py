@@ -32,7 +32,6 @@ LONGEST_FIRST = (
     "test_reading_plugins",
     "test_rungs",
     "test_stability_metamorphic",
-
     "test_film_layers",
     "test_properties_of_rays",
     "test_gate",
