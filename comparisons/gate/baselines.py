@@ -10,7 +10,6 @@ import json
 import os
 import re
 import shlex
-import tempfile
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -30,7 +29,7 @@ from reference_rt.core.exr import write_exr
 from reference_rt.core.model import Description
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ImageError, SceneError, UsageError
-from reference_rt.util.files import check_writable, read_input, read_text
+from reference_rt.util.files import check_writable, read_input, read_text, temporary_folder
 
 RECORD = "baseline.json"
 
@@ -189,8 +188,8 @@ def accept(
     kept = {f"picture-{k:02d}.exr": group.mean(axis=0) for k, group in enumerate(groups)}
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".accepting-") as temporary:
-            new = Path(temporary) / "new"
+        with temporary_folder(folder) as temporary:
+            new = temporary / "new"
             for file, picture in kept.items():
                 planes = dict(zip("RGB", np.moveaxis(picture, -1, 0), strict=True))
                 write_exr(new / file, planes, {})
@@ -212,7 +211,7 @@ def accept(
             )
             (new / RECORD).write_text(_sealed(record), encoding="utf-8", newline="\n")
             if (folder / name).exists():
-                (folder / name).rename(Path(temporary) / "old")
+                (folder / name).rename(temporary / "old")
             new.rename(folder / name)
     except OSError as error:
         raise ImageError(

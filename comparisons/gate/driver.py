@@ -1,13 +1,14 @@
 """Runs another renderer's command line, once per replicate, or once for several."""
 
+import json
 import os
 import re
+import select
 import shlex
 import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -16,14 +17,17 @@ from pathlib import Path
 
 from comparisons.gate.errors import RendererError
 from comparisons.gate.pictures_in import Picture, read_candidate
-from reference_rt.util.child_processes import tied
 from reference_rt.util.errors import ImageError, UsageError
+from reference_rt.util.files import temporary_folder
 
 PLACEHOLDERS = ("scene", "output", "seed", "seeds", "spp", "width", "height")
 
 _BRACES = re.compile(r"\{([A-Za-z_]*)\}")
 
 _PICTURES = (".exr", ".png", ".pfm", ".hdr", ".npy", ".jpg", ".jpeg", ".ppm", ".tif", ".tiff")
+
+LOG = "renderer.log"
+"""The file beside the pictures for what a renderer that failed printed, at most 10 MB."""
 
 _LAST_LINES = 5
 """Lines of a failed renderer's output that a message quotes."""
@@ -101,6 +105,7 @@ class Driver:
         self.seconds = 0.0
         """Wall clock of all starts."""
         with suppress(OSError):
+            (keep / LOG).unlink(missing_ok=True)
             for old in keep.glob("candidate-*"):
                 old.unlink()
 
@@ -125,8 +130,8 @@ class Driver:
         number = f"candidate {first}" if last == first else f"candidates {first} to {last}"
         self._say(f"{number}, {which}")
         suffix = self._command.suffix
-        with tempfile.TemporaryDirectory(prefix="candidate-", ignore_cleanup_errors=True) as name:
-            folder = Path(name) / "output"
+        with temporary_folder() as place:
+            folder = place / "output"
             folder.mkdir()
             if self._command.together:
                 pattern = folder / f"candidate-%d{suffix}"
@@ -137,10 +142,15 @@ class Driver:
             before = _pictures_here()
             arguments = self._command.arguments(pattern, *seeds)
             begun = time.perf_counter()
-            _run(arguments, Path(name) / "said", self._command.seconds * len(seeds), which)
-            self.seconds += time.perf_counter() - begun
-            for output in outputs:
-                _check_written(output, before, which)
+            try:
+                _run(arguments, place / "said", self._command.seconds * len(seeds), which)
+                for output in outputs:
+                    _check_written(output, before, which)
+            except RendererError:
+                self._keep_log(place / "said")
+                raise
+            finally:
+                self.seconds += time.perf_counter() - begun
             kept = [self._kept(output) for output in outputs]
         return [read_candidate(path) for path in kept]
 
@@ -155,41 +165,50 @@ class Driver:
         self.made.append(kept)
         return kept
 
+    def _keep_log(self, said: Path) -> None:
+        """Keep what a renderer that failed printed."""
+        with suppress(OSError):
+            self._keep.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(said, self._keep / LOG)
+
 
 def _named(seeds: range) -> str:
     return f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"
 
 
 def _run(arguments: list[str], said: Path, seconds: float, which: str) -> None:
-    """Run the renderer; after the time limit, kill it and all its children."""
-    with said.open("wb") as log:
-        try:
-            # A session of its own, so that its children can be killed with it; a file instead of
-            # a pipe, which a surviving child would keep open.
-            process = subprocess.Popen(
-                arguments,
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-                **tied(),
-            )
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or str(error)
-            raise RendererError(f"{arguments[0]}: cannot be started: {reason}") from None
-    name = Path(arguments[0]).name
-    guard = _guard(process.pid)
+    """Run the renderer; after the time limit, kill it and all processes that came from it.  said:
+    the file for what it prints."""
+    supervisor = Path(__file__).with_name("supervisor.py")
     try:
-        code = process.wait(seconds)
-    except subprocess.TimeoutExpired:
+        process = subprocess.Popen(
+            [sys.executable, "-I", "-S", str(supervisor), str(said), *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,  # not interrupted or killed with this process's group
+        )
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise RendererError(f"{arguments[0]}: cannot be started: {reason}") from None
+    name = Path(arguments[0]).name
+    try:
+        assert process.stdout is not None
+        # It answers when the renderer has ended.
+        in_time = bool(select.select([process.stdout], [], [], seconds)[0])
+    finally:
+        answer, _ = process.communicate()  # closes its standard input, and waits for it
+    if not in_time:
         raise RendererError(
             f"{name} exceeded the time limit of {seconds:g} s with {which}, and was killed "
             f"with its children; a longer --time-limit would let it run on{_last_lines(said)}"
-        ) from None
-    finally:
-        _kill(process)
-        guard.kill()
-        guard.communicate()
+        )
+    try:
+        found = json.loads(answer)
+    except ValueError:
+        raise RendererError(f"{name}: the process that watches it was killed") from None
+    if "error" in found:
+        raise RendererError(f"{arguments[0]}: cannot be started: {found['error']}")
+    code = found["code"]
     if code < 0:
         with suppress(ValueError):
             raise RendererError(
@@ -201,35 +220,9 @@ def _run(arguments: list[str], said: Path, seconds: float, which: str) -> None:
         )
 
 
-def _guard(group: int) -> "subprocess.Popen[bytes]":
-    """A process that kills the renderer and its children when this process ends, even if it is
-    killed: its standard input is then closed."""
-    code = (
-        "import os, signal, sys; sys.stdin.buffer.read(); "
-        "os.killpg(int(sys.argv[1]), signal.SIGKILL)"
-    )
-    return subprocess.Popen(
-        [sys.executable, "-I", "-S", "-c", code, str(group)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,  # not killed with a group that this process is in
-    )
-
-
-def _kill(process: "subprocess.Popen[bytes]") -> None:
-    """Kill the process and its remaining children, which could write later."""
-    with suppress(ProcessLookupError, PermissionError):
-        os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
-
-
 def _last_lines(said: Path) -> str:
     """The end of the renderer's output, in one line."""
-    with said.open("rb") as file:
-        file.seek(0, os.SEEK_END)
-        file.seek(max(0, file.tell() - 4000))
-        text = file.read().decode("utf-8", "replace")
+    text = said.read_bytes()[-4000:].decode("utf-8", "replace")
     lines = [" ".join(line.split()) for line in text.splitlines() if line.strip()]
     printable = ["".join(c if c.isprintable() else "?" for c in line) for line in lines]
     if not printable:

@@ -9,7 +9,6 @@ To add kernels of another kind, such as those of a query: a function that return
 scene, and its place in `linked_calls`.
 """
 
-import tempfile
 from collections.abc import Iterable, Iterator
 from itertools import chain, cycle, product
 from pathlib import Path
@@ -101,6 +100,7 @@ from reference_rt.shapes.csg import Union
 from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.meshes.files.obj_scanner import scan_call
 from reference_rt.textures import Bitmap, Checker, VertexColours
+from reference_rt.util.files import temporary_folder
 
 
 def linked_calls() -> list[Call]:
@@ -292,9 +292,9 @@ _COPY = Instance(group="group")
 
 def scenes() -> Iterator[BuiltScene]:
     """Scenes that have, together, every type of table, and their tables are built."""
-    with tempfile.TemporaryDirectory() as folder:
-        np.save(Path(folder) / _IMAGE, np.full((2, 2, 3), 0.5))
-        for scene in _scenes(Path(folder)):
+    with temporary_folder() as folder:
+        np.save(folder / _IMAGE, np.full((2, 2, 3), 0.5))
+        for scene in _scenes(folder):
             assert scene.tables
             yield scene
 

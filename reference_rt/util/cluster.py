@@ -7,12 +7,10 @@ import asyncio
 import atexit
 import importlib
 import math
-import shutil
-import tempfile
 import time
 from collections.abc import Callable, Coroutine
 from concurrent.futures import CancelledError, Future
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from threading import Thread
 from typing import Any, TypeVar
@@ -20,7 +18,7 @@ from typing import Any, TypeVar
 import yaml
 
 from reference_rt.util.errors import UsageError, WorkersError
-from reference_rt.util.files import read_text
+from reference_rt.util.files import read_text, temporary_folder
 
 T = TypeVar("T")
 
@@ -290,9 +288,9 @@ def _guarded(options: dict[str, Any]) -> dict[str, Any]:
         del found["security"]
     elif "shared_temp_directory" not in found:
         # Jobs read the keys here: in the working folder, which they see as they see the scene.
-        keys = tempfile.mkdtemp(prefix=".reference_rt_keys_", dir=Path.cwd())
-        atexit.register(shutil.rmtree, keys, ignore_errors=True)
-        found["shared_temp_directory"] = keys
+        stack = ExitStack()
+        atexit.register(stack.close)
+        found["shared_temp_directory"] = str(stack.enter_context(temporary_folder(Path.cwd())))
     return found
 
 

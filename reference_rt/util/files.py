@@ -4,10 +4,12 @@ import errno
 import glob
 import os
 import secrets
+import shutil
 import stat
+import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -134,6 +136,60 @@ def delete_unfinished(folder: Path, name: str = "*") -> None:
             with suppress(OSError):
                 if time.time() - path.lstat().st_mtime > UNFINISHED_FOR:
                     path.unlink()
+
+
+_TEMPORARY, _OWNER = ".reference_rt-", ".owner"
+"""How the names of temporary folders begin; the file in each that its process holds locked."""
+
+
+@contextmanager
+def temporary_folder(place: Path | None = None) -> Iterator[Path]:
+    """Yields a new temporary folder, by default where the system has them, and removes it
+    afterwards.
+
+    Where a process is killed its folder stays.  So each call first removes this user's folders of
+    this kind that no process holds locked.
+    """
+    place = place or Path(tempfile.gettempdir())
+    _remove_ownerless(place)
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=_TEMPORARY, dir=place))
+        with _owned(folder, os.O_CREAT) as is_ours:
+            if not is_ours:  # another process removed it before it was locked
+                continue
+            try:
+                (files := folder / "files").mkdir(0o700)  # empty, without the locked file
+                yield files
+            finally:
+                shutil.rmtree(folder, ignore_errors=True)
+            return
+
+
+def _remove_ownerless(place: Path) -> None:
+    with suppress(OSError):
+        for folder in place.glob(f"{_TEMPORARY}*"):
+            with _owned(folder, 0) as is_ours:
+                if is_ours:
+                    shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextmanager
+def _owned(folder: Path, flags: int) -> Iterator[bool]:
+    """Holds the lock of a temporary folder; yields False if another process has it, or if this is
+    none of this user.  The system releases the locks of a process that ends in any way."""
+    with ExitStack() as stack:
+        try:
+            import fcntl
+
+            flags |= os.O_RDWR | os.O_NOFOLLOW
+            file = stack.enter_context(os.fdopen(os.open(folder / _OWNER, flags, 0o600), "r+b"))
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            is_ours = os.fstat(file.fileno()).st_uid == os.geteuid() and folder.exists()
+        except ImportError:  # Windows: folders of killed processes stay
+            is_ours = bool(flags & os.O_CREAT)
+        except OSError:
+            is_ours = False
+        yield is_ours
 
 
 def check_writable(*paths: Path) -> None:

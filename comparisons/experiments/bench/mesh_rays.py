@@ -4,7 +4,6 @@ closest-hit.
 Both return the same for each ray: t, the triangle, and the position on it."""
 
 import math
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,7 +21,7 @@ from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Mesh
 from reference_rt.util.errors import UsageError
-from reference_rt.util.files import replacing
+from reference_rt.util.files import replacing, temporary_folder
 
 # ---- a generated mesh ---------------------------------------------------------------------------
 
@@ -101,8 +100,8 @@ class Subject(NamedTuple):
 
 def measure(setting: Setting) -> list[Row]:
     """Incoherent, coherent, and any-hit rays.  Raises UsageError, ReferenceUnavailableError."""
-    with tempfile.TemporaryDirectory() as folder:
-        subject = _subject(setting, Path(folder))
+    with temporary_folder() as folder:
+        subject = _subject(setting, folder)
         width = WIDTH // 2 if setting.quick else WIDTH
         vertices = _corners(subject.tables)
         rays = {"incoherent": incoherent(vertices, width**2), "coherent": coherent(vertices, width)}

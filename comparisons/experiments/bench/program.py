@@ -5,7 +5,6 @@ import os
 import re
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,6 +17,7 @@ from comparisons.experiments.bench.setting import Setting
 from comparisons.experiments.bench.timing import ROUNDS
 from reference_rt.util.child_processes import tied
 from reference_rt.util.errors import ReferenceRtError
+from reference_rt.util.files import temporary_folder
 
 # ---- the suite smoke ----------------------------------------------------------------------------
 
@@ -32,11 +32,11 @@ _SUITE_TIMEOUT = 1800.0
 
 def measure_smoke(setting: Setting) -> list[Row]:
     """The row `smoke`: the suite with no kernel compiled, less the same suite once more."""
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         seconds = []
         for k, state in enumerate(("cold", "warm")):
             setting.say(f"{SUITE}, {state}", 0.5 * k)
-            seconds.append(_suite(Path(folder), state, setting.scenes))
+            seconds.append(_suite(folder, state, setting.scenes))
     title = f"suite {SUITE}, {JOBS} processes: with no kernel compiled, less once more"
     details = dict(zip(("cold", "warm"), seconds, strict=True))
     return [within("smoke", title, [seconds[0] - seconds[1]], ADDED, details=details)]
@@ -138,8 +138,8 @@ def measure_warm(setting: Setting) -> list[Row]:
     """The row `warm`: the slowest of some scenes, each rendered several times."""
     names = [n for n in WARM if not setting.quick or n in QUICK]
     found: dict[str, list[dict[str, float]]] = {name: [] for name in names}
-    with tempfile.TemporaryDirectory() as folder:
-        program = Program(Path(folder))
+    with temporary_folder() as folder:
+        program = Program(folder)
         for name in names:
             setting.say(f"{name}, compiling", 0.0)
             program.render(setting.file(name))
@@ -198,8 +198,8 @@ def measure_ever(setting: Setting) -> list[Row]:
     takes so long that one run is enough."""
     names = [n for n in setting.names() if not setting.quick or n in QUICK]
     found: dict[str, dict[str, float]] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        program = Program(Path(folder))
+    with temporary_folder() as folder:
+        program = Program(folder)
         program.prepare()
         for k, name in enumerate(names):
             setting.say(f"{name}, no kernels", k / len(names))
@@ -216,8 +216,8 @@ def measure_new(setting: Setting) -> list[Row]:
     over: dict[str, float] = {}
     found: dict[str, list[dict[str, float]]] = {}
     known = QUICK[:1] if setting.quick else KNOWN
-    with tempfile.TemporaryDirectory() as folder:
-        program = Program(Path(folder))
+    with temporary_folder() as folder:
+        program = Program(folder)
         program.prepare()
         for k, name in enumerate(known):
             setting.say(f"{name}, to be known", k / (len(known) + len(NEW)))
@@ -238,8 +238,8 @@ def measure_warmed(setting: Setting) -> list[Row]:
     names = [n for n in setting.names() if not setting.quick or n in QUICK]
     over: dict[str, float] = {}
     found: dict[str, list[dict[str, float]]] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        program = Program(Path(folder))
+    with temporary_folder() as folder:
+        program = Program(folder)
         program.prepare()
         setting.say("warm-up", 0.0)
         seconds = program.warm_up("cache")

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,6 +17,7 @@ from comparisons.mitsuba.llvm_libraries import LIBRARY
 from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.child_processes import tied
+from reference_rt.util.files import temporary_folder
 
 STAGES = ("start", "load", "build", "compile", "render")
 """start: the interpreter and what it imports;  load: the scene's file read, for Mitsuba also
@@ -56,14 +56,14 @@ def starts_of(
 
 def _start(scene: Scene, side: str) -> dict[str, dict[str, float]] | None:
     """Two processes one after the other, the first with empty caches."""
-    with tempfile.TemporaryDirectory(prefix="reference_rt-") as folder:
-        path = Path(folder) / "scene.json"
+    with temporary_folder() as folder:
+        path = folder / "scene.json"
         path.write_text(scene.to_json(), encoding="utf-8")
         environment = dict(os.environ)
         own = environment.get("REFERENCE_RT_CACHE") or platformdirs.user_cache_dir("reference_rt")
-        environment["REFERENCE_RT_CACHE"] = folder if side == "ours" else own
+        environment["REFERENCE_RT_CACHE"] = str(folder) if side == "ours" else own
         if side != "ours":
-            environment["HOME"] = folder  # below which Dr.Jit keeps its kernels
+            environment["HOME"] = str(folder)  # below which Dr.Jit keeps its kernels
         if side == LLVM:
             environment[LIBRARY] = str(backend().llvm_path)
         found = {}

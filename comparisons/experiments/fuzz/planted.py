@@ -6,7 +6,6 @@ import os
 import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -20,7 +19,7 @@ from comparisons.experiments.selftest.fault import SourceFault
 from comparisons.experiments.selftest.sensitivity import patched_text
 from reference_rt.util.child_processes import tied
 from reference_rt.util.errors import ReferenceRtError
-from reference_rt.util.files import replacing
+from reference_rt.util.files import replacing, temporary_folder
 
 MOST_SCENES = 500
 
@@ -92,8 +91,8 @@ def _search(fault: SourceFault, out: Path, seed: int, workers: int, count: int) 
     """
     text = patched_text(fault)
     folder = out.resolve() / "".join(c if c.isalnum() else "_" for c in fault.name)
-    with tempfile.TemporaryDirectory(prefix="reference_rt_fuzz_") as temporary:
-        package = Path(temporary) / "reference_rt"
+    with temporary_folder() as temporary:
+        package = temporary / "reference_rt"
         skipped = shutil.ignore_patterns("__pycache__")
         shutil.copytree(Path(reference_rt.__file__).parent, package, ignore=skipped)
         (package / fault.file).write_text(text, encoding="utf-8")

@@ -7,7 +7,6 @@ variant that compiles takes several times as long (measured: 2 s against 9 s a s
 import faulthandler
 import os
 import sys
-import tempfile
 import time
 import warnings
 from pathlib import Path
@@ -50,6 +49,7 @@ from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
 from reference_rt.util.errors import ImageError, SceneError
+from reference_rt.util.files import temporary_folder
 
 # ---- pictures for the page ----------------------------------------------------------------------
 
@@ -160,8 +160,8 @@ def _failures(
     command = Command(request.command, path, getattr(scene.resolved_sampler, "spp", 1), ".exr",
                       SECONDS, size)  # fmt: skip
     rounds = Rounds(seed, 1 if noise_free else effort.replicates, None)
-    with tempfile.TemporaryDirectory(prefix="fuzz-renderer-") as kept:
-        driver = Driver(command, Path(kept))
+    with temporary_folder() as kept:
+        driver = Driver(command, kept)
         gate = GateRequest(scene=scene, limit=LIMIT, threads=1, name=str(request.number))
         case: Case = gated_renderer(gate, driver, rounds)
     return [rung for rung in case.rungs if rung.status in FAILED]

@@ -1,11 +1,9 @@
 """Times all methods of a family in all settings of its series."""
 
-import tempfile
 import time
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple, get_args
 
 import numpy as np
@@ -15,6 +13,7 @@ from comparisons.experiments.methods.timing import Prepared, Time
 from comparisons.experiments.methods.trials import SERIES, Draw, Series, Trial, methods
 from reference_rt.accel import bvh
 from reference_rt.rendering.render import Progress
+from reference_rt.util.files import temporary_folder
 
 
 class Effort(NamedTuple):
@@ -55,9 +54,9 @@ def run(family: str, effort: Effort, seed: int, progress: Progress) -> list[Row]
 def _setting(series: Series, x: float, effort: Effort, seed: int) -> Iterator[Row]:
     """A row for each method;  the same trials for the same seed, whatever else is timed."""
     number = zlib.crc32(f"{series.family} {series.name} {x!r}".encode())
-    with tempfile.TemporaryDirectory(prefix="reference_rt_methods_") as folder:
+    with temporary_folder() as folder:
         rng = np.random.default_rng((seed, number))
-        trials = series.make(Draw(rng, effort.rays, Path(folder)), x)
+        trials = series.make(Draw(rng, effort.rays, folder), x)
         prepared = {name: Prepared(m, trials) for name, m in methods(series.family).items()}
         for name, found in timing.measure(prepared, effort.runs).items():
             built = _build(name, trials[0]) if series.family == "hierarchy" else None

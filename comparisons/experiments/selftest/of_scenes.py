@@ -1,8 +1,9 @@
 """Faults of scenes: we render a slightly changed scene, Mitsuba the original."""
 
+import atexit
 import functools
-import tempfile
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from reference_rt.cameras.filters import TentFilter
 from reference_rt.core.transform import Rotate, Scale, Turn
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Box, Cone, Cylinder, Mesh, Quadric, Torus
-from reference_rt.util.files import read_text
+from reference_rt.util.files import read_text, temporary_folder
 
 
 def material(name: str, **fields: Any) -> Callable[[Scene], Scene]:
@@ -67,9 +68,11 @@ def _texture_turned(scene: Scene) -> Scene:
 
 
 @functools.cache
-def _folder() -> tempfile.TemporaryDirectory[str]:
+def _folder() -> Path:
     """The folder of changed meshes; removed when the process ends."""
-    return tempfile.TemporaryDirectory(prefix="reference_rt_selftest_")
+    stack = ExitStack()
+    atexit.register(stack.close)
+    return stack.enter_context(temporary_folder())
 
 
 def _one_face_flipped(scene: Scene) -> Scene:
@@ -83,7 +86,7 @@ def _one_face_flipped(scene: Scene) -> Scene:
     flipped = faces[len(faces) // 20]
     head, *corners = lines[flipped].split()
     lines[flipped] = " ".join([head, *reversed(corners)])
-    file = Path(_folder().name) / "one_face_flipped.obj"
+    file = _folder() / "one_face_flipped.obj"
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return entry("shapes", 0, file=str(file))(scene)
 

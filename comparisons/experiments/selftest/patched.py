@@ -5,7 +5,6 @@ import os
 import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 import reference_rt
 from reference_rt.util.child_processes import tied
 from reference_rt.util.errors import ReferenceRtError
+from reference_rt.util.files import temporary_folder
 
 PACKAGE = Path(reference_rt.__file__).resolve().parent
 
@@ -30,12 +30,12 @@ def run_patched(
     The copy has a kernel cache of its own.  Raises subprocess.TimeoutExpired after so many seconds,
     and ReferenceRtError with the last line of the worker's errors if it fails.
     """
-    with tempfile.TemporaryDirectory(prefix="reference_rt_patched_") as folder:
-        package = Path(folder) / "reference_rt"
+    with temporary_folder() as folder:
+        package = folder / "reference_rt"
         skipped = shutil.ignore_patterns("__pycache__", "*.nbi", "*.nbc")
         shutil.copytree(PACKAGE, package, ignore=skipped)
         (package / file).write_text(text, encoding="utf-8")
-        path = os.pathsep.join(filter(None, (folder, os.environ.get("PYTHONPATH", ""))))
+        path = os.pathsep.join(filter(None, (str(folder), os.environ.get("PYTHONPATH", ""))))
         own = {"PYTHONPATH": path, "REFERENCE_RT_CACHE": f"{folder}/cache"}
         return run_worker(worker, task, {**(environment or {}), **own}, seconds)
 

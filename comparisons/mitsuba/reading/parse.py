@@ -3,7 +3,6 @@ their author wrote them."""
 
 import codecs
 import re
-import tempfile
 import warnings
 import xml.parsers.expat
 from collections.abc import Callable, Iterator, Mapping
@@ -17,7 +16,7 @@ from comparisons.mitsuba.backend import imported
 from comparisons.mitsuba.reading.foreign import OLD_ELEMENT, Note, adapt
 from reference_rt.core.transform import Affine, compose, rotate, scale, translate
 from reference_rt.util.errors import ReferenceUnavailableError, SceneError
-from reference_rt.util.files import read_input
+from reference_rt.util.files import read_input, temporary_folder
 
 # ---- transforms as their author wrote them -------------------------------------------------------
 # Mitsuba's parser multiplies scales, rotations, translations and points to look at. Our scenes keep
@@ -302,7 +301,7 @@ def parse_file(path: Path, defaults: Mapping[str, str]) -> Parsed:
     old = mi.file_resolver()
     resolver = mi.FileResolver(old)
     resolver.prepend(str(folder))
-    with tempfile.TemporaryDirectory() as copies:
+    with temporary_folder() as copies:
         start = path
         if check.is_old:  # Mitsuba's parser finds the copies first
             resolver.prepend(copies)
@@ -323,7 +322,7 @@ def parse_file(path: Path, defaults: Mapping[str, str]) -> Parsed:
             inside = error.file is not None and Path(error.file).is_relative_to(copies)
             name = str(Path(error.file or "").relative_to(copies)) if inside else ""
             file = str(check.copied[name][0]) if inside else error.file
-            message = error.message.replace(copies, str(folder))
+            message = error.message.replace(str(copies), str(folder))
             raise SceneError(message, file=file, line=error.line) from None
         finally:
             mi.set_file_resolver(old)

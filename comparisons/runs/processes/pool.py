@@ -4,7 +4,6 @@ or hangs is replaced, and the others go on."""
 import functools
 import json
 import queue
-import tempfile
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar
 from comparisons.runs.elsewhere import check_sources
 from comparisons.runs.processes.child import Children, Ended
 from comparisons.runs.provenance import everything_fingerprint
-from reference_rt.util.files import replacing
+from reference_rt.util.files import replacing, temporary_folder
 from reference_rt.util.workers import Threads, Workers, run_all
 
 
@@ -126,8 +125,7 @@ def carry_out_remotely(
     Raises WorkersError if these differ here; ReferenceUnavailableError.
     """
     check_sources(sources)
-    with tempfile.TemporaryDirectory(prefix="reference_rt-") as temporary:
-        root = Path(temporary)
+    with temporary_folder() as root:
         asked = {**asked, output: str(root / Path(asked[output]).name)}
         ended = _children.carry_out(module, folder, json.dumps(asked), seconds, lambda step: None)
         written = [path for path in root.rglob("*") if path.is_file()]

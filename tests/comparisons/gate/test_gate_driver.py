@@ -2,9 +2,14 @@
 
 import os
 import shlex
+import subprocess
 import sys
+import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -12,6 +17,7 @@ import pytest
 from comparisons.gate.driver import Command, Driver
 from comparisons.gate.errors import RendererError
 from reference_rt.util.errors import ImageError, UsageError
+from reference_rt.util.files import temporary_folder
 
 RENDERER = """\
 import os, signal, subprocess, sys, time
@@ -20,15 +26,20 @@ import numpy as np
 how, output, seed = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3])
 picture = np.random.default_rng(seed).random((4, 6, 3))
 print("how", how, flush=True)
+if len(sys.argv) > 4:  # a child in a session of its own, which holds the output open
+    sleep = [sys.executable, "-c", "import time; time.sleep(600)"]
+    child = subprocess.Popen(sleep, start_new_session=True)
+    Path(sys.argv[4]).write_text(str(child.pid))
 if how == "fails":
     print("one\\nthe sky\\x1b[2J is\\n\\nfalling", file=sys.stderr)
     sys.exit(7)
 if how == "crashes":
     os.kill(os.getpid(), signal.SIGSEGV)
 if how == "hangs":
-    child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
-    Path(sys.argv[4]).write_text(str(child.pid))
-    time.sleep(60)
+    time.sleep(600)
+if how == "floods":
+    while True:
+        print("x" * 1000)
 if how == "beside":
     np.save(output.with_name("mine.npy"), picture)
 if how == "here":
@@ -97,7 +108,7 @@ def test_failures(renderer: str, tmp_path: Path, how: str, message: str) -> None
         Driver(command(renderer, how), tmp_path / "kept").pictures(range(1, 3))
     assert caught.value.exit_code == 4
     assert "\n" not in str(caught.value)
-    assert not list(tmp_path.glob("kept/*"))
+    assert [path.name for path in tmp_path.glob("kept/*")] == ["renderer.log"]
 
 
 @pytest.mark.parametrize(
@@ -110,19 +121,62 @@ def test_what_is_written_must_be_a_picture(
         Driver(command(renderer, how), tmp_path / "kept").pictures(range(1, 2))
 
 
-def test_what_hangs_is_killed_with_its_children(renderer: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("how", ["hangs", "well", "fails"])
+def test_no_process_outlives_the_renderer(renderer: str, tmp_path: Path, how: str) -> None:
     note = tmp_path / "child.pid"
-    hanging = Command(f"{renderer} hangs {{output}} {{seed}} {note}", seconds=3.0)
-    with pytest.raises(
-        RendererError, match=r"exceeded the time limit of 3 s with seed 3, and was kill"
-    ):
-        Driver(hanging, tmp_path / "kept").pictures(range(3, 4))
-    child = int(note.read_text())
-    for _ in range(100):  # an orphan's end is noted by init, when it comes to it
-        if not _runs(child):
-            break
-        time.sleep(0.05)
-    assert not _runs(child)
+    called = Command(f"{renderer} {how} {{output}} {{seed}} {note}", suffix=".npy", seconds=3.0)
+    driver = Driver(called, tmp_path / "kept")
+    if how == "well":
+        assert len(driver.pictures(range(3, 4))) == 1
+    else:
+        message = (
+            "time limit of 3 s with seed 3, and was killed" if how == "hangs" else "exit code 7"
+        )
+        with pytest.raises(RendererError, match=message):
+            driver.pictures(range(3, 4))
+    assert not _runs(int(note.read_text()))
+
+
+def test_what_a_renderer_prints_is_bounded(renderer: str, tmp_path: Path) -> None:
+    with pytest.raises(RendererError, match=r"it said: .*\| x+ \|"):
+        Driver(command(renderer, "floods", 2.0), tmp_path / "kept").pictures(range(1, 2))
+    text = (tmp_path / "kept" / "renderer.log").read_bytes()
+    assert text.startswith(b"how floods\nxxx")
+    assert b" bytes are left out]\n" in text
+    assert 9_900_000 < len(text) < 10_100_000
+
+
+def test_a_gate_that_is_killed(renderer: str, tmp_path: Path) -> None:
+    """Its renderer ends, and what it left is removed by the next one."""
+    temporary, note = tmp_path / "temporary", tmp_path / "child.pid"
+    temporary.mkdir()
+    (temporary / ".reference_rt-of-a-user").mkdir()  # no folder of ours: it has no lock
+    code = (
+        "import sys; from pathlib import Path; from comparisons.gate.driver import Command, Driver;"
+        "Driver(Command(sys.argv[1]), Path(sys.argv[2])).pictures(range(1, 2))"
+    )
+    template = f"{renderer} hangs {{output}} {{seed}} {note}"
+    gate = subprocess.Popen(
+        [sys.executable, "-c", code, template, str(tmp_path / "kept")],
+        env={**os.environ, "TMPDIR": str(temporary)},
+    )
+    until(lambda: note.exists() and note.read_text())
+    gate.kill()
+    gate.wait()
+    until(lambda: not _runs(int(note.read_text())))
+    assert len(list(temporary.iterdir())) == 2
+    with mock.patch.object(tempfile, "tempdir", str(temporary)):
+        with temporary_folder() as folder, temporary_folder() as other:
+            assert not list(folder.iterdir())
+            assert other.is_dir()
+            assert len(list(temporary.iterdir())) == 3
+    assert [path.name for path in temporary.iterdir()] == [".reference_rt-of-a-user"]
+
+
+def until(holds: Callable[[], Any]) -> None:
+    """Wait for it; where it never comes pytest's own time limit ends the test."""
+    while not holds():
+        time.sleep(0.02)
 
 
 def _runs(pid: int) -> bool:

@@ -79,7 +79,7 @@ def test_strangers_are_refused(started, tmp_path):
     assert {place.ip for place in listens} <= {host, "127.0.0.1"}
     (job,) = inner.workers.values()
     assert "--no-dashboard --dashboard-address 127.0.0.1:0" in job.job_script()
-    (keys,) = tmp_path.glob(".reference_rt_keys_*")
+    (keys,) = tmp_path.glob(".reference_rt-*/files")
     assert keys.stat().st_mode & 0o077 == 0
     assert any(keys.iterdir())
 

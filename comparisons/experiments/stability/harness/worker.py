@@ -7,7 +7,6 @@ crash native libraries.
 
 import faulthandler
 import sys
-import tempfile
 import time
 import warnings
 from pathlib import Path
@@ -20,7 +19,7 @@ from comparisons.experiments.stability.harness.core import OURS, Draw, Effort, F
 from comparisons.experiments.stability.harness.family import family
 from comparisons.runs.processes.protocol import carry_out, private_stdout
 from reference_rt.util.errors import SceneWarning
-from reference_rt.util.files import replacing
+from reference_rt.util.files import replacing, temporary_folder
 
 
 class Request(BaseModel):
@@ -48,12 +47,12 @@ def measure(request: Request) -> None:
     """Measure a sweep point and store the result."""
     series = family(request.family).by_name[request.series]
     start = time.perf_counter()
-    with tempfile.TemporaryDirectory(prefix="reference_rt_stability_") as folder:
+    with temporary_folder() as folder:
         draw = Draw(
             generator(request.seed, request.family, request.series, request.x),
             series.cases[request.effort],
             request.mitsuba,
-            Path(folder),
+            folder,
             request.effort,
         )
         outcomes = series.measure(draw, request.x)

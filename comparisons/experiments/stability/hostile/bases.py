@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from reference_rt.util.files import temporary_folder
+
 Data = dict[str, Any]
 
 MESHES = ("ball.obj", "ball.ply", "ball_ascii.ply", "ball.stl", "ball.off", "ball.glb")
@@ -211,12 +213,11 @@ def _images() -> dict[str, bytes]:
 
 
 def _exr(pixels: Any) -> bytes:
-    import tempfile
 
     from reference_rt.core.exr import write_exr
 
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "sky.exr"
+    with temporary_folder() as folder:
+        path = folder / "sky.exr"
         write_exr(path, {name: pixels[..., k] for k, name in enumerate("RGB")}, {})
         return path.read_bytes()
 

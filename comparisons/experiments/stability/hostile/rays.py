@@ -19,6 +19,7 @@ from comparisons.geometry.exact.dyadic import BoolArray
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
+from reference_rt.util.files import temporary_folder
 
 UNIT = 1e-12
 """How far the length of a unit normal may be from 1: some thousand roundings, of shapes that are
@@ -28,12 +29,10 @@ stretched by 10 at most."""
 @cache
 def _scene() -> Scene:
     """All shapes, solids and instances; its files are read at once."""
-    import tempfile
-    from pathlib import Path
 
-    with tempfile.TemporaryDirectory() as folder:
-        write_files(Path(folder))
-        scene = Scene.parse(as_text(BASES["shapes"]), folder=Path(folder))
+    with temporary_folder() as folder:
+        write_files(folder)
+        scene = Scene.parse(as_text(BASES["shapes"]), folder=folder)
         _ = scene.tables
     return scene
 

@@ -35,9 +35,7 @@ the same way.
 
 import contextlib
 import math
-import tempfile
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -66,6 +64,7 @@ from comparisons.experiments.stability.leaving.shapes import (
 from comparisons.experiments.stability.leaving.tracer import Ways, depart, scene_of, subjects
 from comparisons.mitsuba.backend import scalar
 from reference_rt.core.arrays import FloatArray
+from reference_rt.util.files import temporary_folder
 
 # ---- a shape in sunlight: shadows where there are none are seen as speckle -----------------------
 
@@ -236,8 +235,8 @@ def _series(
         return measure(draw, kinds, extent(draw, x), 1.0 / x if grazing else None)
 
     def picture(contestant: str, x: float) -> Shot:
-        with tempfile.TemporaryDirectory() as folder:
-            draw = Draw(np.random.default_rng(2), 1, contestant == MITSUBA, Path(folder))
+        with temporary_folder() as folder:
+            draw = Draw(np.random.default_rng(2), 1, contestant == MITSUBA, folder)
             single = contestant == MITSUBA
             return shoot(contestant, kinds[0], extent(draw, x)._replace(single=single), draw)
 

@@ -25,7 +25,6 @@ Passes.  No failure within each series' guaranteed range.
 `motion` transforms scenes, `rearranged` reorders and groups them; `rays` and `light`
 judge."""
 
-import tempfile
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import product
@@ -56,6 +55,7 @@ from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.frame import round32
 from comparisons.geometry.vectors import unit_rows
 from reference_rt.shapes.csg.anchor import FAR
+from reference_rt.util.files import temporary_folder
 
 # ---- images of F9's failures, 192 pixels wide ----------------------------------------------------
 
@@ -69,8 +69,8 @@ WRONG = np.array([0.85, 0.10, 0.05])
 
 def shoot_light(motion: Callable[[float], Motion], contestant: str, x: float) -> Shot:
     """The path-traced scene, transformed."""
-    with tempfile.TemporaryDirectory() as folder:
-        scene = scenes.path(Path(folder)).changed(
+    with temporary_folder() as folder:
+        scene = scenes.path(folder).changed(
             film=rt.Film(width=WIDTH, height=HEIGHT), sampler=rt.Sobol(spp=SPP, seed=3)
         )
         first, found = (light.colours(contestant, s) for s in (scene, moved(scene, motion(x))))
@@ -83,8 +83,8 @@ def shoot_light(motion: Callable[[float], Motion], contestant: str, x: float) ->
 def shoot_rays(motion: Callable[[float], Motion], contestant: str, x: float) -> Shot:
     """What the pixels' rays hit in the scene of things, transformed; red where it is not what they
     hit before."""
-    with tempfile.TemporaryDirectory() as folder:
-        scene = scenes.things(Path(folder))
+    with temporary_folder() as folder:
+        scene = scenes.things(folder)
         o = np.tile(scene.camera.eye, (WIDTH * HEIGHT, 1))
         d = round32(_directions(scene))
         pixels = rays.Rays(o, d, np.ones(len(o), bool))

@@ -28,9 +28,7 @@ Mitsuba's hits.
 `trees` draws and rewrites trees; crossings and the exact truth are in
 `harness.solids`."""
 
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -65,6 +63,7 @@ from comparisons.experiments.stability.solids.trees import (
 from comparisons.geometry.vectors import unit_vectors
 from reference_rt.core import transform
 from reference_rt.shapes.meshes.files import read_mesh
+from reference_rt.util.files import temporary_folder
 
 # What films look like: a turned box without a half of it, which has three faces in common.
 
@@ -86,9 +85,9 @@ def shoot(contestant: str, x: float) -> Shot:
     # Not along any of the box's axes, so that each pixel rounds in its own way.
     o = np.column_stack([u, v, np.full(u.size, 5.0)])
     d = np.tile([0.01, -0.02, -1.0], (len(o), 1))
-    with tempfile.TemporaryDirectory() as folder:
-        write_smallest_ball(Path(folder))
-        t = solids.LISTS[contestant](solid, Path(folder), o, d)
+    with temporary_folder() as folder:
+        write_smallest_ball(folder)
+        t = solids.LISTS[contestant](solid, folder, o, d)
     first = t[:, 0] if t.shape[1] else np.full(len(o), np.inf)
     pixels = _shaded(o, d, first).reshape(PIXELS, PIXELS, 3)
     caption = (
