@@ -161,7 +161,7 @@ def temporary_folder(place: Path | None = None) -> Iterator[Path]:
                 (files := folder / "files").mkdir(0o700)  # empty, without the locked file
                 yield files
             finally:
-                shutil.rmtree(folder, ignore_errors=True)
+                _remove(folder)
             return
 
 
@@ -170,7 +170,17 @@ def _remove_ownerless(place: Path) -> None:
         for folder in place.glob(f"{_TEMPORARY}*"):
             with _owned(folder, 0) as is_ours:
                 if is_ours:
-                    shutil.rmtree(folder, ignore_errors=True)
+                    _remove(folder)
+
+
+def _remove(folder: Path) -> None:
+    """The locked file goes last, and only if nothing else is left: another process may still write
+    here, and a folder without that file would stay for ever."""
+    shutil.rmtree(folder / "files", ignore_errors=True)
+    with suppress(OSError):
+        if not (folder / "files").exists():
+            (folder / _OWNER).unlink()
+            folder.rmdir()
 
 
 @contextmanager
