@@ -18,7 +18,8 @@ def checks() -> Iterable[Check]:
     except ReferenceUnavailableError as error:
         yield Check("Mitsuba", "does not work", " ".join(str(error).split()), False)
     else:
-        advice = "" if chosen.variant != backend.SCALAR else f"slow: {chosen.reason}"
+        slow = "" if chosen.variant != backend.SCALAR else f"slow: {chosen.reason}"
+        advice = "; ".join(filter(None, (chosen.doubt, slow)))
         yield Check("Mitsuba", f"{chosen.version}, {chosen.variant}", advice)
     missing = [name for name in PACKAGES if importlib.util.find_spec(name) is None]
     if missing:

@@ -28,13 +28,16 @@ from reference_rt.cli.adjusted import adjusted
 from reference_rt.core.exr import write_exr
 from reference_rt.core.model import Description
 from reference_rt.rendering.scene import Scene
-from reference_rt.util.errors import ImageError, SceneError, UsageError
+from reference_rt.util.errors import ImageError, SceneError, UsageError, printable
 from reference_rt.util.files import check_writable, read_input, read_text, temporary_folder
 
 RECORD = "baseline.json"
 
 MOST_KEPT = 8
 """Most stored pictures (7 degrees of freedom); more replicates are averaged in so many groups."""
+
+_FILE = re.compile(r"picture-[0-9]{2}\.exr")
+"""The names that `accept` gives to pictures.  A baseline may come from a stranger."""
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
@@ -89,6 +92,11 @@ class Baseline:
     def reference(self) -> Reference:
         """Its pictures.  Raises BaselineEditedError."""
         for name, digest in self.record.files.items():
+            if not _FILE.fullmatch(name):
+                raise BaselineEditedError(
+                    f"{self.folder / RECORD}: names the file '{printable(name)}'; expected names "
+                    "like picture-00.exr, of files beside it"
+                )
             if _sha256(self.folder / name) != digest:
                 raise BaselineEditedError(
                     f"{self.folder / name}: has changed since it was accepted (SHA-256 differs); "

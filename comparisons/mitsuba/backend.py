@@ -11,6 +11,7 @@ import importlib.util
 import json
 import os
 import platform
+import re
 import subprocess
 import sys
 import warnings
@@ -70,6 +71,25 @@ class Backend:
     version: str
     reason: str
     llvm_path: str | None
+
+    @property
+    def doubt(self) -> str:
+        """What is doubtful about its version, "" for the one that this package requires."""
+        if (expected := _expected_version()) in (None, self.version):
+            return ""
+        return (
+            f"Mitsuba {self.version} is installed, but what is known of its limits and errors was "
+            f"measured with {expected}; expected `pip install mitsuba=={expected}`"
+        )
+
+
+def _expected_version() -> str | None:
+    """The version of Mitsuba that this package requires; None where it is not installed."""
+    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+        for requirement in importlib.metadata.requires("reference-rt") or ():
+            if found := re.match(r"mitsuba *== *([^\s;]+)", requirement):
+                return found[1]
+    return None
 
 
 def choose() -> Backend:

@@ -6,6 +6,7 @@ import hashlib
 import importlib.metadata
 import os
 import platform
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 
 import reference_rt
 from comparisons.mitsuba.backend import backend
+from reference_rt.util.errors import SceneWarning
 
 # ---- the code fingerprint: a change of any line of the sources invalidates stored results --------
 
@@ -57,8 +59,11 @@ def everything_fingerprint() -> str:
 
 
 def provenance(**more: Any) -> dict[str, Any]:
-    """Versions, machine and date, and `more`.  Raises ReferenceUnavailableError."""
+    """Versions, machine and date, and `more`.  Warns of another version of Mitsuba than the one
+    that is expected.  Raises ReferenceUnavailableError."""
     chosen = backend()
+    if chosen.doubt:
+        warnings.warn(chosen.doubt, SceneWarning, stacklevel=2)
     return {
         **ours(),
         "mitsuba": f"{chosen.version}, {chosen.variant}: {chosen.reason}",

@@ -17,6 +17,7 @@ from reference_rt.util.errors import (
     SceneWarning,
     printable,
 )
+from reference_rt.util.memory import machine_memory
 from reference_rt.util.signals import dropped, exit_code_of
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -50,6 +51,8 @@ def guarded(command: F) -> F:
                 _fail(_INTERRUPTED, exit_code_of(signal))
             if is_output_lost(error):
                 _fail(lost_output(error), ImageError.exit_code)
+            if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
+                _fail(_out_of_memory(), SceneError.exit_code)
             message = " ".join(str(error).split())
             _fail(f"internal error: {type(error).__name__}: {message}; please report it", 5)
 
@@ -71,6 +74,12 @@ def is_output_lost(error: BaseException) -> bool:
     """Whether a print failed, as on a full disk.  Our output files raise ImageError instead."""
     lost = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
     return isinstance(error, OSError) and error.errno in lost and error.filename is None
+
+
+def _out_of_memory() -> str:
+    limit = machine_memory()
+    there = "" if limit is None else f", which is limited to {limit / 2**30:.1f} GiB here"
+    return f"the scene does not fit into memory{there}; expected a smaller one, or more memory"
 
 
 MOST_ALIKE = 3

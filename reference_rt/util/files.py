@@ -2,6 +2,7 @@
 
 import errno
 import glob
+import hashlib
 import os
 import secrets
 import shutil
@@ -95,18 +96,19 @@ def read_text(path: Path) -> str:
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Yields a temporary file name beside `path`; the file is renamed to `path` if the block ends
-    without an exception.
+    without an exception.  A symbolic link stays: the file that it names is replaced.
 
     A reader sees the old file or the whole new one.  After an error, Ctrl-C or with a full disk the
     old file is unchanged and the temporary one is removed.  Creates parent folders.  Raises
     ImageError where the file cannot be written.
     """
     with _temporary_beside(path) as temporary:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        target = _target(path)
+        target.parent.mkdir(parents=True, exist_ok=True)
         yield temporary
         with temporary.open("rb") as file:
             os.fsync(file.fileno())
-        temporary.replace(path)
+        temporary.replace(target)
 
 
 @contextmanager
@@ -115,16 +117,38 @@ def _temporary_beside(path: Path) -> Iterator[Path]:
     into an ImageError."""
     # The same folder, since a rename is atomic within one file system only; the same suffix, since
     # writers choose the format by it.
-    temporary = path.with_name(f".{secrets.token_hex(4)}-{path.name}")
+    temporary = None
     try:
+        target = _target(path)
+        temporary = target.with_name(f".{secrets.token_hex(4)}-{_short(target.name)}")
         yield temporary
     except OSError as error:
         raise ImageError(
             f"{path}: cannot be written: {error.strerror or error}; expected a writable place"
         ) from None
     finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
+        if temporary is not None:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+
+def _target(path: Path) -> Path:
+    """The file that a symbolic link names in the end; of anything else the path itself.  Raises
+    OSError for what must not be replaced by a file."""
+    target = Path(os.path.realpath(path)) if path.is_symlink() else path
+    if target.is_symlink():
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+    if target.exists() and not (target.is_file() or target.is_dir()):
+        raise OSError(errno.EINVAL, "is no regular file", str(path))
+    return target
+
+
+def _short(name: str) -> str:
+    """A file name, or a shorter one with its suffix, which leaves room for what is put before it:
+    file systems allow 255 bytes."""
+    if len(os.fsencode(name)) <= 240:
+        return name
+    return hashlib.sha256(os.fsencode(name)).hexdigest()[:32] + Path(name).suffix[-16:]
 
 
 def delete_unfinished(folder: Path, name: str = "*") -> None:
@@ -211,7 +235,8 @@ def check_writable(*paths: Path) -> None:
     """
     for path in paths:
         _check_writable(path)
-        delete_unfinished(path.parent, glob.escape(path.name))
+        target = _target(path)
+        delete_unfinished(target.parent, glob.escape(_short(target.name)))
 
 
 def _check_writable(path: Path) -> None:
@@ -222,8 +247,8 @@ def _check_writable(path: Path) -> None:
                 raise ImageError(f"{path}: is a folder; expected the name of a file")
             if (file := next((p for p in path.parents if p.is_file()), None)) is not None:
                 raise ImageError(f"{path}: cannot be written: {file} is a file; expected a folder")
-            made = [parent for parent in path.parents if not parent.exists()]
-            path.parent.mkdir(parents=True, exist_ok=True)
+            made = [parent for parent in probe.parents if not parent.exists()]
+            probe.parent.mkdir(parents=True, exist_ok=True)
             probe.touch()
     finally:
         for parent in made:  # the deepest first; one that somebody else fills stays

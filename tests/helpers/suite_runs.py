@@ -37,7 +37,7 @@ def signal_in_the_next_case(
     process: subprocess.Popen[Any], number: int, is_first_done: Callable[[], bool]
 ) -> list[str]:
     """Send a program a signal in its second case: the ids of its workers."""
-    deadline = time.monotonic() + 120.0
+    deadline = time.monotonic() + 600.0
     while not is_first_done():
         assert time.monotonic() < deadline
         assert process.poll() is None

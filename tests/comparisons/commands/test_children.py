@@ -16,7 +16,7 @@ import comparisons
 import reference_rt
 
 SCENES = Path(__file__).parents[3] / "scenes"
-SECONDS = 120.0
+SECONDS = 600.0
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="asks Linux for processes")
 

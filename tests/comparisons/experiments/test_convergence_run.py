@@ -83,7 +83,7 @@ def program(*arguments: object):
     return CliRunner().invoke(app, ["converge", *map(str, arguments)])
 
 
-FAST = ("--size", "16x12", "--time-limit", "60", "--no-starts", "--max-spp", "16")
+FAST = ("--size", "16x12", "--time-limit", "3600", "--no-starts", "--max-spp", "16")
 
 
 @pytest.mark.slow

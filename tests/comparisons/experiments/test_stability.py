@@ -141,12 +141,11 @@ def test_an_end_of_the_run_keeps_what_was_found(fakes, tmp_path):
     command = [sys.executable, "-c", script, "stability", "-o", str(tmp_path), "--family", "T4"]
     process = subprocess.Popen([*command, "--no-mitsuba"], stderr=subprocess.DEVNULL)
     kept = tmp_path / "settings" / "T4" / "slow" / "0.25.json"
-    deadline = time.monotonic() + 60.0
-    while not kept.exists() and time.monotonic() < deadline:
+    while not kept.exists():
+        assert process.poll() is None
         time.sleep(0.05)
-    assert kept.exists()
     process.terminate()
-    assert process.wait(20.0) == 3
+    assert process.wait() == 3
     code, told = stability(
         tmp_path, "--family", "T4", "--no-mitsuba", "--series", "slow", "--at", "0.25"
     )

@@ -209,6 +209,15 @@ def test_edited_by_hand(files: list[str], edit: str) -> None:
     baselines.load(Path("baselines"), "ball").reference()
 
 
+@pytest.mark.parametrize("name", ["../ball2/picture-00.exr", "/etc/passwd", "a/../picture-00.exr"])
+def test_a_strangers_one_names_files_beside_it(files: list[str], name: str) -> None:
+    accepted(files)
+    found = baselines.load(Path("baselines"), "ball")
+    named = found.record.model_copy(update={"files": {name: "0" * 64}})
+    with pytest.raises(BaselineEditedError, match="expected names like picture-00"):
+        baselines.Baseline(named, found.folder).reference()
+
+
 def test_a_missing_one_says_how_it_is_accepted() -> None:
     with pytest.raises(BaselineMissingError, match="there is no baseline 'ball' in") as caught:
         baselines.load(Path("baselines"), "ball", ["out/a b.exr"])

@@ -63,7 +63,7 @@ def renderer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return f"{shlex.quote(sys.executable)} {shlex.quote(str(script))}"
 
 
-def command(renderer: str, how: str, seconds: float = 30.0) -> Command:
+def command(renderer: str, how: str, seconds: float = 600.0) -> Command:
     return Command(f"{renderer} {how} {{output}} {{seed}}", suffix=".npy", seconds=seconds)
 
 
@@ -122,7 +122,7 @@ def test_what_is_written_must_be_a_picture(
 @pytest.mark.parametrize("how", ["hangs", "well", "fails"])
 def test_no_process_outlives_the_renderer(renderer: str, tmp_path: Path, how: str) -> None:
     note = tmp_path / "child.pid"
-    seconds = 5.0 if how == "hangs" else 60.0  # an idle machine needs 0.1 s to write the note
+    seconds = 5.0 if how == "hangs" else 600.0  # an idle machine needs 0.1 s to write the note
     called = Command(f"{renderer} {how} {{output}} {{seed}} {note}", suffix=".npy", seconds=seconds)
     driver = Driver(called, tmp_path / "kept")
     if how == "well":

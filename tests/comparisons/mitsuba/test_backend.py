@@ -4,14 +4,17 @@ import ast
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
+from comparisons.commands.doctor import checks
 from comparisons.mitsuba import backend
 from comparisons.mitsuba.llvm_libraries import LIBRARY
-from reference_rt.util.errors import ReferenceUnavailableError
+from comparisons.runs import provenance
+from reference_rt.util.errors import ReferenceUnavailableError, SceneWarning
 
 
 @pytest.fixture(autouse=True)
@@ -105,6 +108,20 @@ def test_the_proof_renders_in_the_simplest_variant() -> None:
     assert backend.prove("scalar_rgb", None) is None
 
 
+def test_another_version_is_doubtful(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command line prints it, and so does `doctor`."""
+    monkeypatch.setenv(backend.FORCE, "scalar_rgb")
+    assert backend.choose().doubt == ""
+    other = replace(backend.choose(), version="3.8.0")
+    assert "3.8.0" in other.doubt
+    monkeypatch.setattr(provenance, "backend", lambda: other)
+    with pytest.warns(SceneWarning, match="Mitsuba 3.8.0 is installed"):
+        provenance.provenance()
+    monkeypatch.setattr(backend, "choose", lambda: other)
+    (check,) = (check for check in checks() if check.what == "Mitsuba")
+    assert "Mitsuba 3.8.0 is installed" in check.advice
+
+
 def test_forced_variants(monkeypatch: pytest.MonkeyPatch, bogus: str) -> None:
     monkeypatch.setenv(backend.FORCE, "scalar_rgb")
     assert backend.choose().variant == "scalar_rgb"
@@ -149,6 +166,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
+from comparisons.commands.doctor import checks
 from comparisons.mitsuba import backend
 from comparisons.mitsuba.llvm_libraries import LIBRARY
 from comparisons.mitsuba.writing import write_xml

@@ -116,7 +116,7 @@ def interrupted(number, out, *arguments):
         workers = signal_in_the_next_case(
             process, number, lambda: results.exists() and json.loads(results.read_text())["cases"]
         )
-        process.wait(timeout=120.0)
+        process.wait(timeout=600.0)
     finally:
         process.kill()
         # The workers of a killed program live on until their case is done.

@@ -107,7 +107,7 @@ def test_an_interruption_keeps_what_is_done(tmp_path, number):
     try:
         first = out / "cases" / "a" / "case.json"
         workers = signal_in_the_next_case(process, number, first.exists)
-        process.communicate(timeout=120.0)
+        process.communicate(timeout=600.0)
     finally:
         process.kill()
     assert process.returncode != 0

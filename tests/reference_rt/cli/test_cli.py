@@ -1,8 +1,10 @@
 """The program: exit codes, options, and the files that it writes."""
 
+import errno
 import json
 import subprocess
 import sys
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -148,6 +150,14 @@ def test_an_internal_error_is_one_line(refused, monkeypatch, tmp_path):
     assert result.stderr == (
         "error: internal error: ZeroDivisionError: division by zero; please report it\n"
     )
+
+
+@pytest.mark.parametrize("error", [MemoryError(), OSError(errno.ENOMEM, "no memory")])
+def test_what_does_not_fit_into_memory(refused, monkeypatch, error):
+    monkeypatch.setattr("reference_rt.rendering.scene.Scene.load", mock.Mock(side_effect=error))
+    result = run("explain", SPHERES)
+    assert result.exit_code == 3
+    assert "the scene does not fit into memory, which is limited to" in result.stderr
 
 
 def test_schema_is_json():

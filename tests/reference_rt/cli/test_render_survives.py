@@ -50,7 +50,7 @@ def killed(times, tmp_path, arguments, most):
         for _ in range(choose.randrange(most)):
             process.stdout.readline()
         process.kill()
-        process.communicate(timeout=240)
+        process.communicate(timeout=600)
     return begun
 
 
@@ -90,7 +90,7 @@ def test_interrupted_and_resumed(tmp_path):
     while float(process.stdout.readline()) < 0.3:
         pass
     process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=240)
+    _, errors = process.communicate(timeout=600)
     assert process.returncode == 130
     last = errors.strip().splitlines()[-1]
     said = re.escape(f"error: interrupted; {out} is partial, ") + r".* of 64 samples per pixel"
@@ -98,7 +98,7 @@ def test_interrupted_and_resumed(tmp_path):
     assert found, last
     assert 30 <= int(found[1]) < 100
     process, fraction = start("-o", out, *options, "--resume")
-    process.communicate(timeout=240)
+    process.communicate(timeout=600)
     assert process.returncode == 0
     assert fraction == pytest.approx(int(found[1]) / 100, abs=0.006)
     assert run("render", BOX, "-o", expected, *options[:-2], "--no-checkpoint").exit_code == 0

@@ -146,7 +146,7 @@ def test_ctrl_c_keeps_what_is_compiled(tmp_path):
     while process.poll() is None and not [*tmp_path.glob("kernels/*/tiles.render_tile-*")]:
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)
-    output, errors = process.communicate(timeout=240)
+    output, errors = process.communicate(timeout=600)
     assert process.returncode == 130
     assert output == ""
     lines = errors.splitlines()

@@ -1,5 +1,7 @@
 """Image files: read back as they were written; whole or absent; NaN and infinity stay visible."""
 
+import os
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -7,7 +9,7 @@ from PIL import Image
 import reference_rt as rt
 from reference_rt.core.exr import read_exr
 from reference_rt.rendering import image
-from reference_rt.util.files import replacing
+from reference_rt.util.files import _short, check_writable, replacing
 
 PROVENANCE = {"software": "reference_rt 0", "scene": "a scene", "sampler": '{"spp": 4}'}
 
@@ -126,6 +128,45 @@ def test_an_error_while_writing_leaves_the_old_file(tmp_path):
         assert path.read_text() == "old"
     assert path.read_text() == "new"
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("length", [239, 240, 241, 254, 255])
+def test_names_of_any_length(tmp_path, length):
+    for letter in ("n", "é"):
+        name = "".join([letter] * ((length - 4) // len(letter.encode()))) + ".exr"
+        check_writable(tmp_path / name)
+        image.write(tmp_path / name, picture(), PROVENANCE)
+        assert read_exr(tmp_path / name)
+    killed = tmp_path / f".{'0' * 8}-{_short(name)}"
+    killed.touch()
+    os.utime(killed, (0, 0))
+    check_writable(tmp_path / name)
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_links_are_written_through(tmp_path):
+    """The file that a link names is replaced, beside it; the link stays."""
+    (tmp_path / "there").mkdir()
+    link, other = tmp_path / "a.exr", tmp_path / "b.exr"
+    link.symlink_to("b.exr")
+    other.symlink_to(tmp_path / "there" / "c.exr")
+    for _ in range(2):  # without the file, and with it
+        check_writable(link)
+        image.write(link, picture(), PROVENANCE)
+        assert link.is_symlink()
+        assert other.is_symlink()
+        assert [path.name for path in (tmp_path / "there").iterdir()] == ["c.exr"]
+    assert len(list(tmp_path.iterdir())) == 3
+    loop = tmp_path / "loop.exr"
+    loop.symlink_to("loop.exr")
+    device = tmp_path / "device.exr"
+    device.symlink_to("/dev/null")
+    for path in (loop, device):  # never replaced
+        with pytest.raises(rt.ImageError, match=path.name):
+            check_writable(path)
+        with pytest.raises(rt.ImageError, match=path.name):
+            image.write(path, picture(), PROVENANCE)
+        assert path.is_symlink()
 
 
 def test_unwritable(tmp_path):

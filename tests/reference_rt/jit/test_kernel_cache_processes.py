@@ -66,7 +66,7 @@ def start(tmp_path):
 
 
 def _done(process):
-    out, errors = process.communicate(timeout=300.0)
+    out, errors = process.communicate(timeout=600.0)
     assert errors == ""
     return process.returncode, out.strip()
 

@@ -120,7 +120,7 @@ def test_what_a_scheduler_took_along_ends(machines, cluster, number, is_forgotte
     machines.start_scheduler()
     machines.start_worker()
     assert cluster.recovers(error_of(lost))
-    assert cluster.submit(abs, -3).result(60.0) == 3
+    assert cluster.submit(abs, -3).result(600.0) == 3
     assert cluster.threads == 1
 
 
@@ -153,9 +153,9 @@ def test_what_is_given_up_leaves_its_worker(cluster, machines, give_up):
         cluster.stop()
     else:
         assert second.cancel()
-        first.result(60.0)
+        first.result(600.0)
     other = Cluster(machines.address)
-    assert other.submit(abs, -3).result(60.0) == 3
+    assert other.submit(abs, -3).result(600.0) == 3
     other.close()
     assert not begun.exists()
 
@@ -185,7 +185,7 @@ def test_a_scheduler_that_does_not_answer(machines, cluster, monkeypatch):
     assert cluster.recovers(error_of(lost))
     assert isinstance(error_of(cluster.submit(abs, -3)), WorkersError)
     machines.scheduler.send_signal(signal.SIGCONT)
-    assert cluster.submit(abs, -3).result(60.0) == 3
+    assert cluster.submit(abs, -3).result(600.0) == 3
 
 
 @pytest.mark.parametrize(

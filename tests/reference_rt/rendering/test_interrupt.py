@@ -49,7 +49,7 @@ def test_ctrl_c(number, tmp_path):
     """The picture so far, which says so in its header."""
     process = start(tmp_path)
     process.send_signal(number)
-    _, errors = process.communicate(timeout=240)
+    _, errors = process.communicate(timeout=600)
     assert process.returncode == 128 + number
     assert "Traceback" not in errors
     out = tmp_path / "out.exr"
@@ -73,7 +73,7 @@ def test_kill(tmp_path):
     old.write_bytes(b"the old picture")
     process = start(tmp_path)
     process.kill()
-    process.communicate(timeout=240)
+    process.communicate(timeout=600)
     assert old.read_bytes() == b"the old picture"
     assert list(tmp_path.iterdir()) == [old]
 
