@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.exr import read_header
+from reference_rt.core.exr import read_headers
 from reference_rt.core.image_files import ImageFile, open_image
 from reference_rt.core.image_files.exr import ExrFile
 from reference_rt.core.image_files.image_file import as_float64
@@ -138,7 +138,7 @@ def variance_of(path: Path) -> FloatArray:
 
 def _channel_names(path: Path) -> list[str]:
     try:
-        return [channel.name for channel in read_header(path)["channels"]]
+        return [c.name for header in read_headers(path) for c in header["channels"]]
     except (OSError, ValueError):
         return []  # reading it as a picture gives a better message
 

@@ -80,7 +80,7 @@ def exr_rows(
 def read_exr(path: Path) -> tuple[dict[str, FloatArray], dict[str, Any]]:
     """Channels (height, width) by name, as float64, and the header.  Raises ImageError."""
     try:
-        header = read_header(path)
+        header = read_headers(path)[0]
         channels = {n: np.array(plane, np.float64) for n, plane in read_planes(path).items()}
         if len({plane.shape for plane in channels.values()}) > 1 or not channels:
             raise ValueError("cannot be read as EXR: expected channels of one size")
@@ -91,36 +91,38 @@ def read_exr(path: Path) -> tuple[dict[str, FloatArray], dict[str, Any]]:
     return channels, header
 
 
-def read_header(path: Path) -> dict[str, Any]:
-    """The header of an EXR file.  Raises ValueError (what is wrong), OSError."""
+def read_headers(path: Path) -> list[dict[str, Any]]:
+    """The headers of an EXR file's parts.  Raises ValueError (what is wrong), OSError."""
     with open_input(path) as start:
         if start.read(4) != _MAGIC:
             raise ValueError("cannot be read as EXR: it does not begin as one")
-    header, _ = _opened(path, header_only=True)
-    return header
+    return [header for header, _ in _opened(path, header_only=True)]
 
 
-def read_planes(path: Path) -> dict[str, npt.NDArray[Any]]:
+def read_planes(path: Path, part: int = 0) -> dict[str, npt.NDArray[Any]]:
     """Channels by name, (height, width) unless they are subsampled, in the file's own data type.
     Raises ValueError (what is wrong), OSError."""
     open_input(path).close()
-    _, planes = _opened(path, separate_channels=True)
-    return planes
+    return _opened(path, separate_channels=True)[part][1]
 
 
-def _opened(path: Path, **how: bool) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
+def _opened(path: Path, **how: bool) -> list[tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]]:
+    """Of each part its header and its planes."""
     import OpenEXR
 
     damaged = "cannot be read as EXR: it is truncated or damaged; expected a whole image"
     try:
         with _silent(), OpenEXR.File(_name(path), **how) as file:
-            planes = {name: channel.pixels for name, channel in file.channels().items()}
-            header = dict(file.header())
+            parts = [
+                (dict(part.header), {name: c.pixels for name, c in part.channels.items()})
+                for part in file.parts
+            ]
     except (RuntimeError, OSError, TypeError, ValueError):  # its messages say nothing to users
         raise ValueError(damaged) from None
-    if "separate_channels" in how and not all(hasattr(p, "shape") for p in planes.values()):
+    has_pixels = all(hasattr(plane, "shape") for _, planes in parts for plane in planes.values())
+    if not parts or ("separate_channels" in how and not has_pixels):
         raise ValueError(damaged)  # the library returns channels without pixels
-    return header, planes
+    return parts
 
 
 def _name(path: Path) -> str | bytes:

@@ -47,6 +47,9 @@ class Bitmap(Texture):
     `srgb` for files of integers, `raw` for files of floats.  `radiance`: .hdr as Radiance itself
     decodes it, half a step of a mantissa brighter, EXPOSURE and COLORCORR undone; other renderers
     ignore these."""
+    layer: str = ""
+    """Of an .exr file with several pictures: the one whose channels begin so, such as `diffuse` for
+    diffuse.R.  Default: R, G, B, or the file's only picture."""
     scale: Positive = 1.0
     """A factor of the linear values: radiance and heights may need values above 1."""
 
@@ -58,7 +61,7 @@ class Bitmap(Texture):
 
     def read(self, folder: Path, out: Bytes | None = None) -> Texels:
         """The image.  Raises ValueError (what is wrong, what was expected)."""
-        return read_texels(folder / self.file, self.encoding, self.scale, out)
+        return read_texels(folder / self.file, self.encoding, self.scale, out, self.layer)
 
 
 class Memory(NamedTuple):
@@ -125,7 +128,7 @@ def room_for(textures: Iterable[Texture], folder: Path) -> Bytes:
     size = 0
     for one in bitmaps:
         with suppress(ValueError):  # reading it tells
-            size += most_bytes(folder / one.file, one.encoding)
+            size += most_bytes(folder / one.file, one.encoding, one.layer)
     check_memory(size, f"{len(bitmaps)} bitmaps of {size} bytes in all")
     return room_of(size)
 

@@ -21,10 +21,10 @@ READER = 8
 """The most bytes per pixel that reading an image takes beside its values."""
 
 
-def read_image(path: Path, encoding: Encoding, scale: float = 1.0) -> FloatArray:
+def read_image(path: Path, encoding: Encoding, scale: float = 1.0, layer: str = "") -> FloatArray:
     """(height, width, 3) linear sRGB times `scale`, row 0 on top, finite and at least 0.  Raises
     ValueError (what is wrong, what was expected)."""
-    with reading(path, encoding) as image:
+    with reading(path, encoding, layer) as image:
         pixels = image.height * image.width
         check_memory((24 + READER) * pixels, f"{image.width} x {image.height} pixels")
         colours = np.empty((image.height, image.width, 3))
@@ -38,13 +38,13 @@ def read_image(path: Path, encoding: Encoding, scale: float = 1.0) -> FloatArray
 
 
 @contextmanager
-def reading(path: Path, encoding: Encoding) -> Iterator[ImageFile]:
+def reading(path: Path, encoding: Encoding, layer: str = "") -> Iterator[ImageFile]:
     """The image in a file, while it is read.  Raises ValueError (the file, what is wrong, what was
     expected) for all that goes wrong meanwhile."""
     from reference_rt.core.image_files import HdrFile, open_image  # importing Pillow is slow
 
     try:
-        image = open_image(path, radiance=encoding == "radiance")
+        image = open_image(path, layer, radiance=encoding == "radiance")
         if encoding == "radiance" and not isinstance(image, HdrFile):
             raise ValueError("is no Radiance image; expected one with `encoding: radiance`")
         yield image
@@ -127,10 +127,10 @@ def padded(size: int) -> int:
     return -(-size // WIDEST) * WIDEST
 
 
-def most_bytes(path: Path, encoding: Encoding) -> int:
+def most_bytes(path: Path, encoding: Encoding, layer: str = "") -> int:
     """The most bytes that the texels of a file can take, according to its header.  Raises
     ValueError (what is wrong, what was expected)."""
-    with reading(path, encoding) as image:
+    with reading(path, encoding, layer) as image:
         pixels = image.height * image.width
         is_decoded = not image.is_integer and curve_of(image, encoding) is not None
         kind = np.dtype("float64" if is_decoded else image.kind)
@@ -139,13 +139,15 @@ def most_bytes(path: Path, encoding: Encoding) -> int:
     return padded(size)
 
 
-def read_texels(path: Path, encoding: Encoding, scale: float, out: Bytes | None = None) -> Texels:
+def read_texels(
+    path: Path, encoding: Encoding, scale: float, out: Bytes | None = None, layer: str = ""
+) -> Texels:
     """out (n,), aligned: if it is large enough, the texels are written to its beginning.  Raises
     ValueError (what is wrong, what was expected)."""
     from reference_rt.core.image_files.image_file import as_float64, decoding
 
-    most_bytes(path, encoding)
-    with reading(path, encoding) as image, np.errstate(over="ignore", invalid="ignore"):
+    most_bytes(path, encoding, layer)
+    with reading(path, encoding, layer) as image, np.errstate(over="ignore", invalid="ignore"):
         curve = curve_of(image, encoding)
         strips = image.stored()
         first = next(strips)

@@ -32,6 +32,33 @@ def check_memory(needed: int, what: str) -> None:
         )
 
 
+RATIO = 200
+"""The most that content may unpack to, as a multiple of its own size: arrays of numbers shrink to a
+half, texts of numbers to a tenth, and nothing but repetition to less than a hundredth (at most
+1/1032, by the format of zlib)."""
+
+SMALL = 1 << 24
+"""Bytes that are unpacked whatever the ratio."""
+
+
+def check_unpacked(packed: int, unpacked: int, what: str, each: int = 8) -> None:
+    """Raises ValueError if content must not be unpacked: it is made to fill memory, or too large.
+
+    packed, unpacked: bytes;  what: names the content;  each: bytes of memory per unpacked byte.
+    """
+    if unpacked > max(SMALL, RATIO * packed):
+        raise ValueError(
+            f"{what} unpacks from {packed} to {unpacked} bytes; expected at most {RATIO} times as "
+            "many"
+        )
+    there = machine_memory()
+    if there is not None and each * unpacked > there:
+        raise ValueError(
+            f"{what} unpacks to {unpacked} bytes, which take {each * unpacked / 2**30:.1f} GiB of "
+            f"memory; expected at most the {there / 2**30:.1f} GiB that there are"
+        )
+
+
 def resident_memory() -> int | None:
     """The bytes of memory that this process has now; None where the system does not say."""
     try:

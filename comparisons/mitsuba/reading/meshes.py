@@ -22,6 +22,7 @@ from reference_rt.shapes.meshes.files.data import MeshData, RawMesh, checked
 from reference_rt.shapes.meshes.triangle_table import geometric_normals
 from reference_rt.shapes.meshes.vertex_normals import smooth_normals, unit
 from reference_rt.util.files import read_input
+from reference_rt.util.memory import check_unpacked
 
 # ---- Mitsuba's `.serialized` meshes, of versions 3 and 4 -----------------------------------------
 # Several meshes in a file, each compressed. Layout (src/shapes/serialized.cpp): two shorts, the
@@ -34,8 +35,8 @@ from reference_rt.util.files import read_input
 _FORMAT = 0x041C
 _NORMALS, _UV, _COLOURS, _DOUBLE = 0x0001, 0x0002, 0x0008, 0x2000
 
-MOST_BYTES = 1 << 33
-"""The largest mesh that is unpacked: a damaged file may claim any size."""
+_HEAD = 1 << 16
+"""Bytes of a stream in which its flags, its name and its sizes lie."""
 
 
 def read(content: bytes, index: int) -> RawMesh:
@@ -47,15 +48,20 @@ def read(content: bytes, index: int) -> RawMesh:
         version = _header(content, start)
     unpacker = zlib.decompressobj()
     try:
-        data = unpacker.decompress(content[start + 4 :], MOST_BYTES)
+        stream = _Stream(unpacker.decompress(content[start + 4 :], _HEAD), index)
+        (flags,) = stream.numbers("<u4", 1).tolist()
+        if version == 4:
+            stream.skip_name()
+        vertices, faces = (int(n) for n in stream.numbers("<u8", 2).tolist())
+        real = "<f8" if flags & _DOUBLE else "<f4"
+        each = 3 + 3 * bool(flags & _NORMALS) + 2 * bool(flags & _UV) + 3 * bool(flags & _COLOURS)
+        size = stream.place + np.dtype(real).itemsize * each * vertices + 12 * faces
+        check_unpacked(len(content) - start, size, f"mesh {index}")
+        if size > len(stream.data):
+            rest = unpacker.decompress(unpacker.unconsumed_tail, size - len(stream.data))
+            stream.data += rest
     except zlib.error as error:
         raise ValueError(f"mesh {index} cannot be unpacked: {error}") from None
-    stream = _Stream(data, index)
-    (flags,) = stream.numbers("<u4", 1).tolist()
-    if version == 4:
-        stream.skip_name()
-    vertices, faces = (int(n) for n in stream.numbers("<u8", 2).tolist())
-    real = "<f8" if flags & _DOUBLE else "<f4"
     positions = stream.numbers(real, 3 * vertices).reshape(-1, 3)
     normals = stream.numbers(real, 3 * vertices).reshape(-1, 3) if flags & _NORMALS else None
     uv = stream.numbers(real, 2 * vertices).reshape(-1, 2) if flags & _UV else None

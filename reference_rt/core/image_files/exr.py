@@ -1,28 +1,33 @@
-"""OpenEXR images: half, float or integer channels R, G, B, or Y."""
+"""OpenEXR images: half, float or integer channels R, G, B, or one channel of grey.
 
-from collections.abc import Iterator
+A renderer writes several pictures into one file, as layers, whose channels have a prefix
+(`diffuse.R`), and as parts.  Read are, of the first part that has it: the layer that is asked for;
+else R, G, B, or Y without a prefix; else the only layer that has these; else the only channel."""
+
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from reference_rt.core.exr import read_header, read_planes
+from reference_rt.core.exr import read_headers, read_planes
 from reference_rt.core.image_files.image_file import ImageFile, StoredStrip
 
 
 @dataclass(frozen=True)
 class ExrFile(ImageFile):
-    """names: the channels for red, green, blue, or for grey, and for opacity if there is one;
-    channels: the number of all channels in the file;  windows: corners (x0, y0, x1, y1) of the data
-    window and of the display window."""
+    """part: the number of the file's part;  names: the channels for red, green, blue, or for grey,
+    and for opacity if there is one;  channels: the number of all channels in the part;  windows:
+    corners (x0, y0, x1, y1) of the data window and of the display window."""
 
+    part: int = 0
     names: tuple[str, ...] = ()
     channels: int = 0
     windows: tuple[tuple[int, ...], tuple[int, ...]] = ((), ())
 
     def stored(self, with_opacity: bool = False) -> Iterator[StoredStrip]:
-        planes = read_planes(self.path)
+        planes = read_planes(self.path, self.part)
         names = self.names if with_opacity else self.names[: 1 if self.is_grey else 3]
         wanted = {name: planes[name] for name in names}
         del planes
@@ -47,19 +52,14 @@ class ExrFile(ImageFile):
 
 
 def open_exr(path: Path, layer: str = "") -> ImageFile:
-    """layer: the prefix of the channels' names, such as "diffuse" for diffuse.R.  Raises
-    ValueError (what is wrong, what was expected)."""
-    header = read_header(path)
-    kinds = [channel.name for channel in header["channels"]]
-    prefix = f"{layer}." if layer else ""
-    if all(prefix + name in kinds for name in "RGB"):
-        names = [prefix + name for name in "RGB"]
-    elif prefix + "Y" in kinds and prefix + "RY" not in kinds:  # with which it is in colour
-        names = [prefix + "Y"]
-    else:
-        expected = ", ".join(prefix + name for name in "RGB")
-        raise ValueError(f"has channels {_list(kinds)}; expected {expected}, or {prefix}Y")
-    has_opacity = prefix + "A" in kinds
+    """layer: the prefix of the channels' names, such as "diffuse" for diffuse.R; "" for the file's
+    only one.  Raises ValueError (what is wrong, what was expected)."""
+    headers = read_headers(path)
+    parts = [[channel.name for channel in header["channels"]] for header in headers]
+    part, names = _chosen(parts, layer)
+    header, kinds = headers[part], parts[part]
+    opacity = names[0][:-1] + ("a" if names[0].endswith("r") else "A")
+    has_opacity = opacity in kinds and opacity not in names
     (x0, y0, x1, y1), display = (_corners(header[n]) for n in ("dataWindow", "displayWindow"))
     return ExrFile(
         path,
@@ -68,11 +68,53 @@ def open_exr(path: Path, layer: str = "") -> ImageFile:
         "float64",  # the library tells the type of channels only with their pixels
         is_grey=len(names) == 1,
         has_opacity=has_opacity,
+        part=part,
         text={key: value for key, value in header.items() if isinstance(value, str)},
-        names=(*names, *([prefix + "A"] if has_opacity else [])),
+        names=(*names, *([opacity] if has_opacity else [])),
         channels=len(kinds),
         windows=((x0, y0, x1, y1), display),
     )
+
+
+def _chosen(parts: Sequence[Sequence[str]], layer: str) -> tuple[int, list[str]]:
+    """The number of the part, and its channels for red, green and blue, or for grey.
+
+    parts: the names of the channels of each.  Raises ValueError, which names the layers there are.
+    """
+    pictures: dict[str, tuple[int, list[str]]] = {}
+    for number, kinds in enumerate(parts):
+        for kind in kinds:
+            prefix, last = kind[:-1], kind[-1:]
+            if prefix and not prefix.endswith("."):
+                continue
+            if last in "Rr" and all(prefix + name in kinds for name in _after(last)):
+                pictures.setdefault(prefix, (number, [kind, *(prefix + n for n in _after(last))]))
+            elif last in "Yy" and prefix + "RY" not in kinds:  # with which it is in colour
+                pictures.setdefault(prefix, (number, [kind]))
+    alone = [(number, list(kinds)) for number, kinds in enumerate(parts) if len(kinds) == 1]
+    every = sorted({kind for kinds in parts for kind in kinds})
+    if layer:
+        if f"{layer}." in pictures:
+            return pictures[f"{layer}."]
+        raise ValueError(
+            f"has channels {_list(every)}; expected {layer}.R, {layer}.G, {layer}.B, or {layer}.Y"
+        )
+    if "" in pictures:
+        return pictures[""]
+    if len(pictures) == 1:
+        return next(iter(pictures.values()))
+    if pictures:
+        raise ValueError(
+            f"has several pictures; expected `layer` as one of: "
+            f"{_list([prefix.removesuffix('.') for prefix in pictures])}"
+        )
+    if len(alone) == 1 and len(parts) == 1:
+        return alone[0]
+    raise ValueError(f"has channels {_list(every)}; expected R, G, B, or Y")
+
+
+def _after(red: str) -> str:
+    return "GB" if red == "R" else "gb"
 
 
 def _corners(window: Any) -> tuple[int, ...]:

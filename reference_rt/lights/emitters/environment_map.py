@@ -38,6 +38,9 @@ class EnvironmentMap(Description):
     encoding: Literal["auto", "radiance"] = "auto"
     """`radiance`: .hdr as Radiance itself decodes it, half a step of a mantissa brighter, EXPOSURE
     and COLORCORR undone; other renderers ignore these."""
+    layer: str = ""
+    """Of an .exr file with several pictures: the one whose channels begin so, such as `diffuse` for
+    diffuse.R.  Default: R, G, B, or the file's only picture."""
     scale: Positive = 1.0
     """A factor of the image's values, which gives W sr^-1 m^-2, linear sRGB."""
     transform: Transform = ()
@@ -47,7 +50,7 @@ class EnvironmentMap(Description):
     def tabulate(self, folder: Path) -> "EnvironmentMaps":
         """One row.  Raises ValueError (what is wrong, what was expected)."""
         path = folder / self.file
-        texels = read_image(path, self.encoding, self.scale)
+        texels = read_image(path, self.encoding, self.scale, self.layer)
         if len(texels) < 2:
             raise ValueError(f"{path}: has one row of pixels; expected two or more")
         with np.errstate(over="ignore", invalid="ignore"):

@@ -264,6 +264,17 @@ def test_damaged_serialized_meshes_are_refused():
             meshes.read(bytes(damaged), 1)
 
 
+def test_serialized_meshes_that_unpack_to_much_are_refused():
+    """Whatever their stream claims, no more is unpacked than that."""
+    head = struct.pack("<HH", 0x041C, 4)
+    cases = (b"a\0", 1 << 24, 1 << 28), (b"a\0", 1 << 60, 100), (b"a" * 99999, 1, 0)
+    for name, count, length in cases:
+        stream = struct.pack("<I", 0) + name + struct.pack("<QQ", count, 0) + bytes(length)
+        content = head + zlib.compress(stream) + struct.pack("<QI", 0, 1)
+        with pytest.raises(ValueError, match=r"unpacks from|a name without an end"):
+            meshes.read(content, 0)
+
+
 def test_a_scene_of_mitsuba_loads_by_its_suffix(folder):
     """Needs the entry point of the installed package."""
     scene = Scene.load(folder / "scene.xml", {"spp": "9"})

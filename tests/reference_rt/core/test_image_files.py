@@ -1,9 +1,11 @@
 """Images for textures: how every kind of file is read, and the message of every fault."""
 
+import re
 import struct
 import zlib
 
 import numpy as np
+import OpenEXR
 import pytest
 from PIL import Image
 
@@ -81,9 +83,39 @@ def test_modes_of_images(tmp_path):
 
 
 def test_exr_channels(tmp_path):
-    write_exr(tmp_path / "layer.exr", {"beauty.R": np.ones((3, 4))}, {})
-    with pytest.raises(ValueError, match=r"has channels beauty.R; expected R, G, B, or Y"):
-        read_image(tmp_path / "layer.exr", "auto")
+    """Colours, or grey, of the layer that is asked for, or of the only one."""
+    path, plane = tmp_path / "a.exr", np.ones((3, 4))
+
+    def colour(names, layer="", parts=()):
+        planes = [{name: k * plane for k, name in enumerate(n.split(), 1)} for n in (names, *parts)]
+        if parts:
+            made = [
+                OpenEXR.Part(
+                    {"type": OpenEXR.scanlineimage, "name": str(k)},
+                    {n: p.astype(np.float32) for n, p in one.items()},
+                )
+                for k, one in enumerate(planes)
+            ]
+            OpenEXR.File(made).write(str(path))
+        else:
+            write_exr(path, planes[0], {})
+        return read_image(path, "auto", layer=layer)[1, 2].tolist()
+
+    assert colour("R G B") == colour("r g b") == colour("beauty.R beauty.G beauty.B") == [1, 2, 3]
+    assert colour("V.Depth.Z V.Combined.R V.Combined.G V.Combined.B V.Combined.A") == [2, 3, 4]
+    assert colour("a.R a.G a.B R G B") == [4, 5, 6]
+    assert colour("a.R a.G a.B R G B", "a") == [1, 2, 3]
+    assert colour("Z", parts=["b.R b.G b.B"]) == [1, 2, 3]
+    assert colour("a.R a.G a.B", "b", parts=["Z b.R b.G b.B"]) == [2, 3, 4]
+    assert colour("R") == colour("beauty.R") == colour("Y") == colour("y") == [1, 1, 1]
+    for names, layer, said in (
+        ("a.R a.G a.B b.R b.G b.B", "", "several pictures; expected `layer` as one of: a, b"),
+        ("a.R a.G a.B", "b", "expected b.R, b.G, b.B, or b.Y"),
+        ("R Z", "", "has channels R, Z; expected R, G, B, or Y"),
+        ("Y RY BY", "", "has channels BY, RY, Y; expected R, G, B, or Y"),
+    ):
+        with pytest.raises(ValueError, match=re.escape(said)):
+            colour(names, layer)
 
 
 def faults(folder):

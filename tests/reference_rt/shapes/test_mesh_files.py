@@ -1,6 +1,7 @@
 """Mesh files: what a file says is what is read, to the last bit."""
 
 import os
+import zipfile
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from mesh_writers import (
     SQUARE,
     TRIANGLES,
     XYZ,
+    Gltf,
     V,
     ascii_stl,
     binary_stl,
@@ -27,9 +29,10 @@ from mesh_writers import (
 )
 
 from reference_rt.rendering.image import srgb
-from reference_rt.shapes.meshes.files import other, read_mesh
+from reference_rt.shapes.meshes.files import read_mesh
 from reference_rt.shapes.meshes.files.data import linear
 from reference_rt.shapes.meshes.files.polygons import triangulated
+from reference_rt.util import memory
 
 
 def decoded(x):
@@ -137,6 +140,63 @@ def test_ply_of_any_polygons(tmp_path_factory, form, types, faces, beside):
     expected = triangulated(points, np.concatenate(faces), np.array([len(f) for f in faces]))[0]
     assert np.array_equal(mesh.faces, expected)
     assert np.array_equal(mesh.vertices, points)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_ply_strips(tmp_path, form):
+    """A strip of n corners has n - 2 triangles, all of one side; -1 and a row's end end it."""
+    points = [[x, y, 0.0] for x in range(6) for y in (0, 1)]
+    vertices = ("vertex", XYZ, points)
+    rows = [[list(range(7, -1, -1))], [[-1, 11, 10, 9, 8, 7, 6, -1, -1, 0, 1]]]
+    strips = ("tristrips", ["list int int vertex_indices"], rows)
+    mesh = read(tmp_path, ply(form, vertices, strips), "mesh.ply")
+    assert len(mesh.faces) == 6 + 4
+    across = np.cross(*(corners(mesh)[:, k] - corners(mesh)[:, 0] for k in (1, 2)))
+    assert np.array_equal(across, [[0, 0, -1]] * 10)
+    assert mesh.doubtful == ()
+    both = ply(form, vertices, ("face", FACES, [[[0, 2, 1]]]), strips)
+    with pytest.raises(ValueError, match="has faces and tristrips"):
+        read(tmp_path, both, "mesh.ply")
+
+
+@pytest.mark.parametrize("name", ["mesh.obj", "mesh.off", "mesh.ply"])
+def test_a_byte_order_mark_is_no_content(tmp_path, name):
+    text = {
+        "mesh.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+        "mesh.off": "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+        "mesh.ply": square("ascii"),
+    }[name]
+    content = text if isinstance(text, bytes) else text.encode()
+    marked = read(tmp_path, b"\xef\xbb\xbf" + content, name)
+    assert np.array_equal(corners(marked), corners(read(tmp_path, content, name)))
+
+
+def test_gltf_sparse_accessors(tmp_path):
+    """Values in place of some rows of a view, and of zeros; a file without scenes shows all."""
+    file = Gltf()
+    place, value = np.array([1, 3], np.uint16), np.array([[5, 6, 7], [8, 9, 1]], np.float32)
+    views = [file.accessors[file.add(array)]["bufferView"] for array in (place, value)]
+    file.accessors[0]["sparse"] = {
+        "count": 2,
+        "indices": {"bufferView": views[0], "componentType": 5123},
+        "values": {"bufferView": views[1]},
+    }
+    path = tmp_path / "a.glb"
+    for rows in (POINTS, np.zeros_like(POINTS)):
+        path.write_bytes(file.glb())
+        expected = rows.copy()
+        expected[place] = value
+        assert np.array_equal(read_mesh(path).vertices, expected)
+        file.accessors[0].pop("bufferView", None)
+    file.accessors[0]["sparse"]["indices"]["bufferView"] = views[1]  # out of range
+    path.write_bytes(file.glb())
+    with pytest.raises(ValueError, match="its indices reach"):
+        read_mesh(path)
+    bare = Gltf()
+    del bare.root["scenes"]
+    bare.root["nodes"] = [{"mesh": 0}, {"children": [0], "translation": [0, 0, 2]}]
+    path.write_bytes(bare.glb())
+    assert np.array_equal(corners(read_mesh(path)), [POINTS[:3] + np.float32([0, 0, 2])])
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -250,7 +310,7 @@ def test_other_formats_are_those_of_trimesh(tmp_path, monkeypatch):
         read(tmp_path, b"other content", "a.thing")
 
 
-def test_3mf(tmp_path, monkeypatch):
+def test_3mf(tmp_path):
     pytest.importorskip("lxml")
     pytest.importorskip("networkx")
     vertices, faces = cube(2)
@@ -258,6 +318,21 @@ def test_3mf(tmp_path, monkeypatch):
     mesh = read_mesh(path)
     check(mesh)
     assert np.array_equal(corners(mesh), vertices[faces] + [9, 0, 0])
-    monkeypatch.setattr(other, "UNPACKED", 1000)
-    with pytest.raises(ValueError, match="unpacks to"):
+
+
+def test_what_unpacks_to_much_is_refused_before(tmp_path, monkeypatch):
+    """By the ratio, and by the memory of the machine."""
+    with zipfile.ZipFile(tmp_path / "a.3mf", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("3D/3dmodel.model", b" " * (1 << 25))
+    sparse = Gltf()
+    much = {"componentType": 5126, "type": "VEC3", "count": 10**9, "sparse": {"count": 1}}
+    sparse.accessors[0] = much
+    (tmp_path / "a.glb").write_bytes(sparse.glb())
+    for name in ("a.3mf", "a.glb"):
+        with pytest.raises(ValueError, match=r"unpacks from \d+ to \d+ bytes; expected"):
+            read_mesh(tmp_path / name)
+    vertices, faces = cube(2)
+    path = model_3mf(tmp_path, vertices, faces)
+    monkeypatch.setattr(memory, "machine_memory", lambda: 1000)
+    with pytest.raises(ValueError, match=r"memory; expected at most the 0.0 GiB"):
         read_mesh(path)

@@ -16,6 +16,7 @@ folder.
 To add a format: a module with `read`, a line in `_READERS`, a row in the tests of damaged files.
 """
 
+import codecs
 from collections.abc import Callable
 from pathlib import Path
 
@@ -45,6 +46,8 @@ def read_mesh(path: Path) -> MeshData:
     suffix = path.suffix.lower()
     reader = _READERS.get(suffix)
     content = _content(path)
+    if suffix in (".obj", ".off", ".ply"):  # some editors begin texts with a byte-order mark
+        content = content.removeprefix(codecs.BOM_UTF8)
     if reader is None and (reader := other.reader(suffix)) is None:
         known = ", ".join([*_READERS, *other.suffixes()])
         raise ValueError(f"mesh {path}: '{suffix}' is not supported; expected one of {known}")

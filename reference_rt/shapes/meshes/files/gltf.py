@@ -21,6 +21,7 @@ from reference_rt.shapes.meshes.files.data import RawMesh
 from reference_rt.shapes.meshes.files.join import joined
 from reference_rt.shapes.meshes.files.polygons import fans
 from reference_rt.util.files import read_input
+from reference_rt.util.memory import check_unpacked
 
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
@@ -97,8 +98,13 @@ class _File:
 
     def parts(self) -> Iterator[tuple[RawMesh, transform.Affine]]:
         """The primitives of all nodes of the scene, with the nodes' maps to the world."""
-        scene = self.item("scenes", self.root.get("scene", 0))
-        waiting = [(node, transform.identity()) for node in reversed(scene.get("nodes", []))]
+        if "scenes" in self.root:
+            roots = self.item("scenes", self.root.get("scene", 0)).get("nodes", [])
+        else:  # a library of nodes: all of them, where their trees begin
+            nodes = self.root.get("nodes", [])
+            children = {child for node in nodes for child in node.get("children", [])}
+            roots = [k for k in range(len(nodes)) if k not in children]
+        waiting = [(node, transform.identity()) for node in reversed(roots)]
         seen = set()
         while waiting:
             index, to_world = waiting.pop()
@@ -151,29 +157,51 @@ class _File:
         """Rows (count, one of `widths`); fraction: integers stand for numbers of [0, 1] or [-1,
         1]."""
         accessor = self.item("accessors", index)
-        if "sparse" in accessor or "bufferView" not in accessor:
-            raise ValueError(
-                f"accessors[{index}] is sparse or without data, which is not supported"
-            )
-        view = self.item("bufferViews", accessor["bufferView"])
-        data = self.buffer(view.get("buffer"))
         width = _WIDTHS.get(str(accessor.get("type")))
         component = _COMPONENTS.get(accessor.get("componentType", 0))
         if width not in widths or component is None:
             raise ValueError(f"accessors[{index}] has the wrong type")
-        dtype = np.dtype(component)
-        row = width * dtype.itemsize
-        count, stride = _natural(accessor, "count"), _natural(view, "byteStride", row)
-        begin, within = _natural(view, "byteOffset", 0), _natural(accessor, "byteOffset", 0)
-        size = _natural(view, "byteLength")
-        if begin + size > len(data):
-            raise ValueError(f"the view of accessors[{index}] reaches beyond its buffer")
-        if count < 1 or stride < row or within + (count - 1) * stride + row > size:
-            raise ValueError(f"accessors[{index}] reaches beyond its view, or is empty")
-        rows = np.ndarray((count, width), dtype, data, begin + within, (stride, dtype.itemsize))
+        dtype, count, name = np.dtype(component), _natural(accessor, "count"), f"accessors[{index}]"
+        sparse = accessor.get("sparse")
+        if "bufferView" in accessor:
+            rows = self.rows(accessor, name, count, width, dtype)
+        elif sparse is None:
+            raise ValueError(f"{name} has no data; expected 'bufferView' or 'sparse'")
+        else:  # zeros, but for some
+            check_unpacked(len(self.binary or b""), count * width * dtype.itemsize, name)
+            rows = np.zeros((count, width), dtype)
+        if sparse is not None:
+            rows = self.replaced(rows, sparse, name)
         if dtype.kind != "f" and (fraction or accessor.get("normalized", False)):
             return np.maximum(rows / np.iinfo(dtype).max, -1.0)
         return rows
+
+    def rows(
+        self, part: dict[str, Any], name: str, count: int, width: int, dtype: np.dtype[Any]
+    ) -> Rows:
+        """Rows (count, width) of a view.  part: names the view and the offset in it."""
+        view = self.item("bufferViews", part.get("bufferView"))
+        data, row = self.buffer(view.get("buffer")), width * dtype.itemsize
+        stride, size = _natural(view, "byteStride", row), _natural(view, "byteLength")
+        begin, within = _natural(view, "byteOffset", 0), _natural(part, "byteOffset", 0)
+        if begin + size > len(data):
+            raise ValueError(f"the view of {name} reaches beyond its buffer")
+        if count < 1 or stride < row or within + (count - 1) * stride + row > size:
+            raise ValueError(f"{name} reaches beyond its view, or is empty")
+        return np.ndarray((count, width), dtype, data, begin + within, (stride, dtype.itemsize))
+
+    def replaced(self, rows: Rows, sparse: dict[str, Any], name: str) -> Rows:
+        """The rows with those that a sparse accessor lists in place of others."""
+        count = _natural(sparse, "count")
+        kind = np.dtype(_COMPONENTS.get(sparse["indices"].get("componentType", 0), "f4"))
+        if kind.kind != "u":
+            raise ValueError(f"the indices of {name} have the wrong type")
+        places = self.rows(sparse["indices"], f"the indices of {name}", count, 1, kind)[:, 0]
+        if places.max() >= len(rows):
+            raise ValueError(f"{name} has {len(rows)} rows; its indices reach {places.max()}")
+        found = rows.copy()
+        found[places] = self.rows(sparse["values"], name, count, rows.shape[1], rows.dtype)
+        return found
 
     def buffer(self, index: Any) -> bytes:
         entry = self.item("buffers", index)

@@ -1,12 +1,12 @@
 """Polygon files, .ply (Turk 1994): ascii, binary of both byte orders, any mixture of polygons.
 
 It reads the element `vertex` with x y z, nx ny nz, uv (u v, s t or texture_u texture_v) and a
-colour, and the element `face` with its list vertex_indices or vertex_index; everything else is
-ignored, and named.  A colour is red green blue, or r g b; or diffuse_red and so on; or as Mitsuba
-writes it, color_0 color_1 color_2, and in the other forms that it reads, color_r and vertex_color_x
-among them; the first of these that the file has.  Colours of integers are sRGB-encoded, 255 or
-65535 being 1: as displayed, which is what scanners and modellers write.  Colours of floats are
-linear: as computed."""
+colour, and the element `face`, or `tristrips`, with its list vertex_indices or vertex_index;
+everything else is ignored, and named.  A colour is red green blue, or r g b; or diffuse_red and so
+on; or as Mitsuba writes it, color_0 color_1 color_2, and in the other forms that it reads, color_r
+and vertex_color_x among them; the first of these that the file has.  Colours of integers are sRGB-
+encoded, 255 or 65535 being 1: as displayed, which is what scanners and modellers write.  Colours of
+floats are linear: as computed."""
 
 import struct
 from array import array
@@ -212,7 +212,7 @@ def read(content: bytes) -> RawMesh:
         body = memoryview(numbers(bytes(body)).tobytes())
     mesh, position = RawMesh(np.zeros((0, 3)), np.zeros((0, 3), np.int64)), 0
     ignored: list[str] = []
-    polygons = None
+    polygons = strips = None
     for element in header.elements:
         if element.name == "vertex":
             table, position = columns(body, position, element)
@@ -239,6 +239,11 @@ def read(content: bytes) -> RawMesh:
             polygons = corners.astype(np.int64), counts
             used = _indices(element).name
             ignored += [f"face {p.name}" for p in element.properties if p.name != used]
+        elif element.name == "tristrips" and element.rows > 0:
+            corners, counts, position = lists(body, position, element, _indices(element))
+            if not np.all(np.isfinite(corners) & (corners == np.trunc(corners))):
+                raise ValueError("it has an index that is no integer")
+            strips = _of_strips(corners.astype(np.int64), counts)
         else:
             _, _, position = lists(body, position, element, None)
             if element.rows > 0:
@@ -247,10 +252,28 @@ def read(content: bytes) -> RawMesh:
         left = (len(body) - position) // (8 if ascii_ else 1)
         what = "numbers" if ascii_ else "bytes"
         raise ValueError(f"{left} {what} are left after all that its header promises")
+    if strips is not None:
+        mesh = mesh._replace(faces=strips)
     if polygons is not None:
+        if strips is not None:
+            raise ValueError("it has faces and tristrips; expected one of them")
         faces, concave = triangulated(mesh.vertices, *polygons)
         mesh = mesh._replace(faces=faces, doubtful=doubt(concave))
     return mesh._replace(ignored=tuple(ignored))
+
+
+def _of_strips(corners: IntArray, counts: IntArray) -> IntArray:
+    """The triangles (m, 3) of strips, which -1 and the end of a list end: each corner makes one
+    with the two before it, every second one in reverse."""
+    row = np.repeat(np.arange(len(counts)), counts)
+    cuts = np.flatnonzero((corners[:-1] < 0) | (corners[1:] < 0) | (np.diff(row) != 0)) + 1
+    begins = np.zeros(len(corners), np.int64)
+    begins[cuts] = cuts
+    begins = np.maximum.accumulate(begins)
+    last = np.flatnonzero(np.arange(len(corners)) - begins >= 2)
+    is_odd = (last - begins[last]) % 2 == 1
+    first, second = last - 2 + is_odd, last - 1 - is_odd
+    return np.stack([corners[first], corners[second], corners[last]], axis=1)
 
 
 def _first(table: dict[str, Array], sets: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
@@ -287,7 +310,7 @@ def _indices(element: Element) -> Property:
             if p.declared[0] == "f":
                 raise ValueError(f"its '{p.name}' are floats; expected integers")
             return p
-    raise ValueError("its element 'face' has no list 'vertex_indices'; expected one")
+    raise ValueError(f"its element '{element.name}' has no list 'vertex_indices'; expected one")
 
 
 def _header(content: bytes) -> Header:
