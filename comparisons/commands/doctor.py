@@ -7,7 +7,7 @@ from comparisons.mitsuba import backend
 from reference_rt.cli.doctor import Check
 from reference_rt.util.errors import ReferenceUnavailableError
 
-PACKAGES = ("skimage", "flip_evaluator", "scipy", "jinja2", "junitparser", "manifold3d", "flint")
+PACKAGES = ("skimage", "scipy", "jinja2", "junitparser", "manifold3d", "flint")
 """Modules of the extra `compare`, besides Mitsuba."""
 
 
@@ -21,6 +21,8 @@ def checks() -> Iterable[Check]:
         slow = "" if chosen.variant != backend.SCALAR else f"slow: {chosen.reason}"
         advice = "; ".join(filter(None, (chosen.doubt, slow)))
         yield Check("Mitsuba", f"{chosen.version}, {chosen.variant}", advice)
+    if importlib.util.find_spec("flip_evaluator") is None:
+        yield Check("FLIP", "left out: flip-evaluator is not installed", "pip install flip-evaluator")
     missing = [name for name in PACKAGES if importlib.util.find_spec(name) is None]
     if missing:
         found = f"without {', '.join(missing)}"

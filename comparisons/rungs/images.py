@@ -19,7 +19,7 @@ from comparisons.statistics.metric_null import (
     noise_alone,
     noise_ratio,
 )
-from comparisons.statistics.metrics import decibels
+from comparisons.statistics.metrics import decibels, has_flip
 from comparisons.statistics.shared_noise import excess_by_sharing
 
 MEAN_BIAS = 0.001
@@ -121,7 +121,15 @@ def images_rung(
             failed.append(f"{LABEL[name]} {gate.value:.4g}, expected {_expected(name, gate)}")
     if failed:
         return RungResult("images", "differ", "; ".join(failed), numbers)
-    facts.append(", ".join(f"{LABEL[name]} {gate.value:.4g}" for name, gate in gates.items()))
+    facts.append(
+        ", ".join(
+            f"{LABEL[name]} {gate.value:.4g}"
+            for name, gate in gates.items()
+            if not math.isnan(gate.value)
+        )
+    )
+    if not has_flip():
+        facts.append("FLIP is left out: flip-evaluator is not installed")
     return RungResult("images", "agree", "; ".join(facts), numbers)
 
 

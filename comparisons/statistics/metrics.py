@@ -5,6 +5,7 @@ None of them alone is a test: a picture 20 % too bright still has an SSIM of 0.9
 """
 
 import functools
+import importlib.util
 import math
 import os
 from typing import Any, NamedTuple
@@ -55,7 +56,7 @@ def image_metrics(images: Images) -> Metrics:
     NaN, so that no threshold is passed.
 
     SSIM uses a 7 px window, or the largest odd one that fits into a smaller picture; below 3 px
-    it is undefined and NaN. PSNR of equal pictures is infinite, and so is relMSE or the bias of
+    it is undefined and NaN; so is FLIP without its package (`has_flip`). PSNR of equal pictures is infinite, and so is relMSE or the bias of
     a channel where the reference is black and the candidate is not. Raises ValueError for pictures
     that are not (height, width, 3), are empty, or differ in shape.
     """
@@ -161,7 +162,14 @@ def _checked(images: Images) -> tuple[FloatArray, FloatArray]:
     return a, b
 
 
+def has_flip() -> bool:
+    """Whether FLIP can be measured here.  Its package has no wheels for some versions of Python."""
+    return importlib.util.find_spec("flip_evaluator") is not None
+
+
 def _flip(a: FloatArray, b: FloatArray, white: float, stops: tuple[float, float]) -> FloatArray:
+    if not has_flip():
+        return np.full(a.shape[:2], math.nan)
     first, last = stops
     # FLIP needs radiance >= 0; clipping comes before the division, which cannot overflow then.
     a, b = (np.clip(image, 0.0, FLIP_HIGHEST * white) / white for image in (a, b))
