@@ -22,7 +22,9 @@ def checks() -> Iterable[Check]:
         advice = "; ".join(filter(None, (chosen.doubt, slow)))
         yield Check("Mitsuba", f"{chosen.version}, {chosen.variant}", advice)
     if importlib.util.find_spec("flip_evaluator") is None:
-        yield Check("FLIP", "left out: flip-evaluator is not installed", "pip install flip-evaluator")
+        yield Check(
+            "FLIP", "left out: flip-evaluator is not installed", "pip install flip-evaluator"
+        )
     missing = [name for name in PACKAGES if importlib.util.find_spec(name) is None]
     if missing:
         found = f"without {', '.join(missing)}"

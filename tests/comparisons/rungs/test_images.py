@@ -5,7 +5,9 @@ import pytest
 from scipy import ndimage
 
 from comparisons.results.case import FloatArray, Images, RungResult
+from comparisons.rungs import images
 from comparisons.rungs.images import images_rung
+from comparisons.statistics import metrics
 from comparisons.statistics.metric_null import noise_ratio
 from comparisons.statistics.metrics import image_metrics
 
@@ -28,13 +30,13 @@ def picture() -> FloatArray:
 
 
 def judged(candidate: FloatArray, reference: FloatArray) -> RungResult:
-    images = Images(candidate.mean(axis=0), reference.mean(axis=0))
-    return images_rung(images, image_metrics(images), (candidate, reference))
+    pair = Images(candidate.mean(axis=0), reference.mean(axis=0))
+    return images_rung(pair, image_metrics(pair), (candidate, reference))
 
 
 def judged_alone(candidate: FloatArray, reference: FloatArray) -> RungResult:
-    images = Images(candidate, reference)
-    return images_rung(images, image_metrics(images), None)
+    pair = Images(candidate, reference)
+    return images_rung(pair, image_metrics(pair), None)
 
 
 def test_noise_alone_has_ratio_one(picture: FloatArray) -> None:
@@ -47,6 +49,21 @@ def test_noise_alone_has_ratio_one(picture: FloatArray) -> None:
     assert np.mean([r for r, _ in ratios]) == pytest.approx(1.0, abs=0.02)
     # Of 20 the largest deviation is below 5 standard errors but once in 10^5 runs.
     assert all(abs(r - 1.0) < 5.0 * s + 0.02 for r, s in ratios)
+
+
+@pytest.mark.parametrize("off", [1.0, 1.3])
+def test_without_flip_the_others_judge(
+    monkeypatch: pytest.MonkeyPatch, picture: FloatArray, off: float
+) -> None:
+    """Its package has no wheels for some versions of Python."""
+    for module in (metrics, images):
+        monkeypatch.setattr(module, "has_flip", lambda: False)
+    found = judged(off * replicates(1, picture), replicates(2, picture))
+    assert found.status == ("agree" if off == 1.0 else "differ")
+    assert found.numbers["flip"]["value"] is None
+    assert "nan" not in found.reason
+    if off == 1.0:
+        assert found.reason.endswith("FLIP is left out: flip-evaluator is not installed")
 
 
 def skewed(rng: np.random.Generator, picture: FloatArray, count: int) -> FloatArray:
