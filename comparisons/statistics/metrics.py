@@ -56,9 +56,10 @@ def image_metrics(images: Images) -> Metrics:
     NaN, so that no threshold is passed.
 
     SSIM uses a 7 px window, or the largest odd one that fits into a smaller picture; below 3 px
-    it is undefined and NaN; so is FLIP without its package (`has_flip`). PSNR of equal pictures is infinite, and so is relMSE or the bias of
-    a channel where the reference is black and the candidate is not. Raises ValueError for pictures
-    that are not (height, width, 3), are empty, or differ in shape.
+    it is undefined and NaN; so is FLIP without its package (`has_flip`). PSNR of equal pictures is
+    infinite, and so is relMSE or the bias of a channel where the reference is black and the
+    candidate is not. Raises ValueError for pictures that are not (height, width, 3), are empty, or
+    differ in shape.
     """
     a, b = _checked(images)
     nonfinite = count_nonfinite(a, b)
