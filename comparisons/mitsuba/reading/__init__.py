@@ -44,7 +44,7 @@ def leave_out_missing(parsed: Parsed, read: Callable[[], S]) -> tuple[S, list[st
     """Change `parsed` until `read` finds nothing that our scenes lack: the scene, and what was left
     out, a line each.  Raises the error of what can neither be left out nor replaced, such as a
     camera."""
-    said: list[str] = []
+    said = list(parsed.left_out)
     while True:
         try:
             return read(), said
@@ -96,7 +96,7 @@ def read_file(
 
     Raises SceneError, ReferenceUnavailableError without Mitsuba; warns of what is read otherwise.
     """
-    parsed = parse_file(path, defaults or {})
+    parsed = parse_file(path, defaults or {}, allow_missing)
     if allow_missing:
         scene, left_out = read_supported(parsed, cls)
         for text in left_out:

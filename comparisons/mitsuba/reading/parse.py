@@ -5,7 +5,7 @@ import codecs
 import re
 import warnings
 import xml.parsers.expat
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -233,7 +233,8 @@ class Parsed(NamedTuple):
     state: `mitsuba.parser.ParserState`, upgraded to Mitsuba 3 and its references resolved;  file:
     the name for messages;  folder: where relative file names count from, first;  resolve: the
     file that Mitsuba finds for a name;  defaults: values for <default> elements;  written: see
-    `transforms`;  notes: what `foreign` has changed.
+    `transforms`;  notes: what `foreign` has changed;  left_out: a line for each kind of element
+    that Mitsuba does not know.
     """
 
     state: Any
@@ -243,6 +244,7 @@ class Parsed(NamedTuple):
     defaults: Mapping[str, str]
     written: dict[str, Transforms]
     notes: list[Note]
+    left_out: Collection[str] = ()
 
     def transforms(self, file: str) -> Transforms:
         """The transforms of a file as they are written."""
@@ -292,23 +294,45 @@ def scalar() -> Iterator[Any]:
                 mi.set_variant(old)
 
 
-def parse_file(path: Path, defaults: Mapping[str, str]) -> Parsed:
-    """Parse an .xml file;  defaults: values for its <default> elements.  Raises SceneError."""
+_UNKNOWN = re.compile(r"encountered an unsupported XML element: (<[\w.:-]+>)")
+_LEFT_OUT = re.compile(r"<([\w.:-]+)>: is not supported$")
+
+
+def parse_file(path: Path, defaults: Mapping[str, str], allow_missing: bool = False) -> Parsed:
+    """Parse an .xml file;  defaults: values for its <default> elements;  allow_missing: whether to
+    leave out elements that Mitsuba does not know, such as those of its forks.  Raises SceneError.
+    """
+    check = _Included(path.parent, dict(defaults))
+    check.read(path, path.name, (), 0)
+    unknown: dict[str, str] = {}
+    while True:
+        try:
+            parsed = _parse_file(path, defaults, check, unknown)
+            return parsed._replace(left_out=list(unknown.values()))
+        except SceneError as error:
+            found = _LEFT_OUT.search(error.message)
+            if not allow_missing or found is None or found[1] in unknown:
+                raise
+            unknown[found[1]] = f"{error}, and left out on both sides"
+
+
+def _parse_file(
+    path: Path, defaults: Mapping[str, str], check: "_Included", unknown: Collection[str]
+) -> Parsed:
+    """unknown: the names of elements that are left out."""
     mi = module()
     folder = path.parent
-    check = _Included(folder, dict(defaults))
-    check.read(path, path.name, (), 0)
     old = mi.file_resolver()
     resolver = mi.FileResolver(old)
     resolver.prepend(str(folder))
     with temporary_folder() as copies:
         start = path
-        if check.is_old:  # Mitsuba's parser finds the copies first
-            resolver.prepend(copies)
+        if check.is_old or unknown:  # Mitsuba's parser finds the copies first
+            resolver.prepend(str(copies))
             for name, (_, content) in check.copied.items():
                 copy = Path(copies, name)
                 copy.parent.mkdir(parents=True, exist_ok=True)
-                copy.write_bytes(OLD_ELEMENT.sub(rb"\1lookat", content))
+                copy.write_bytes(_without(unknown, OLD_ELEMENT.sub(rb"\1lookat", content)))
             start = Path(copies, path.name)
         before = len(resolver)
         mi.set_file_resolver(resolver)
@@ -331,6 +355,16 @@ def parse_file(path: Path, defaults: Mapping[str, str]) -> Parsed:
     if check.is_old:
         notes.insert(0, (0, "<lookAt> of Mitsuba 0.x is read as <lookat>, on both sides"))
     return Parsed(state, str(path), folder, paths, defaults, {}, notes)
+
+
+def _without(names: Collection[str], content: bytes) -> bytes:
+    """A file without the elements of these names; its lines keep their numbers."""
+    for name in names:
+        word = re.escape(name.encode())
+        element = rb"<%b(\s[^>]*)?/>|<%b(\s[^>]*)?>.*?</%b\s*>" % (word, word, word)
+        lines = re.compile(element, re.DOTALL)
+        content = lines.sub(lambda found: b"\n" * found[0].count(b"\n"), content)
+    return content
 
 
 def parse_dict(scene: Mapping[str, Any], folder: Path) -> Parsed:
@@ -373,6 +407,7 @@ def _scene_error(message: str, path: Path | None) -> SceneError:
         line, column = int(last["line"]), last["col"]
         message = message[: last.start()]
     text = " ".join(_FIRST.sub("", message, count=1).split())
+    text = _UNKNOWN.sub(r"\1: is not supported", text)
     return SceneError((f"column {column}: " if column else "") + text, file=file, line=line)
 
 

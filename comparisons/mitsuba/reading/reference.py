@@ -252,7 +252,7 @@ def _parsed(scene: Scene) -> tuple[Parsed, list[str]]:
     """The file of a scene, without what `Scene.load` was asked to leave out; and what it was."""
     path = file_of(scene)
     assert path is not None
-    parsed = parse_file(path, scene.defaults)
+    parsed = parse_file(path, scene.defaults, scene.allows_missing)
     if not scene.allows_missing:
         return parsed, []
     with warnings.catch_warnings():

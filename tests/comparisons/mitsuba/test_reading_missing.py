@@ -53,6 +53,14 @@ MISSING = {
         f'{SPHERE}<integrator type="ptracer"/>',
         "integrator 'ptracer': is not supported, and replaced by 'path' on both sides",
     ),
+    "element of a fork": (
+        f'<denoiser type="oidn"><integer name="n" value="3"/>\n</denoiser>{SPHERE}<denoiser/>',
+        "<denoiser>: is not supported, and left out on both sides",
+    ),
+    "element in an element": (
+        '<shape type="sphere"><tint.of_fork value="3">\n<velocity x="1"/></tint.of_fork></shape>',
+        "<tint.of_fork>: is not supported, and left out on both sides",
+    ),
     "parameter": (
         '<shape type="sphere"><float name="wobble" value="1"/></shape>',
         "the parameter 'wobble' is not supported, and left out on both sides",
