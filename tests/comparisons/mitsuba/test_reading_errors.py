@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from comparisons.mitsuba.reading import read_dict, read_file
-from comparisons.mitsuba.reading.parse import MOST_NESTED
+from comparisons.mitsuba.reading.included import MOST_NESTED
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneError, SceneWarning
 

@@ -15,7 +15,7 @@ from PIL import Image
 from test_reading_plugins import fast, filled
 
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.reading import parse, read_file
+from comparisons.mitsuba.reading import included, read_file
 from comparisons.mitsuba.reading.foreign import PRIMAL
 from comparisons.mitsuba.reading.reference import changes_to, own_scene
 from reference_rt.rendering.scene import Scene
@@ -306,10 +306,10 @@ def test_includes_end(tmp_path, monkeypatch):
     write("scene.xml", *["p0.xml"] * 4)  # no cycle, but 4^10 files
     for k in range(10):
         write(f"p{k}.xml", *[f"p{k + 1}.xml"] * 4)
-    assert f"more than {parse.MOST_FILES} files" in refused(tmp_path)
+    assert f"more than {included.MOST_FILES} files" in refused(tmp_path)
     write("scene.xml", *["d.xml"] * 3)
     write("d.xml", head="<!--" + 500 * "x" + "-->")
-    monkeypatch.setattr(parse, "MOST_BYTES", 1500)
+    monkeypatch.setattr(included, "MOST_BYTES", 1500)
     assert "more than" in refused(tmp_path)
 
 
