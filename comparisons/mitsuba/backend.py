@@ -280,7 +280,9 @@ def _remembered_proof(version: str, variant: str, path: str) -> str | None:
     if key in memory:
         return memory[key]
     problem = prove(variant, path)
-    if problem is None or "did not answer" not in problem:  # a time-out may be a busy machine
+    # A time-out may be a busy machine, and a library that fails may only lack another one: what is
+    # remembered is what depends on the file alone.
+    if problem is None or "by signal" in problem:
         _write_memory(_read_memory() | {key: problem})
     return problem
 

@@ -301,6 +301,8 @@ def _word(part: dict[str, Any], draw: Draw, names: Names, own: str, key: str) ->
         return draw.pick(part["enum"])
     if key == "file":
         return draw.pick(names.files[own]) if own in names.files else None
+    if key == "layer":  # files here have no layers
+        return None
     if key == "group":
         return draw.pick(names.groups) if names.groups else None
     images = names.normals if key == "normals" and not draw.extreme else names.images

@@ -66,6 +66,19 @@ def test_what_was_proven_is_remembered_until_the_file_changes(
     assert len(proofs) == 2
 
 
+@pytest.mark.parametrize(
+    ("problem", "times"), [("ends the process by signal 4", 1), ("fails: lacks another one", 2)]
+)
+def test_what_others_may_mend_is_tried_again(
+    bogus: str, monkeypatch: pytest.MonkeyPatch, problem: str, times: int
+) -> None:
+    proofs = []
+    monkeypatch.setattr(backend, "prove", lambda *which: proofs.append(which) or problem)
+    assert backend.choose().llvm_path is None
+    assert problem in backend.choose().reason
+    assert len(proofs) == times
+
+
 def test_a_broken_memory_is_none(bogus: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Cut anywhere, or of other types than were written: proven again, and whole afterwards."""
     file = backend._memory_file()
