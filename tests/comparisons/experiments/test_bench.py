@@ -158,6 +158,7 @@ def test_equal_error_of_nothing_meets_no_goal() -> None:
     assert not any(row.met for row in equal_error.rows({}, {}))
 
 
+@pytest.mark.slow
 def test_only_path_traced_scenes_of_the_standard_suite_count() -> None:
     names = set(equal_error.path_traced(Setting(scenes=SCENES, quick=True)))
     assert names == set(equal_error.QUICK)

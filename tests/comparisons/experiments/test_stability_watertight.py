@@ -108,6 +108,7 @@ def test_seams_of_something_else_are_seen():
     assert found.examples[1]["found"] == "shape 0 at t = inf"
 
 
+@pytest.mark.slow
 def test_mitsuba_leaks_without_the_robust_flag_and_in_groups(tmp_path):
     found = measured(tmp_path, "F3", "offset", 1.0, 4000, mitsuba=True)
     assert found[OURS].failures == 0

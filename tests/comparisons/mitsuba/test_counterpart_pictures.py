@@ -316,7 +316,7 @@ def test_solids(operation: str, material: str) -> None:
     assert agree(by_ours(scene), by_mitsuba(load(scene).mi_scene, scene), 0.02)
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("coat", COATS)
 def test_samples_of_plastics_have_the_density_that_they_state(
     coat: str, image_folder: Path
@@ -430,7 +430,7 @@ def test_first_hits_in_the_scalar_variant(operation: str, of: tuple[str, ...]) -
         check_hits(solid(operation, of, MAPS[1]), 100)
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("material", ["coat", "glass", "grey", "silver", "glow"])
 @pytest.mark.parametrize("operation", ["union", "intersection", "difference"])
 def test_light_on_solids(operation: str, material: str) -> None:

@@ -72,6 +72,7 @@ def test_what_is_behind_a_lamp_is_seen(lamp, integrator):
     assert (shown.layers["depth"] < wall.layers["depth"]).any()
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("integrator", INTEGRATORS.values(), ids=INTEGRATORS)
 def test_the_same_wall_in_the_same_light(integrator):
     """A lamp between the eye and the wall, and its light by a point source in its middle's place

@@ -117,6 +117,7 @@ def test_linked_kernels_stay_if_they_are_asked_for(scene, monkeypatch):
     assert all(kernel in watched.linked for kernel in watched.used)
 
 
+@pytest.mark.slow
 @forks
 def test_a_child_that_stores_nothing_changes_nothing(scene, monkeypatch):
     """On a full disk, for example."""

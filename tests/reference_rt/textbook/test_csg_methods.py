@@ -216,7 +216,7 @@ def test_many_random_trees(depth, mesh):
     assert check_random_trees(depth, range(100, 150), mesh) > 0.05 * N
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_operand(kind, mesh):
     """A tree of one, and no tree at all."""
