@@ -5,7 +5,6 @@ import numba
 import numpy as np
 
 from reference_rt import shapes as any_shape
-from reference_rt.accel.bvh import Bvh
 from reference_rt.accel.geometry import Geometry, closest_hit, geometries, occluded
 from reference_rt.accel.stream import any_of_block, closest_of_block, trace_block
 from reference_rt.core.ray import Hit, Ray
@@ -19,11 +18,10 @@ from reference_rt.core.ray_block import (
     ray_of,
 )
 from reference_rt.core.ray_block import hit_of as hit_in_block
-from reference_rt.jit.function_pointer import FunctionPointer, call_pointer
+from reference_rt.jit.function_pointer import call_pointer
 from reference_rt.jit.kernel import ByClass, kernel, signature_of
 from reference_rt.jit.links import Link
 from reference_rt.jit.parallel_compile import Call
-from reference_rt.shapes.instances import Instances
 
 
 def tracer_of(geometry: Geometry) -> Call | None:
@@ -44,32 +42,23 @@ def tracer_of(geometry: Geometry) -> Call | None:
 @geometries.operation
 def closest_hits(geometry: Geometry, rays: RayBlock, hits: HitBlock, n: int) -> None:
     """`closest_hit` of the first n rays; read the hits with `hit_of`."""
-    _trace(geometry.bvh, geometry.instances, geometry.tracer, geometry, rays, hits, n, False)
+    _trace(geometry, rays, hits, n, False)
 
 
 @geometries.operation
 def any_hits(geometry: Geometry, rays: RayBlock, hits: HitBlock, n: int) -> None:
     """`occluded` of the first n rays: hits.codes[j] >= 0 for those that are; the rest of the hits
     means nothing."""
-    _trace(geometry.bvh, geometry.instances, geometry.tracer, geometry, rays, hits, n, True)
+    _trace(geometry, rays, hits, n, True)
 
 
 @kernel
-def _trace(
-    bvh: Bvh | None,
-    instances: Instances | None,
-    tracer: FunctionPointer | None,
-    geometry: Geometry,
-    rays: RayBlock,
-    hits: HitBlock,
-    n: int,
-    any_hit: bool,
-) -> None:
-    shapes, solids = geometry.shapes, geometry.solids
-    if bvh is None:
+def _trace(geometry: Geometry, rays: RayBlock, hits: HitBlock, n: int, any_hit: bool) -> None:
+    bvh, shapes, solids = geometry.bvh, geometry.shapes, geometry.solids
+    if geometry.bvh is None:
         any_shape.nearest_of_rays(shapes, rays, hits, n, any_hit)
         return
-    if instances is not None:
+    if geometry.instances is not None:
         # An instance changes the ray's origin and direction, which streams compute only once.
         for j in range(n):
             if any_hit:
@@ -77,8 +66,8 @@ def _trace(
             else:
                 put_hit(hits, j, closest_hit(geometry, ray_of(rays, j)))
         return
-    if tracer is not None:
-        call_pointer(tracer[0], (bvh, shapes, solids, rays, hits, n, any_hit))
+    if geometry.tracer is not None:
+        call_pointer(geometry.tracer[0], (bvh, shapes, solids, rays, hits, n, any_hit))
         return
     if any_hit:
         any_of_block(bvh, shapes, solids, rays, hits, n)
@@ -88,7 +77,10 @@ def _trace(
 
 @kernel
 def _hit_in_geometry(geometry: Geometry, ray: Ray, hits: HitBlock, j: int) -> Hit:
-    return _hit_of(geometry.bvh, geometry, ray, hits, j)
+    if geometry.bvh is None:
+        found: Hit = any_shape.nearest_of_ray(geometry.shapes, ray, hits, j)
+        return found
+    return hit_in_block(hits, j)
 
 
 @kernel
@@ -101,11 +93,3 @@ _choice.register(Geometry, _hit_in_geometry)
 _choice.register(Link, _hit_through_link)
 hit_of = _choice.function
 """hit_of(geometry, ray, hits, j): the hit of ray j after `closest_hits`."""
-
-
-@kernel
-def _hit_of(bvh: Bvh | None, geometry: Geometry, ray: Ray, hits: HitBlock, j: int) -> Hit:
-    if bvh is None:
-        found: Hit = any_shape.nearest_of_ray(geometry.shapes, ray, hits, j)
-        return found
-    return hit_in_block(hits, j)

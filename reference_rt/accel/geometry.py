@@ -63,22 +63,22 @@ geometries = Linkable()
 @geometries.operation
 def closest_hit(geometry: Geometry, ray: Ray) -> Hit:
     """The intersection with the smallest t in (0, t_max); `kind` is -1 for none."""
-    return _trace(geometry.bvh, geometry, ray, False)
+    return _trace(geometry, ray, False)
 
 
 @geometries.operation
 def occluded(geometry: Geometry, ray: Ray) -> bool:
     """Whether anything is hit at t in (0, t_max); the traversal ends at the first hit."""
-    return _trace(geometry.bvh, geometry, ray, True).kind >= 0
+    return _trace(geometry, ray, True).kind >= 0
 
 
 @kernel
-def _trace(bvh: Bvh | None, geometry: Geometry, ray: Ray, any_hit: bool) -> Hit:
-    if bvh is None:
+def _trace(geometry: Geometry, ray: Ray, any_hit: bool) -> Hit:
+    if geometry.bvh is None:
         # For a few shapes an early exit of any-hit rays would cost more than it saves.
         found: Hit = any_shape.nearest(geometry.shapes, geometry.packets, ray)
         return found
-    return _traverse(bvh, geometry.shapes, geometry.solids, geometry.instances, ray, any_hit)
+    return _traverse(geometry, ray, any_hit)
 
 
 class LocalRay(NamedTuple):
@@ -100,17 +100,11 @@ def local_ray(bvh: Bvh, instances: Instances | None, instance: int, ray: Ray) ->
 
 
 @kernel
-def _traverse(
-    bvh: Bvh,
-    shapes: Shapes,
-    solids: Solids | None,
-    instances: Instances | None,
-    ray: Ray,
-    any_hit: bool,
-) -> Hit:
+def _traverse(geometry: Geometry, ray: Ray, any_hit: bool) -> Hit:
     """Depth first, the nearest child first.  The stack holds the other children (`stack`), the t at
     which the ray enters their boxes (`waiting`) and the instance in whose space they are
     (`space`)."""
+    bvh, shapes, instances = geometry.bvh, geometry.shapes, geometry.instances
     stack, waiting, space = local_integers(STACK), local_floats(STACK), local_integers(STACK)
     distances, seen = local_floats(VECTOR_WIDTH), local_floats(PROJECTION_FLOATS)
     closest = no_hit(ray)
@@ -130,7 +124,7 @@ def _traverse(
                 node, top = any_child(bvh, node, met, stack, top)
             else:
                 node, top = nearest_child(bvh, node, met, distances, stack, waiting, top)
-            if instances is not None:
+            if geometry.instances is not None:
                 for k in range(bottom, top):
                     space[k] = instance
         if is_triangle_leaf(node):
@@ -141,13 +135,21 @@ def _traverse(
             first = first_of(node)
             for k in range(first, first + size_of(node)):
                 kind, row = kind_of(bvh, k), row_of(bvh, k)
-                if instances is not None:
+                if geometry.instances is not None:
                     if kind == INSTANCE:
                         stack[top], waiting[top], space[top] = instances.root[row], 0.0, row
                         top += 1
                         continue
                 closest = nearer_primitive(
-                    bvh, shapes, solids, kind, row, local.ray, local.shear, instance, closest
+                    bvh,
+                    shapes,
+                    geometry.solids,
+                    kind,
+                    row,
+                    local.ray,
+                    local.shear,
+                    instance,
+                    closest,
                 )
         # Tested once per leaf: a test after each primitive costs a quarter of the speed.
         if any_hit and closest.kind >= 0:
@@ -159,7 +161,7 @@ def _traverse(
             if any_hit or can_be_nearer(waiting[top], closest.t):
                 break
         node = stack[top]
-        if instances is not None:
+        if geometry.instances is not None:
             if space[top] != instance:
                 instance = space[top]
                 local = local_ray(bvh, instances, instance, ray)
@@ -170,7 +172,12 @@ def surface(geometry: Geometry, ray: Ray, hit: Hit) -> SurfacePoint:
     """The surface point, in world space, of a hit with `hit.kind >= 0`."""
     local, seen, solid = _in_primitive_space(geometry, ray, hit)
     point = any_shape.surface(geometry.shapes, local, seen)
-    point = _flipped(geometry.parts, geometry.shapes, hit, point)
+    if geometry.parts is not None:
+        # The outside of an operand may be the inside of its solid.
+        if geometry.parts.turned[any_shape.owner(geometry.shapes, hit.kind, hit.row)] != 0:
+            point = SurfacePoint(
+                point.p, -point.n, -point.ns, point.error, point.material, point.light
+            )
     point = out_of_solid(geometry.solids, solid, point)
     return out_of(geometry.instances, hit.instance, point)
 
@@ -180,26 +187,11 @@ def _in_primitive_space(geometry: Geometry, ray: Ray, hit: Hit) -> tuple[Ray, Hi
     """(ray, hit, solid): the ray and the hit in the space of the primitive's table, that is of its
     instance and relative to the anchor of its solid; solid is -1 for none."""
     local = ray_in(geometry.instances, hit.instance, ray)
-    solid = _solid_of(geometry.parts, geometry.shapes, hit)
+    solid = -1
+    if geometry.parts is not None:
+        solid = int(geometry.parts.solid[any_shape.owner(geometry.shapes, hit.kind, hit.row)])
     local, begin = ray_near(geometry.solids, solid, local)
     return local, Hit(hit.t - begin, hit.kind, hit.row, hit.u, hit.v, hit.instance), solid
-
-
-@kernel
-def _solid_of(parts: Parts | None, shapes: Shapes, hit: Hit) -> int:
-    if parts is None:
-        return -1
-    return int(parts.solid[any_shape.owner(shapes, hit.kind, hit.row)])
-
-
-@kernel
-def _flipped(parts: Parts | None, shapes: Shapes, hit: Hit, point: SurfacePoint) -> SurfacePoint:
-    """The point, with normals flipped where the operand's outside is the inside of its solid."""
-    if parts is None:
-        return point
-    if parts.turned[any_shape.owner(shapes, hit.kind, hit.row)] == 0:
-        return point
-    return SurfacePoint(point.p, -point.n, -point.ns, point.error, point.material, point.light)
 
 
 class HitIds(NamedTuple):
@@ -219,9 +211,14 @@ class HitIds(NamedTuple):
 @geometries.operation
 def owner(geometry: Geometry, hit: Hit) -> HitIds:
     """The ids of a hit, for layers and queries; path tracing needs none."""
-    number = any_shape.owner(geometry.shapes, hit.kind, hit.row)
-    shape, part = _shape_and_part(geometry.parts, number)
-    shape, copy = _in_scene(geometry.instances, hit.instance, shape)
+    shape, part, copy = any_shape.owner(geometry.shapes, hit.kind, hit.row), 0, -1
+    if geometry.parts is not None:
+        part = int(geometry.parts.part[shape])
+        shape = int(geometry.parts.shape[shape])
+    if geometry.instances is not None:
+        if hit.instance >= 0:
+            shape = int(geometry.instances.owner[hit.instance])
+            copy = int(geometry.instances.copy[hit.instance])
     face = any_shape.face(geometry.shapes, hit)
     return HitIds(shape, copy, part, face)
 
@@ -250,25 +247,6 @@ def tangents(geometry: Geometry, ray: Ray, hit: Hit) -> Tangents:
     local, seen, _ = _in_primitive_space(geometry, ray, hit)
     found = any_shape.tangents(geometry.shapes, local, seen)
     return tangents_out_of(geometry.instances, hit.instance, found)
-
-
-@kernel
-def _shape_and_part(parts: Parts | None, number: int) -> tuple[int, int]:
-    """(shape, part) of the owner number in a primitive's table."""
-    if parts is None:
-        return number, 0
-    return int(parts.shape[number]), int(parts.part[number])
-
-
-@kernel
-def _in_scene(instances: Instances | None, i: int, shape: int) -> tuple[int, int]:
-    """(shape, copy) of a hit in instance i: the instance's index in the scene, and its number among
-    the copies that the instance stands for."""
-    if instances is None:
-        return shape, -1
-    if i < 0:
-        return shape, -1
-    return int(instances.owner[i]), int(instances.copy[i])
 
 
 @kernel

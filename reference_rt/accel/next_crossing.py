@@ -23,7 +23,6 @@ from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.shapes import TABLES, Shapes
 from reference_rt.shapes.crossings import MAX_CROSSINGS, along, primitive_count
 from reference_rt.shapes.csg.tables import Solids
-from reference_rt.shapes.instances import Instances
 from reference_rt.shapes.meshes.watertight import Shear, shear_of
 
 KINDS = len(TABLES)
@@ -36,7 +35,9 @@ def next_crossing(geometry: Geometry, ray: Ray, after: OrderedCrossing) -> Order
     Each call traverses the BVH from the ray's origin.  So no buffer limits the number of crossings,
     and each has the t that `closest_hit` would have found.
     """
-    return _next(geometry.bvh, geometry, ray, after)
+    if geometry.bvh is None:
+        return _brute_force(geometry.shapes, ray, after)
+    return _traverse(geometry, ray, after)
 
 
 @geometries.operation
@@ -51,13 +52,6 @@ def crossings_of_solid(
         solids, geometry.shapes, bvh, s, ray, math.inf, t, widths, part, -1, FROM_THE_START
     )
     return count
-
-
-@kernel
-def _next(bvh: Bvh | None, geometry: Geometry, ray: Ray, after: OrderedCrossing) -> OrderedCrossing:
-    if bvh is None:
-        return _brute_force(geometry.shapes, ray, after)
-    return _traverse(bvh, geometry.shapes, geometry.solids, geometry.instances, ray, after)
 
 
 @kernel
@@ -112,15 +106,10 @@ def _first(
 
 
 @kernel
-def _traverse(
-    bvh: Bvh,
-    shapes: Shapes,
-    solids: Solids | None,
-    instances: Instances | None,
-    ray: Ray,
-    after: OrderedCrossing,
-) -> OrderedCrossing:
+def _traverse(geometry: Geometry, ray: Ray, after: OrderedCrossing) -> OrderedCrossing:
     """As `geometry._traverse`."""
+    bvh: Any = geometry.bvh
+    shapes, solids, instances = geometry.shapes, geometry.solids, geometry.instances
     stack, waiting, space = local_integers(STACK), local_floats(STACK), local_integers(STACK)
     distances = local_floats(VECTOR_WIDTH)
     best = nothing_at(ray.t_max)
@@ -143,7 +132,7 @@ def _traverse(
         first = first_of(node)
         for k in range(first, first + size_of(node)):
             kind, row = kind_of(bvh, k), row_of(bvh, k)
-            if instances is not None:
+            if geometry.instances is not None:
                 if kind == INSTANCE:
                     stack[top], waiting[top], space[top] = instances.root[row], 0.0, row
                     top += 1
@@ -158,7 +147,7 @@ def _traverse(
             if can_be_nearer(waiting[top], best.hit.t):
                 break
         node = stack[top]
-        if instances is not None:
+        if geometry.instances is not None:
             if space[top] != instance:
                 instance = space[top]
                 local = local_ray(bvh, instances, instance, ray)

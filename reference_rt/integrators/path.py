@@ -16,8 +16,8 @@ of the path takes three steps:
 Step 2 and the next edge's step 1 estimate the same direct light.  `_mis_weight` weights them so
 that it is counted once (multiple importance sampling, Veach 1997).
 
-`radiances` takes these steps for a block of paths, edge by edge, so that the rays of all paths are
-traced together.
+`_edge` takes these steps.  `radiances` does so for a block of paths, edge by edge, so that the rays
+of all paths are traced together.
 """
 
 from typing import Annotated, ClassVar, Literal, NamedTuple
@@ -28,8 +28,9 @@ from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt import sampling
 from reference_rt.accel.block_query import any_hits, closest_hits, hit_of
+from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Description
-from reference_rt.core.ray import Ray, ray_from
+from reference_rt.core.ray import Hit, Ray, ray_from
 from reference_rt.core.ray_block import add_vector, put_ray, put_vector, ray_of, vector_of
 from reference_rt.core.vec3 import Vec3, is_black, max_component, to_world
 from reference_rt.integrators.direct_light import (
@@ -123,6 +124,43 @@ class LightConnection(NamedTuple):
     shadow: Ray
 
 
+class Edge(NamedTuple):
+    """An edge of a path.  emitted: what it adds to the path's radiance by emission of what it has
+    hit;  connection: by next-event estimation there;  step: how the path goes on."""
+
+    emitted: Vec3
+    connection: LightConnection
+    step: Step
+
+
+@kernel
+def _edge(
+    path: PathSetup,
+    scene: SceneTables,
+    state: State,
+    ray: Ray,
+    hit: Hit,
+    sampler: Sample,
+    depth: int,
+    kept: FloatArray,
+) -> Edge:
+    """Edge number `depth`, along `ray`, which has hit `hit`.  kept: the buffer of `shade`."""
+    nothing = Vec3(0.0, 0.0, 0.0)
+    unlit, ended = LightConnection(nothing, ray), Step(False, ray, state)
+    if hit.kind < 0:
+        if depth == 0 and path.hides_lamps:
+            return Edge(nothing, unlit, ended)
+        return Edge(_environment_emission(path, scene, state, ray), unlit, ended)
+    shading = shade(scene, ray, hit, kept)
+    emitted = nothing
+    if any_light.is_area(scene.lights, shading.point):
+        emitted = _hit_emission(path, scene, state, ray, shading)
+    if depth + 1 >= path.max_depth:
+        return Edge(emitted, unlit, ended)
+    connection = _next_event_estimation(path, scene, state, shading, sampler, depth)
+    return Edge(emitted, connection, _scatter(path, scene, state, shading, sampler, depth))
+
+
 @kernel
 def radiances(
     path: PathSetup, scene: SceneTables, samplers: Samplers, n: int, scratch: Scratch
@@ -146,29 +184,18 @@ def radiances(
         alive, lit = 0, 0
         for j in range(n):
             k = scratch.samples[j]
-            state = state_of(scene, scratch, j)
-            ray = ray_of(rays, j)
-            hit = hit_of(scene.geometry, ray, hits, j)
-            if hit.kind < 0:
-                if depth > 0 or not path.hides_lamps:
-                    add_vector(scratch.totals, 0, k, _environment_emission(path, scene, state, ray))
-                continue
-            shading = shade(scene, ray, hit, scratch.kept)
-            if any_light.is_area(scene.lights, shading.point):
-                add_vector(scratch.totals, 0, k, _hit_emission(path, scene, state, ray, shading))
-            if depth + 1 >= path.max_depth:
-                continue
-            sampler = sampler_of(samplers, k)
-            found = _next_event_estimation(path, scene, state, shading, sampler, depth)
-            if not is_black(found.light):
-                put_ray(shadows, lit, found.shadow)
-                put_vector(scratch.lights, 0, lit, found.light)
+            state, ray = state_of(scene, scratch, j), ray_of(rays, j)
+            hit, sampler = hit_of(scene.geometry, ray, hits, j), sampler_of(samplers, k)
+            edge = _edge(path, scene, state, ray, hit, sampler, depth, scratch.kept)
+            add_vector(scratch.totals, 0, k, edge.emitted)
+            if not is_black(edge.connection.light):
+                put_ray(shadows, lit, edge.connection.shadow)
+                put_vector(scratch.lights, 0, lit, edge.connection.light)
                 scratch.lit[lit] = k
                 lit += 1
-            step = _scatter(path, scene, state, shading, sampler, depth)
-            if step.goes_on:
-                put_ray(rays, alive, step.ray)
-                put_state(scene, scratch, alive, k, step.state)
+            if edge.step.goes_on:
+                put_ray(rays, alive, edge.step.ray)
+                put_state(scene, scratch, alive, k, edge.step.state)
                 alive += 1
         any_hits(scene.geometry, shadows, hits, lit)
         for j in range(lit):

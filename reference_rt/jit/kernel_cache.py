@@ -48,13 +48,16 @@ _CHECKSUM_BYTES = 32
 
 
 def _sources_digest() -> str:
-    """Digest of all sources, versions and the bounds-check flag.  Numba's own key lacks that flag
-    and edits in a callee's file (numba#1833)."""
+    """Digest of all sources that kernels may be in, of versions and the bounds-check flag.  Numba's
+    own key lacks that flag and edits in a callee's file (numba#1833)."""
     digest = hashlib.sha256()
     for version in (sys.version, numba.__version__, llvmlite.__version__):
         digest.update(version.encode())
     digest.update(str(numba.config.BOUNDSCHECK).encode())
-    for source in sorted(_PACKAGE.rglob("*.py")):  # kernels of every folder call each other
+    # Kernels of every folder call each other, but for the command line, which has none.
+    for source in sorted(_PACKAGE.rglob("*.py")):
+        if source.parent.name == "cli":
+            continue
         digest.update(source.relative_to(_PACKAGE).as_posix().encode())
         digest.update(source.read_bytes())
     return digest.hexdigest()[:20]
