@@ -267,7 +267,9 @@ def _gather(
             f"move by at most {moved:.2g}"
         )
     films = (subject.scene.film, (subject.reference or subject.scene).film)
-    found = _deterministic_rungs(scene, tables, counterpart, films, budget, only, say)
+    found = _deterministic_rungs(
+        subject.scene, scene, tables, counterpart, films, budget, only, say
+    )
     pictured = not only or not {"statistics", "images"}.isdisjoint(only)
     reason = _no_pictures(counterpart, scene)
     if reason:
@@ -331,6 +333,7 @@ def _left_out(scene: Scene, tables: SceneTables) -> tuple[str, ...]:
 
 
 def _deterministic_rungs(
+    written: Scene,
     scene: Scene,
     tables: SceneTables,
     counterpart: Counterpart,
@@ -339,8 +342,8 @@ def _deterministic_rungs(
     only: tuple[str, ...],
     say: Say,
 ) -> list[RungResult]:
-    """Film, geometry, light, layers; each only if the rungs below it hold: a wrong convention must
-    not be reported as wrong light."""
+    """Files, film, geometry, light, layers; each only if the rungs below it hold: a wrong
+    convention must not be reported as wrong light.  written: the scene as its author wrote it."""
     film_filters = films[0].filter, films[1].filter
     climbs: dict[str, Callable[[], RungResult]] = {
         "geometry": lambda: ladder.geometry(
@@ -351,6 +354,7 @@ def _deterministic_rungs(
     }
     if any(not isinstance(film_filter, BoxFilter) for film_filter in film_filters):
         climbs = {"film": lambda: ladder.film(*film_filters), **climbs}
+    climbs = {"files": lambda: ladder.files(written), **climbs}
     if applies(scene, films[0]):
         climbs["layers"] = lambda: ladder.layers(scene, tables, counterpart, films)
     found: list[RungResult] = []

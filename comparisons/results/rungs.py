@@ -1,12 +1,12 @@
 """The names of the rungs, in their order."""
 
 RUNGS = (
-    *("scene", "run", "input", "film", "geometry"),
+    *("scene", "run", "input", "files", "film", "geometry"),
     *("direct", "whitted", "layers", "statistics", "images"),
 )
 """The ladder, in order: a failure is reported at the first rung that breaks.  `scene` exists only
 if the scene or one of its files is invalid, `run` only if the case could not be completed; `input`
-checks the pictures themselves."""
+checks the pictures themselves, `files` what we hold of files and descriptions."""
 
 COMPARED = RUNGS[3:]
 """The rungs that compare the two renderers: those a suite can be limited to."""

@@ -1,6 +1,8 @@
 """Closest-hit and any-hit queries for a block of rays: by SIMD brute force, stream traversal or
 single-ray traversal."""
 
+from typing import Any
+
 import numba
 import numpy as np
 
@@ -54,7 +56,8 @@ def any_hits(geometry: Geometry, rays: RayBlock, hits: HitBlock, n: int) -> None
 
 @kernel
 def _trace(geometry: Geometry, rays: RayBlock, hits: HitBlock, n: int, any_hit: bool) -> None:
-    bvh, shapes, solids = geometry.bvh, geometry.shapes, geometry.solids
+    bvh: Any = geometry.bvh
+    shapes, solids = geometry.shapes, geometry.solids
     if geometry.bvh is None:
         any_shape.nearest_of_rays(shapes, rays, hits, n, any_hit)
         return

@@ -1,7 +1,7 @@
 """`Geometry`, all that a ray can hit: closest-hit and any-hit queries for one ray; the surface
 point, ids, texture coordinates and tangents of a hit."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from reference_rt import shapes as any_shape
 from reference_rt.accel.bvh import (
@@ -104,7 +104,9 @@ def _traverse(geometry: Geometry, ray: Ray, any_hit: bool) -> Hit:
     """Depth first, the nearest child first.  The stack holds the other children (`stack`), the t at
     which the ray enters their boxes (`waiting`) and the instance in whose space they are
     (`space`)."""
-    bvh, shapes, instances = geometry.bvh, geometry.shapes, geometry.instances
+    bvh: Any = geometry.bvh
+    instances: Any = geometry.instances
+    shapes = geometry.shapes
     stack, waiting, space = local_integers(STACK), local_floats(STACK), local_integers(STACK)
     distances, seen = local_floats(VECTOR_WIDTH), local_floats(PROJECTION_FLOATS)
     closest = no_hit(ray)

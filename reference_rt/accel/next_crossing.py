@@ -109,7 +109,8 @@ def _first(
 def _traverse(geometry: Geometry, ray: Ray, after: OrderedCrossing) -> OrderedCrossing:
     """As `geometry._traverse`."""
     bvh: Any = geometry.bvh
-    shapes, solids, instances = geometry.shapes, geometry.solids, geometry.instances
+    instances: Any = geometry.instances
+    shapes, solids = geometry.shapes, geometry.solids
     stack, waiting, space = local_integers(STACK), local_floats(STACK), local_integers(STACK)
     distances = local_floats(VECTOR_WIDTH)
     best = nothing_at(ray.t_max)

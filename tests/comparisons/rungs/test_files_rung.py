@@ -1,0 +1,165 @@
+"""The rung `files` sees what both renderers share: faults of readers, transforms and tables, which
+no other rung can see, since Mitsuba is fed from the same."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from builders import SCENES
+
+from comparisons.rungs import files
+from reference_rt.core import transform
+from reference_rt.core.image_files import hdr
+from reference_rt.lights.emitters import environment_map
+from reference_rt.rendering.scene import Scene
+from reference_rt.shapes import Cylinder, Sphere, Torus, shape
+from reference_rt.shapes.meshes import mesh as meshes
+from reference_rt.textures import image_file
+
+Patch = pytest.MonkeyPatch
+
+
+def _data(change: Callable[[Any], dict[str, Any]]) -> Callable[[Patch], None]:
+    """A fault in reading meshes: these fields in place of what was read."""
+    read = meshes.read_mesh
+
+    def plant(patch: Patch) -> None:
+        patch.setattr(meshes, "read_mesh", lambda p: replace(d := read(p), **change(d)))
+
+    return plant
+
+
+def _result(owner: Any, name: str, change: Callable[[Any], Any]) -> Callable[[Patch], None]:
+    """A fault in what a function returns."""
+    right = getattr(owner, name)
+
+    def plant(patch: Patch) -> None:
+        patch.setattr(owner, name, lambda *given, **more: change(right(*given, **more)))
+
+    return plant
+
+
+def _field(owner: Any, name: str, change: Callable[[Any], Any]) -> Callable[[Patch], None]:
+    """A fault in a description's number on its way into the table."""
+    right = owner.tabulate
+
+    def tabulate(self: Any, context: Any) -> Any:
+        return right(self.model_copy(update={name: change(getattr(self, name))}), context)
+
+    return lambda patch: patch.setattr(owner, "tabulate", tabulate)
+
+
+def _normals_by_the_matrix(m: Any, normals: Any) -> Any:
+    mapped = normals @ m[:, :3].T
+    return mapped / np.linalg.norm(mapped, axis=1, keepdims=True)
+
+
+def _half_a_mantissa(patch: Patch) -> None:
+    right = hdr._radiance
+    patch.setattr(hdr, "_radiance", lambda rgbe, middle: right(rgbe, 0.5))
+
+
+PLANTED: dict[str, tuple[str, Callable[[Patch], None], str]] = {
+    "meshes too large": ("mesh_knot", _data(lambda d: {"vertices": 1.05 * d.vertices}), "is at"),
+    "v upside down": (
+        "petal",
+        _data(lambda d: {"uv": None if d.uv is None else d.uv * [1.0, -1.0] + [0.0, 1.0]}),
+        "has the uv",
+    ),
+    "the last face lost": ("mesh_knot", _data(lambda d: {"faces": d.faces[:-1]}), "lacks triangle"),
+    "faces wound in reverse": (
+        "mesh_knot",
+        _data(lambda d: {"faces": d.faces[:, [0, 2, 1]]}),
+        "is at",
+    ),
+    "corners turned": ("mesh_knot", _data(lambda d: {"faces": d.faces[:, [1, 2, 0]]}), "is at"),
+    "normals lost": ("mesh_knot", _data(lambda d: {"normals": None}), "has the normal"),
+    "normals by the matrix": (
+        "stretched",
+        lambda patch: patch.setattr(transform, "apply_normals", _normals_by_the_matrix),
+        "has the normal",
+    ),
+    "x and y exchanged": (
+        "mesh_knot",
+        _data(lambda d: {"vertices": d.vertices[:, [1, 0, 2]]}),
+        "is at",
+    ),
+    "spheres too large": ("transforms", _field(Sphere, "radius", lambda r: 1.05 * r), "off the"),
+    "tori too thick": ("torus", _field(Torus, "minor_radius", lambda r: 1.05 * r), "off the"),
+    "cylinders too long": ("transforms", _field(Cylinder, "z_max", lambda z: 1.05 * z), "off the"),
+    "angles in radians": (
+        "transforms",
+        _result(transform, "rotate", lambda m: transform.compose(m, m)),
+        "off the",
+    ),
+    "scales undone": ("transforms", _result(transform, "scale", transform.invert), "off the"),
+    "steps in reverse": (
+        "transforms",
+        lambda patch: patch.setattr(
+            shape, "affine", lambda steps: transform.compose(*(s.matrix_of() for s in steps[::-1]))
+        ),
+        "off the",
+    ),
+    "a sky's contrast": (
+        "environment",
+        _result(environment_map, "read_image", lambda texels: texels**1.2),
+        "the pixel at",
+    ),
+    "a sky moved by a texel": (
+        "environment",
+        _result(environment_map, "read_image", lambda texels: np.roll(texels, 1, axis=1)),
+        "the pixel at",
+    ),
+    "a sky that is turned": (
+        "environment",
+        _result(environment_map, "orthogonal", lambda m: m @ transform.rotate((0, 1, 0), 2)[:, :3]),
+        "turns directions",
+    ),
+    ".hdr half a mantissa brighter": (
+        "hdr",
+        _half_a_mantissa,
+        "the pixel at",
+    ),
+    "sRGB decoded twice": (
+        "texture_filters",
+        _result(image_file, "linear", lambda x: np.power(x, 2.2)),
+        "the pixel at",
+    ),
+}
+
+
+def parsed(folder: Path, **parts: Any) -> Scene:
+    return Scene.parse(json.dumps(parts), folder=folder)
+
+
+def scene_of(name: str, folder: Path) -> Scene:
+    if name == "stretched":
+        knot = {"type": "mesh", "file": str(SCENES / "meshes" / "knot.obj")}
+        return parsed(folder, shapes=[{**knot, "transform": [{"scale": [1, 2, 3]}]}])
+    if name == "petal":
+        return parsed(folder, shapes=[{"type": "mesh", "file": str(SCENES / "meshes/petal.ply")}])
+    if name == "torus":
+        tilt = [{"rotate": {"axis": [1, 2, 0], "degrees": 33}}, {"scale": [1, 0.5, 2]}]
+        return parsed(folder, shapes=[{"type": "torus", "transform": tilt}])
+    if name == "hdr":
+        header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n"
+        pixels = bytes(b for k in range(8) for b in (9 + 30 * k, 200 - k, 128, 110 + 3 * k))
+        (folder / "sky.hdr").write_bytes(header + pixels)
+        sky = {"type": "environment_map", "file": "sky.hdr"}
+        return parsed(folder, lights=[sky])
+    return Scene.load(SCENES / f"{name}.yaml")
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_faults_that_both_renderers_share(name: str, tmp_path: Path, monkeypatch: Patch) -> None:
+    which, plant, said = PLANTED[name]
+    right = files(scene_of(which, tmp_path))
+    assert right.status == "agree", right.reason
+    plant(monkeypatch)
+    found = files(scene_of(which, tmp_path))
+    assert found.status == "differ"
+    assert said in found.reason
