@@ -80,6 +80,7 @@ def test_a_wrong_reading_differs_from_the_file(tmp_path):
     assert compared(wrong).verdict == "differ"
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*its moments are left out")
 def test_defaults_are_those_of_the_reading(tmp_path):
     scene = scene_of(tmp_path, grey="0.9")

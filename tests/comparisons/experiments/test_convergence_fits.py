@@ -128,6 +128,7 @@ def test_times_that_do_not_rise_with_the_samples_are_not_continued(seconds):
     assert time_to(points(spp, seconds, 1.0 / spp), 0.3).how == "interpolated"
 
 
+@pytest.mark.slow
 def test_time_lies_within_its_band():
     """Measured curves of eight replicates: the band of the time to an error about eight times below
     that of the last rung holds the true time in 95 % of 200 runs (four standard deviations of a

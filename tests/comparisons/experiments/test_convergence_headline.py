@@ -242,6 +242,7 @@ def test_the_benchmark_says_how_many_are_extrapolated():
 # ---- the command --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_an_invalid_scene_does_not_cost_the_others(tmp_path, monkeypatch):
     """Nor does a kill cost what is done: each scene that is missing says so."""
     missing = tmp_path / "missing.yaml"

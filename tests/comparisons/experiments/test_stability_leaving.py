@@ -118,6 +118,7 @@ def test_gaps_below_the_law_are_lost_at_last(tmp_path):
     assert far.measure(draw_of(tmp_path, 80), 1e15)[OURS].failures > 0
 
 
+@pytest.mark.slow
 def test_mitsuba_skips_gaps_of_its_epsilon(tmp_path):
     pytest.importorskip("mitsuba")
     draw = draw_of(tmp_path, 40)._replace(mitsuba=True)

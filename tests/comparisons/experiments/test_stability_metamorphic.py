@@ -125,6 +125,7 @@ def test_solids_are_judged_by_what_is_resolved(tmp_path):
     assert (right[1:] <= 2).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gap", "either"), [(2.0**-52, True), (1e-12, False)])
 def test_a_film_may_show_or_not(gap, either, tmp_path):
     """Of a wall as thick as `gap`, cut from a box by another."""
@@ -189,6 +190,7 @@ def _transformed_alone(monkeypatch, change):
     monkeypatch.setattr(light, "moved", moved)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("series", "x"), LIGHT_SERIES)
 def test_a_colour_is_seen(series, x, tmp_path, monkeypatch):
     def tinted(scene):
@@ -271,6 +273,7 @@ def test_an_epsilon_of_rays_that_leave_is_seen(factor, tmp_path):
 # ---- Mitsuba ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_mitsuba_takes_part(tmp_path):
     """Its float32 holds what is near, and not what is far."""
     near = measured("translated", 1.0, tmp_path, mitsuba=True)[MITSUBA]

@@ -166,6 +166,7 @@ def test_distances_of_other_shapes(kind):
     assert DISTANCES[kind](row, p).tolist() == [0.25, 0.25, 0.0]
 
 
+@pytest.mark.slow
 def test_the_text_book_fails_on_slivers_and_under_grazing_rays(tmp_path):
     """Cramer's rule names points that are not on the triangle; so did ours before edge functions
     that cancel were worked out exactly."""

@@ -150,6 +150,7 @@ def test_seeds_of_the_reference(copied: range) -> None:
     assert renderer.seeds == list(range(1, 9))
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("noise", [0.1, 0.4])
 def test_more_candidates_than_pictures_of_a_precise_reference(noise: float) -> None:
     """Sixteen precise pictures are no limit for sixty-four noisy ones: the standard error is that

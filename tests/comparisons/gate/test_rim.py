@@ -26,6 +26,7 @@ def candidates(rim: float) -> list[Picture]:
     return [Picture(picture, np.ones((48, 64))) for picture in pictures]
 
 
+@pytest.mark.slow
 def test_a_rim_by_another_convention_is_named_and_can_be_left_out() -> None:
     reference = Reference(noisy(0, 16))
     case = gate_pictures(candidates(0.8), reference)

@@ -89,6 +89,7 @@ lights:
     assert np.allclose(d, d2, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_far_away_agrees_when_moved_and_not_without(monkeypatch: pytest.MonkeyPatch) -> None:
     far = scene("far_origin")
     tables = build_tables(far)

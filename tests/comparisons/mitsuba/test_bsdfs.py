@@ -149,6 +149,7 @@ def test_a_slightly_different_material_is_distinguished(
     assert (np.abs(ours - theirs).max(axis=1) > bound).any()
 
 
+@pytest.mark.slow
 def test_tables_of_rough_plastic_are_off_by_little() -> None:
     """The bound that comparisons allow for is far from what they call wrong."""
     worst = max(

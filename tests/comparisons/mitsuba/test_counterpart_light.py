@@ -155,7 +155,7 @@ def test_light_on_shapes_under_maps(shape: str, placed: str, image_folder: Path)
     assert max(agrees(scene), default=0.0) < 1e-3
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("around", AROUND)
 @pytest.mark.parametrize("material", MATERIALS)
 def test_every_material_under_a_bump(material: str, around: str, image_folder: Path) -> None:
@@ -185,7 +185,7 @@ WITH_UV = ("cylinder", "cone", "frustum", "torus", "ball", "paraboloid", "saddle
 """Shapes whose meshes have our uv, between vertices too."""
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("placed", MAPS)
 @pytest.mark.parametrize("name", WITH_UV)
 def test_uv_are_ours(name: str, placed: str, image_folder: Path) -> None:

@@ -109,7 +109,7 @@ def test_a_counterpart_is_met_in_the_same_places(name: str) -> None:
             assert stand_in["sag"] < 1e-4
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_another_counterpart_is_distinguished(name: str) -> None:
     shape, right, wrong = SCENES[name]

@@ -59,6 +59,7 @@ def test_radiance_is_mitsubas(tmp_path: Path) -> None:
     assert error.max() < 1e-2
 
 
+@pytest.mark.slow
 def test_the_suns_flux_is_mitsubas(tmp_path: Path) -> None:
     """Against Mitsuba's own light samples, whose weights have the flux as their mean."""
     scene = scene_of(tmp_path, 1.0)

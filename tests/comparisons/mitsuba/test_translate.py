@@ -129,6 +129,7 @@ def test_film_samplers_and_integrators() -> None:
     assert parts(integrator=RayCast())[1] == {}
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("film_filter", [BoxFilter(), TentFilter(radius=1.5), GaussianFilter()])
 def test_filters_load_and_wide_ones_sample_beyond_the_border(film_filter: AnyFilter) -> None:
     film = Film(width=8, height=4, filter=film_filter)

@@ -208,7 +208,7 @@ ALIKE = {
 }  # fmt: skip
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", ALIKE)
 def test_faces_in_one_place(name: str, seed: int) -> None:

@@ -60,7 +60,7 @@ def film_of(scene: Scene, names: tuple[str, ...], wide: bool = False) -> tuple[F
     return film, film
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("wide", [False, True])
 @pytest.mark.parametrize("sampler", [None, Sobol(spp=8)])
 def test_right_layers_agree(

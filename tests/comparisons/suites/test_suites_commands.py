@@ -9,6 +9,7 @@ from suite_runs import SCENES, run_in, scenes
 pytestmark = pytest.mark.usefixtures("fake_runners")
 
 
+@pytest.mark.slow
 def test_the_command_as_a_whole(tmp_path, program):
     folder, out = scenes(tmp_path / "scenes", "a", "b", "differ"), tmp_path / "out"
     mine = tmp_path / "mine.yaml"

@@ -221,7 +221,7 @@ def test_all_lamps_together(sampling, spp, power):
     assert_mean(scene, RHO / math.pi * RADIANCE * irradiance, power)
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @budgets
 @pytest.mark.parametrize("sampling", SAMPLING)
 def test_environment_map(sampling, spp, power, tmp_path):

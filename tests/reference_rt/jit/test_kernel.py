@@ -65,6 +65,7 @@ def test_an_edit_of_a_callee_is_seen(copy, tmp_path):
     assert first_hit(copy, tmp_path) == warm
 
 
+@pytest.mark.slow
 def test_bounds_checking_has_its_own_folder(copy, tmp_path):
     _HIT_FOLDER = "from reference_rt.jit.kernel import CACHE_FOLDER; print(CACHE_FOLDER)"
     folders = {

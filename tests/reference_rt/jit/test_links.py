@@ -85,6 +85,7 @@ def test_only_what_is_asked_for_is_compiled():
 # ---- how long -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @needs_jit
 def test_tables_live_as_long_as_the_linker():
     numbers = np.array([1.0, 2.0])

@@ -246,6 +246,7 @@ def test_turned_and_mirrored(tmp_path):
             assert found == pytest.approx(expected, abs=1e-13)
 
 
+@pytest.mark.slow
 def test_the_mean_of_a_map_lights_a_wall():
     """Irradiance from the upper half by samples: within 6 standard errors of quadrature."""
     table = random_map(np.random.default_rng(426), 7, 12)

@@ -78,6 +78,7 @@ def same(a, b):
     return a == b
 
 
+@pytest.mark.slow
 def test_texts_read_as_ruamel_reads_them():
     for text in (*(f.read_text(encoding="utf-8") for f in FILES), *EVERYTHING, *TEXTS):
         assert same(yaml_text.load(text), by_ruamel(text)), text[:99]

@@ -68,6 +68,7 @@ def test_a_solid_without_itself_is_empty():
             assert np.isinf(solid_of(empty).intersect(o, d).t).all()
 
 
+@pytest.mark.slow
 def test_laws_of_sets():
     rng = np.random.default_rng(2)
     for seed in range(4):

@@ -165,7 +165,7 @@ RIMS = [
 ]
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("shape", "rim"), RIMS)
 def test_rims(shape, rim):
     """A rim belongs to the surface, also where t, the third of an integer, is rounded."""

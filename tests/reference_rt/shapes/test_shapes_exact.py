@@ -85,6 +85,7 @@ def test_sphere_points_lie_on_it_and_are_the_right_root():
 # ---- flat shapes --------------------------------------------------------------------------------
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("kind", ["rectangle", "triangle"])
 def test_flat_shapes(kind):
     """Hit or miss by the exact coordinates in the plane, away from the edge by their rounding;

@@ -79,6 +79,7 @@ def test_no_more_tasks_are_begun_than_there_are_threads():
     assert watched[0] == 2
 
 
+@pytest.mark.slow
 def test_tasks_of_processes_that_die_are_run_again(tmp_path):
     with closing(Processes(2)) as workers:
         tasks = ((k, tmp_path / "dead") for k in range(8))
