@@ -118,8 +118,8 @@ OF_KERNELS = (
     ),
     SourceFault(
         "one edge too many", "cornell_box", "integrators/path.py",
-        "            if depth + 1 >= path.max_depth:\n",
-        "            if depth + 1 >= path.max_depth + 1:\n",
+        "    if depth + 1 >= path.max_depth:\n",
+        "    if depth + 1 >= path.max_depth + 1:\n",
     ),
     SourceFault(
         "roulette that compensates too little", "colour_bleeding", "integrators/path.py",
