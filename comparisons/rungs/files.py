@@ -15,17 +15,21 @@ share nothing with them:
 What no second source reads is counted, and named.
 """
 
+import warnings
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from comparisons.geometry.equations import EQUATIONS
 from comparisons.mitsuba.reading.parse import scalar
 from comparisons.results.case import RungResult
 from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.image_files import open_image
 from reference_rt.lights import EnvironmentMap
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import (
@@ -45,6 +49,12 @@ from reference_rt.textures import Bitmap
 FLOAT32 = 2.0**-24
 """The rounding of the numbers that Mitsuba holds."""
 
+LEAST32 = 2.0**-126
+"""The least number that float32 holds with all of its bits."""
+
+MOST_TRIANGLES = 4_000_000
+"""Triangles of a scene after which no further mesh is checked: these take some seconds."""
+
 MOST_SHAPES = 200
 """Most shapes of a scene that are checked, evenly chosen: a shape takes some milliseconds."""
 
@@ -55,11 +65,14 @@ RAYS = 64
 @dataclass
 class Found:
     """checked: how many of each kind;  unread: what no second source reads;  differences: what
-    differs, the first one first."""
+    differs, the first one first;  read: meshes of second sources, by file;  triangles: how many
+    have been compared."""
 
     checked: dict[str, int] = field(default_factory=dict)
     unread: list[str] = field(default_factory=list)
     differences: list[str] = field(default_factory=list)
+    read: dict[Path, "tuple[Second, str] | None"] = field(default_factory=dict)
+    triangles: int = 0
 
     def count(self, kind: str) -> None:
         self.checked[kind] = self.checked.get(kind, 0) + 1
@@ -69,9 +82,10 @@ def files(scene: Scene) -> RungResult:
     """Compare what we hold of a scene's shapes and images with second sources."""
     found = Found()
     shapes = list(_shapes(scene))
-    step = -(-len(shapes) // MOST_SHAPES)
-    with scalar() as mi:
-        for where, shape in shapes[::step] if step else ():
+    step = max(1, -(-len(shapes) // MOST_SHAPES))
+    with scalar() as mi, warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")  # they were issued when the scene was built
+        for where, shape in shapes[::step]:
             _check_shape(mi, where, shape, scene.folder, found)
         for name, texture in scene.textures.items():
             if isinstance(texture, Bitmap):
@@ -160,7 +174,11 @@ class Second(NamedTuple):
 
 
 def _check_mesh(mi: Any, where: str, mesh: Mesh, folder: Path, found: Found) -> None:
+    if found.triangles > MOST_TRIANGLES:
+        found.unread.append(f"meshes beyond {MOST_TRIANGLES:,} triangles")
+        return
     table = mesh.tabulate(TabulationContext(folder=folder))
+    found.triangles += len(table.face)
     if mesh.file is None:
         assert mesh.vertices is not None
         assert mesh.faces is not None
@@ -174,15 +192,27 @@ def _check_mesh(mi: Any, where: str, mesh: Mesh, folder: Path, found: Found) -> 
         if mesh.data(folder).doubtful:
             found.unread.append(f"{suffix} of concave polygons, or with uv and normals in part")
             return
-        reader = READERS.get(suffix)
-        if reader is None:
-            found.unread.append(suffix)
+        if path not in found.read:
+            found.read[path] = _second(mi, path)
+        if (known := found.read[path]) is None:
+            found.unread.append(f"{suffix} that no other reader takes, or beyond float32")
             return
-        second, source = reader(mi, path)
+        second, source = known
     if mesh.face_normals:
         second = second._replace(normals=None)
     _compare(where, source, table, second, _matrix(mi, mesh), found, made=mesh.smooth)
     found.count("meshes")
+
+
+def _second(mi: Any, path: Path) -> "tuple[Second, str] | None":
+    """A mesh by the first second reader that takes it; None where none does, or where float32 does
+    not hold the numbers."""
+    for reader in READERS.get(path.suffix.lower(), ()):
+        with suppress(Exception):  # of a library: it may refuse what ours has read
+            second, source = reader(mi, path)
+            if np.isfinite(second.corners).all():
+                return second, source
+    return None
 
 
 def _arrays(mesh: Mesh) -> tuple[Any, Any, Any]:
@@ -217,6 +247,9 @@ def _has_normals(path: Path) -> bool:
     return b" nx\n" in content[: content.find(b"end_header")].replace(b"\r", b"\n")
 
 
+TRIMESH = "trimesh"
+
+
 def _of_trimesh(mi: Any, path: Path) -> tuple[Second, str]:
     import trimesh
 
@@ -226,15 +259,15 @@ def _of_trimesh(mi: Any, path: Path) -> tuple[Second, str]:
         for matrix, name in (scene.graph[node] for node in scene.graph.nodes_geometry)
         if hasattr(scene.geometry[name], "faces")
     ]
-    return Second(np.concatenate(parts), None, None), "trimesh"
+    return Second(np.concatenate(parts), None, None), TRIMESH
 
 
-READERS: dict[str, Callable[[Any, Path], tuple[Second, str]]] = {
-    ".obj": _of_mitsuba,
-    ".ply": _of_mitsuba,
-    **dict.fromkeys((".stl", ".off", ".gltf", ".glb"), _of_trimesh),
+READERS: dict[str, tuple[Callable[[Any, Path], tuple[Second, str]], ...]] = {
+    ".obj": (_of_mitsuba, _of_trimesh),
+    ".ply": (_of_mitsuba, _of_trimesh),  # Mitsuba refuses polygons
+    **dict.fromkeys((".stl", ".off", ".gltf", ".glb"), (_of_trimesh,)),
 }
-"""The second reader of each format: never the library that ours reads it with."""
+"""The second readers of each format: never the library that ours reads it with."""
 
 
 def _compare(
@@ -261,7 +294,7 @@ def _compare(
     area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     # A product of three rounded numbers, of the size of the coordinates.
     size = np.abs(second.corners) @ np.abs(linear).T + np.abs(offset)
-    rounding = 4.0 * FLOAT32 * max(float(size.max(initial=0.0)), np.finfo(float).tiny)
+    rounding = 4.0 * FLOAT32 * float(size.max(initial=0.0)) + LEAST32 * float(np.abs(linear).max())
     longest = np.linalg.norm(sides, axis=-1).max(axis=1, initial=0.0)
     lost = np.ones(len(corners), bool)
     lost[kept] = False
@@ -271,6 +304,8 @@ def _compare(
         )
         return
     n = len(kept)
+    if source == TRIMESH:
+        corners[kept] = _matched(table.vertices.reshape(n, 3, 3), corners)
     expected: list[tuple[str, FloatArray | None, FloatArray | None, float]] = [
         ("is at", table.vertices.reshape(n, 3, 3), corners[kept], rounding)
     ]
@@ -300,6 +335,17 @@ def _compare(
                 f"{where}: corner {corner} of triangle {kept[k]} {what} "
                 f"{_text(ours[k, corner])}; {source} has {_text(theirs[k, corner])}"
             )
+
+
+def _matched(ours: FloatArray, theirs: FloatArray) -> FloatArray:
+    """For each of our triangles (n, 3, 3) the nearest of theirs, which may have another order, and
+    may begin at another corner."""
+    _, near = cKDTree(theirs.mean(axis=1)).query(ours.mean(axis=1), k=min(4, len(theirs)))
+    near = near.reshape(len(ours), -1)
+    candidates = np.stack([np.roll(theirs[near], k, axis=2) for k in range(3)], axis=2)
+    candidates = candidates.reshape(len(ours), -1, 3, 3)
+    best = np.abs(candidates - ours[:, None]).max(axis=(2, 3)).argmin(axis=1)
+    return np.asarray(candidates[np.arange(len(ours)), best])
 
 
 def _text(numbers: Any) -> str:
@@ -356,8 +402,8 @@ def _check_equation(mi: Any, where: str, shape: Shape, found: Found) -> None:
         is_smooth &= value < -1e-9 * size
     p, n, expected = p[is_smooth], n[is_smooth], _unit(gradient[is_smooth] @ inverse)
     # Mirrored shapes keep the front of their description.
-    off = 1.0 - np.sum(expected * n, axis=1)
-    if len(off) and off.max() > 1e-9:
+    off = np.linalg.norm(expected - n, axis=1)
+    if len(off) and off.max() > 3e-5 + 16.0 * rounding / size:
         k = int(off.argmax())
         found.differences.append(
             f"{where}: has the normal {_text(n[k])} at {_text(p[k])}; expected {_text(expected[k])}"
@@ -418,7 +464,7 @@ def _check_bitmap(mi: Any, where: str, bitmap: Bitmap, folder: Path, found: Foun
     path = folder / bitmap.file
     encoding = bitmap.encoding
     theirs = None if bitmap.layer or encoding == "radiance" else _image(mi, path, encoding)
-    if theirs is None:
+    if theirs is None or getattr(open_image(path), "gamma", None) is not None:
         found.unread.append(path.suffix.lower())
         return
     texels = bitmap.read(folder)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builders import SCENES
+from mesh_writers import FACES, SQUARE, TRIANGLES, XYZ, Gltf, binary_stl, ply
 
 from comparisons.rungs import files
 from reference_rt.core import transform
@@ -163,3 +164,40 @@ def test_faults_that_both_renderers_share(name: str, tmp_path: Path, monkeypatch
     found = files(scene_of(which, tmp_path))
     assert found.status == "differ"
     assert said in found.reason
+
+
+FORMATS: dict[str, bytes] = {
+    "a.stl": binary_stl(TRIANGLES),
+    "a.off": b"OFF\n5 3 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n2 2 2\n3 0 1 4\n4 0 1 2 3\n3 4 2 1\n",
+    "a.gltf": Gltf().gltf(),
+    "a.glb": Gltf().glb(),
+    "a.obj": b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv -1 .5 0\nf 1 2 3 4 5\nf 1 2 3\n",
+    "a.ply": ply("ascii", ("vertex", XYZ, SQUARE.tolist()), ("face", FACES, [[[0, 1, 2, 3]]])),
+}
+"""A file of each format that has a second reader, those with polygons of four and five corners."""
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_format_with_a_second_reader(name: str, tmp_path: Path, monkeypatch: Patch) -> None:
+    (tmp_path / name).write_bytes(FORMATS[name])
+    turn = [{"rotate": {"axis": [1, 2, 3], "degrees": 40}}, {"scale": [1, -2, 3]}]
+    scene = parsed(tmp_path, shapes=[{"type": "mesh", "file": name, "transform": turn}])
+    right = files(scene)
+    assert right.status == "agree", right.reason
+    assert right.numbers["checked"] == {"meshes": 1}
+    PLANTED["meshes too large"][1](monkeypatch)
+    assert files(scene).status == "differ"
+
+
+def test_what_nobody_else_reads_is_named(tmp_path: Path) -> None:
+    outline = [[0, 0], [1, 0], [0, 1]]
+    np.save(tmp_path / "a.npy", np.ones((2, 4, 3)))
+    sky = {"type": "environment_map", "file": "a.npy"}
+    found = files(parsed(tmp_path, shapes=[{"type": "polygon", "rings": [outline]}], lights=[sky]))
+    assert found.status == "not-applicable"
+    assert found.numbers["unread"] == [".npy", "polygon"]
+
+
+def test_many_shapes_take_as_long_as_some(tmp_path: Path) -> None:
+    balls = [{"type": "sphere", "center": [k, 0, 0]} for k in range(1001)]
+    assert files(parsed(tmp_path, shapes=balls)).numbers["checked"] == {"spheres": 167}
