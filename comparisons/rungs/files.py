@@ -253,6 +253,8 @@ TRIMESH = "trimesh"
 def _of_trimesh(mi: Any, path: Path) -> tuple[Second, str]:
     import trimesh
 
+    if path.suffix.lower() in (".gltf", ".glb") and b'"sparse"' in path.read_bytes():
+        raise ValueError("trimesh ignores sparse accessors")
     scene = trimesh.load(path, process=False, force="scene")
     parts = [
         trimesh.transform_points(scene.geometry[name].vertices, matrix)[scene.geometry[name].faces]
