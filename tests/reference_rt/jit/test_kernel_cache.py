@@ -224,9 +224,11 @@ def test_other_versions_are_deleted_when_they_are_old(kernels):
     assert folder.stat().st_mode & 0o077 == 0
 
 
-def test_an_edit_anywhere_in_the_package_gives_another_folder(kernels, monkeypatch):
+def test_an_edit_of_a_source_gives_another_folder_unless_it_is_of_the_command_line(
+    kernels, monkeypatch
+):
     """Kernels call each other across folders: a source in any of them is part of the machine code,
-    and so are its place and its name."""
+    and so are its place and its name.  The command line holds no kernel."""
     whole = Path(kernel_cache.__file__).parents[1]
     package = kernels.parent / "package"
     shutil.copytree(whole, package, ignore=shutil.ignore_patterns("__pycache__"))
@@ -234,6 +236,9 @@ def test_an_edit_anywhere_in_the_package_gives_another_folder(kernels, monkeypat
     found = [kernel_cache.prepare_folder()]
     one_of_each_folder = {path.parent: path for path in sorted(package.rglob("*.py"))}
     assert {package, package / "jit", package / "shapes" / "curved"} <= set(one_of_each_folder)
+    command_line = one_of_each_folder.pop(package / "cli")
+    command_line.write_text("edited")
+    assert kernel_cache.prepare_folder() == found[0]
     for path in one_of_each_folder.values():
         path.write_text(path.read_text() + "# edited\n")
         found.append(kernel_cache.prepare_folder())
