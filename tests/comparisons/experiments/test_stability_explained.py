@@ -65,7 +65,7 @@ SMOKE = [
 F10's renderings take long."""
 
 
-@pytest.mark.cases(4)
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "series", "x", "cases"), SMOKE)
 def test_ours_holds(name, series, x, cases, tmp_path):
     found = measured(name, series, x, tmp_path, cases)[OURS]

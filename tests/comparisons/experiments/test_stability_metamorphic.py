@@ -158,7 +158,7 @@ RAY_SERIES += [slow("grown", 1e9), ("powers of two", 3.0), ("rearranged", 2.0), 
 RAY_SERIES += [slow("turned", 2.0)]
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("series", "x"), RAY_SERIES)
 def test_missing_triangles_are_seen_by_rays(series, x, tmp_path, monkeypatch):
     """Half of each mesh, in what is transformed alone."""

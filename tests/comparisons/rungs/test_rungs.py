@@ -110,7 +110,7 @@ MORE_FAULTS: tuple[tuple[Rung, str, str], ...] = (
 )  # fmt: skip
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("rung", "right", "wrong"),
     [*FAULTS, *(pytest.param(*fault, marks=pytest.mark.slow) for fault in MORE_FAULTS)],

@@ -83,6 +83,7 @@ DEAR = ("photon map, radius 20", "64 point lights")
 QUICK = [pytest.param(x, marks=pytest.mark.slow) if x in DEAR else x for x in ALL]
 
 
+@pytest.mark.cases(12)
 @pytest.mark.parametrize("name", QUICK)
 def test_no_right_replicate_is_odd(name: str) -> None:
     """Heavy tails, and noise that pixels share."""

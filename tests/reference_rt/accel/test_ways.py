@@ -383,6 +383,7 @@ def _entered(bvh, o, d, together, for_all, for_each, distances):
                 distances[node, 1 + j, lane] = own[lane]
 
 
+@pytest.mark.slow
 def test_a_packet_enters_what_its_rays_enter():
     bvh = rt.build_tables(rt.Scene(shapes=(mesh(icosphere(4)),))).geometry.bvh
     rng, nodes = np.random.default_rng(11), len(bvh.boxes)

@@ -39,6 +39,7 @@ def explained(scene):
     return tables, dict(used), dict(left_out)
 
 
+@pytest.mark.cases(24)
 @pytest.mark.parametrize("file", FILES, ids=lambda f: f.stem)
 def test_tables(file):
     scene = rt.Scene.load(file)

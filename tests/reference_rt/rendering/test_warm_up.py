@@ -116,6 +116,7 @@ def test_operations_on_solids_are_compiled_where_there_are_some():
         assert any(name.startswith("crossings_of_solid") for name in names) == solids
 
 
+@pytest.mark.slow
 def test_queries_call_these_kernels():
     """That is with arguments of these types: nothing else is compiled."""
     scene = rt.Scene.parse(SOLID)
