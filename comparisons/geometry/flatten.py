@@ -5,10 +5,13 @@ trees is under test too.
 """
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
-from reference_rt.core import transform
-from reference_rt.core.transform import Affine
+import numpy as np
+
+from comparisons.geometry import affine
+from comparisons.geometry.affine import Affine
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes.csg import Difference, Solid, Union
 from reference_rt.shapes.instances import Instance
@@ -58,7 +61,7 @@ class Copy(NamedTuple):
 
 def place_of(scene: Scene, leaf: Leaf, outer: Affine) -> TabulationContext:
     """The place with which a leaf is tabulated;  outer: the map of its group to the scene."""
-    return TabulationContext(folder=scene.folder, outer=transform.compose(leaf.outer, outer))
+    return TabulationContext(folder=scene.folder, outer=affine.compose(leaf.outer, outer))
 
 
 def copies_of(scene: Scene) -> list[Copy]:
@@ -68,10 +71,10 @@ def copies_of(scene: Scene) -> list[Copy]:
     found: list[Copy] = []
     for i, shape in enumerate(scene.shapes):
         if isinstance(shape, Instance):
-            expanded = _expanded(scene, shape, transform.identity())
+            expanded = _expanded(scene, shape, affine.IDENTITY)
             found += [Copy(i, k, g, groups[g], m) for k, (g, m) in enumerate(expanded)]
         else:
-            found.append(Copy(i, -1, "", (member_of(shape, 0),), transform.identity()))
+            found.append(Copy(i, -1, "", (member_of(shape, 0),), affine.IDENTITY))
     return found
 
 
@@ -90,8 +93,8 @@ def _members(shapes: Sequence[Shape]) -> Iterator[Member]:
 def _expanded(scene: Scene, instance: Instance, outer: Affine) -> Iterator[tuple[str, Affine]]:
     """(group, map to the scene) of each copy that an instance expands to."""
     shapes = scene.groups[instance.group]
-    for own in instance.maps(scene.folder):
-        inner = transform.compose(own, outer)
+    for own in maps_of(instance, scene.folder):
+        inner = affine.compose(own, outer)
         if not all(isinstance(shape, Instance) for shape in shapes):
             yield instance.group, inner
         for shape in shapes:
@@ -99,13 +102,22 @@ def _expanded(scene: Scene, instance: Instance, outer: Affine) -> Iterator[tuple
                 yield from _expanded(scene, shape, inner)
 
 
+def maps_of(instance: Instance, folder: Path) -> list[Affine]:
+    """The maps of an instance's copies."""
+    own = affine.of_steps(instance.transform)
+    if instance.file is None:
+        return [own]
+    maps = np.load(folder / instance.file).astype(np.float64)
+    return [affine.compose(m[:3], own) for m in maps]
+
+
 def member_of(shape: Shape, number: int) -> Member:
     """The member for a shape that is no instance;  number: of its first leaf in its group."""
     if not isinstance(shape, Solid):
-        leaf = Leaf(shape, transform.identity(), shape.material, number)
+        leaf = Leaf(shape, affine.IDENTITY, shape.material, number)
         return Member((leaf,), None)
     leaves: list[Leaf] = []
-    tree = _tree(shape, transform.identity(), None, leaves)
+    tree = _tree(shape, affine.IDENTITY, None, leaves)
     assert isinstance(tree, Tree)
     return Member(tuple(leaf._replace(part=number + leaf.part) for leaf in leaves), tree)
 
@@ -116,7 +128,7 @@ def _tree(shape: Shape, outer: Affine, material: str | None, leaves: list[Leaf])
     if not isinstance(shape, Solid):
         leaves.append(Leaf(shape, outer, material, len(leaves)))
         return len(leaves) - 1
-    outer = transform.compose(transform.affine(shape.transform), outer)
+    outer = affine.compose(affine.of_steps(shape.transform), outer)
     of = tuple(_tree(operand, outer, material, leaves) for operand in shape.of)
     if isinstance(shape, Difference):
         return Tree("difference", of)

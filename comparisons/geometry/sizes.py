@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from comparisons.geometry import affine
 from comparisons.geometry.flatten import Copy, copies_of, place_of
 from comparisons.geometry.frame import OURS, Frame
-from reference_rt.core import transform
 from reference_rt.core.arrays import Bounds, FloatArray, IdArray, IntArray
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
@@ -86,7 +86,7 @@ class ShapeSizes:
             numbers = self._parts[name] = [-1] * (max(leaf.part for leaf in leaves) + 1)
             for leaf in leaves:
                 numbers[leaf.part] = len(self.leaves)
-                place = place_of(scene, leaf, transform.identity())
+                place = place_of(scene, leaf, affine.IDENTITY)
                 table = leaf.shape.tabulate(place)
                 self.leaves.append(LeafSizes(leaf.shape, leaf.material, table))
         for sizes in self.leaves_of(copy):
@@ -172,11 +172,11 @@ def _name(copy: Copy) -> str:
     return copy.group if copy.instance >= 0 else f"{copy.shape}:"
 
 
-def corners_of(bounds: Bounds, m: transform.Affine) -> FloatArray:
+def corners_of(bounds: Bounds, m: affine.Affine) -> FloatArray:
     """(8, 3): the corners of a box, mapped by m."""
     ends = np.stack(bounds)
     pick = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
-    return transform.apply_points(m, ends[pick, [0, 1, 2]])
+    return affine.apply_points(m, ends[pick, [0, 1, 2]])
 
 
 def _features(field: str, table: Any) -> FloatArray:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from comparisons.geometry import affine
 from comparisons.geometry.flatten import Leaf, Tree
 from comparisons.geometry.frame import delta, round32
 from comparisons.mitsuba.hits import (
@@ -23,7 +24,6 @@ from comparisons.mitsuba.hits import (
     rows_of,
 )
 from comparisons.mitsuba.scene import first_hits
-from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IdArray, IntArray
 from reference_rt.shapes import Plane
 from reference_rt.shapes.shape import TabulationContext
@@ -147,8 +147,8 @@ class Operand(NamedTuple):
         Backwards, since ahead may be an edge that the rays are aimed at.
         """
         if isinstance(self.leaf.shape, Plane):
-            to_local = transform.invert(self.leaf.shape.map_in(self.place))
-            return transform.apply_points(to_local, o)[:, 2] < 0.0
+            to_local = affine.invert(affine.map_in(self.leaf.shape, self.place))
+            return affine.apply_points(to_local, o)[:, 2] < 0.0
         if len(o) == 0:  # Dr.Jit does not accept empty arrays
             return np.zeros(0, bool)
         behind = read(first_hits(self.mi_scene, ids, o, -d), mi_shapes, o)

@@ -11,6 +11,7 @@ Works in scalar variants and in wide ones, where all rays are traced together.
 
 from typing import Any, NamedTuple
 
+from comparisons.geometry import affine
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.csg import (
@@ -23,7 +24,6 @@ from comparisons.mitsuba.csg import (
 )
 from comparisons.mitsuba.hits import CURVED
 from comparisons.mitsuba.plugins.base import PlainScene, is_wide
-from reference_rt.core import transform
 from reference_rt.shapes import Plane
 
 NONE = 0xFFFFFFFF
@@ -198,7 +198,7 @@ class _Operand:
         self.reach = operand.reach()
         self.plane: Any = None
         if isinstance(operand.leaf.shape, Plane):
-            self.plane = transform.invert(operand.leaf.shape.map_in(operand.place))[2].tolist()
+            self.plane = affine.invert(affine.map_in(operand.leaf.shape, operand.place))[2].tolist()
 
     def begins_inside(self, o: Any, first: _Crossing) -> Any:
         """Whether rays start inside: their first crossing leaves the operand."""

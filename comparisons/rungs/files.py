@@ -5,10 +5,9 @@ read 5 % too large is too large in both.  Here each shape and image is held agai
 share nothing with them:
 
 - files of meshes: Mitsuba's own loader (.obj, .ply), or trimesh (.stl, .off, .gltf, .glb), for
-  corners, faces, normals and uv;
+  corners, faces, normals and uv; smooth normals by their formula;
 - images: Mitsuba's own loader, and its conversion to linear values;
-- transforms: Mitsuba's own functions, step by step, in float64, and the inverse transpose for
-  normals;
+- transforms and maps of instances: SciPy's rotations and NumPy's inverse, for normals too;
 - spheres, boxes, cylinders, ...: the equation of the description's own numbers, at the points and
   for the normals that our tracer finds.
 
@@ -16,20 +15,19 @@ What no second source reads is counted, and named.
 """
 
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import suppress
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from comparisons.geometry import affine
 from comparisons.geometry.equations import EQUATIONS
-from comparisons.mitsuba.reading.parse import scalar
+from comparisons.geometry.flatten import maps_of
+from comparisons.mitsuba.second import SLIVERS, Corners, by_second, image, rounding_of
 from comparisons.results.case import RungResult
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.image_files import open_image
 from reference_rt.lights import EnvironmentMap
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import (
@@ -43,6 +41,7 @@ from reference_rt.shapes import (
     Torus,
     Triangle,
 )
+from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.shape import Shape, Solid, TabulationContext
 from reference_rt.textures import Bitmap
 
@@ -65,13 +64,11 @@ RAYS = 64
 @dataclass
 class Found:
     """checked: how many of each kind;  unread: what no second source reads;  differences: what
-    differs, the first one first;  read: meshes of second sources, by file;  triangles: how many
-    have been compared."""
+    differs, the first one first;  triangles: how many have been compared."""
 
     checked: dict[str, int] = field(default_factory=dict)
     unread: list[str] = field(default_factory=list)
     differences: list[str] = field(default_factory=list)
-    read: dict[Path, "tuple[Second, str] | None"] = field(default_factory=dict)
     triangles: int = 0
 
     def count(self, kind: str) -> None:
@@ -83,16 +80,16 @@ def files(scene: Scene) -> RungResult:
     found = Found()
     shapes = list(_shapes(scene))
     step = max(1, -(-len(shapes) // MOST_SHAPES))
-    with scalar() as mi, warnings.catch_warnings(), np.errstate(all="ignore"):
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")  # they were issued when the scene was built
         for where, shape in shapes[::step]:
-            _check_shape(mi, where, shape, scene.folder, found)
+            _check_shape(where, shape, scene.folder, found)
         for name, texture in scene.textures.items():
             if isinstance(texture, Bitmap):
-                _check_bitmap(mi, f"textures.{name}", texture, scene.folder, found)
+                _check_bitmap(f"textures.{name}", texture, scene.folder, found)
         for i, light in enumerate(scene.lights):
             if isinstance(light, EnvironmentMap):
-                _check_environment(mi, f"lights[{i}]", light, scene.folder, found)
+                _check_environment(f"lights[{i}]", light, scene.folder, found)
     numbers: dict[str, Any] = {"checked": found.checked, "unread": sorted(set(found.unread))}
     if found.differences:
         more = len(found.differences) - 1
@@ -124,168 +121,56 @@ def _shapes(scene: Scene) -> Iterator[tuple[str, Shape]]:
             yield f"{place} ({type(shape).__name__.lower()})", shape
 
 
-def _check_shape(mi: Any, where: str, shape: Shape, folder: Path, found: Found) -> None:
-    if isinstance(shape, Mesh):
-        _check_mesh(mi, where, shape, folder, found)
-    elif isinstance(shape, Triangle):
-        corners = np.array([[shape.v0, shape.v1, shape.v2]])
-        second = Second(corners, None, None)
-        table = shape.tabulate(TabulationContext(folder=folder))
-        _compare(where, "the description", table, second, _matrix(mi, shape), found)
-        found.count("triangles")
+def _check_shape(where: str, shape: Shape, folder: Path, found: Found) -> None:
+    if isinstance(shape, Mesh | Triangle):
+        _check_mesh(where, shape, folder, found)
+    elif isinstance(shape, Instance):
+        ours, theirs = shape.maps(folder), np.array(maps_of(shape, folder))
+        error = np.abs(ours - theirs).max(axis=(1, 2))
+        # A few products of rounded matrices.
+        if (error > 2.0**-44 * np.abs(theirs).max(axis=(1, 2))).any():
+            k = int(error.argmax())
+            found.differences.append(
+                f"{where}: copy {k} has the map {_text(ours[k])}; its description says "
+                f"{_text(theirs[k])}"
+            )
+        found.count("instances")
     elif type(shape) in EQUATIONS:
-        _check_equation(mi, where, shape, found)
+        _check_equation(where, shape, found)
     else:
         found.unread.append(type(shape).__name__.lower())
-
-
-# ---- transforms ----------------------------------------------------------------------------------
-
-
-def _matrix(mi: Any, described: Any) -> FloatArray:
-    """The transform (4, 4) of a description, by Mitsuba's functions in float64."""
-    known = mi.ScalarTransform4d
-    total = known()
-    for step in described.transform:
-        match step.model_dump():
-            case {"translate": offset}:
-                one = known().translate(list(offset))
-            case {"scale": factors}:
-                one = known().scale(list(factors))
-            case {"rotate": {"axis": axis, "degrees": degrees}}:
-                unit = np.array(axis) / np.linalg.norm(axis)
-                one = known().rotate(unit.tolist(), degrees)
-            case {"matrix": rows}:
-                one = known(np.vstack([rows, [[0.0, 0.0, 0.0, 1.0]]]))
-        total = one @ total
-    return np.array(total.matrix, np.float64)
 
 
 # ---- meshes --------------------------------------------------------------------------------------
 
 
-class Second(NamedTuple):
-    """A mesh of a second source, before its transform: corners (n, 3, 3), and at these, or None,
-    unit normals (n, 3, 3) and uv (n, 3, 2)."""
-
-    corners: FloatArray
-    normals: FloatArray | None
-    uv: FloatArray | None
-
-
-def _check_mesh(mi: Any, where: str, mesh: Mesh, folder: Path, found: Found) -> None:
+def _check_mesh(where: str, mesh: Mesh | Triangle, folder: Path, found: Found) -> None:
     if found.triangles > MOST_TRIANGLES:
         found.unread.append(f"meshes beyond {MOST_TRIANGLES:,} triangles")
         return
     table = mesh.tabulate(TabulationContext(folder=folder))
     found.triangles += len(table.face)
-    if mesh.file is None:
-        assert mesh.vertices is not None
-        assert mesh.faces is not None
-        faces = np.asarray(mesh.faces)
-        vertices: Any
-        vertices, normals, uv = (None if a is None else a[faces] for a in _arrays(mesh))
-        second, source = Second(vertices, normals, uv), "the description"
-    else:
-        path = folder / mesh.file
-        suffix = path.suffix.lower()
-        if mesh.data(folder).doubtful:
-            found.unread.append(f"{suffix} of concave polygons, or with uv and normals in part")
-            return
-        if path not in found.read:
-            found.read[path] = _second(mi, path)
-        if (known := found.read[path]) is None:
-            found.unread.append(f"{suffix} that no other reader takes, or beyond float32")
-            return
-        second, source = known
-    if mesh.face_normals:
-        second = second._replace(normals=None)
-    _compare(where, source, table, second, _matrix(mi, mesh), found, made=mesh.smooth)
-    found.count("meshes")
+    second = by_second(mesh, folder)
+    if second is not None:
+        _compare(where, table, second, affine.of_steps(mesh.transform), found)
+        found.count("meshes" if isinstance(mesh, Mesh) else "triangles")
+        return
+    assert isinstance(mesh, Mesh)
+    assert mesh.file is not None
+    suffix = Path(mesh.file).suffix.lower()
+    doubtful = mesh.data(folder).doubtful
+    found.unread.append(
+        f"{suffix} of concave polygons, or with uv and normals in part"
+        if doubtful
+        else f"{suffix} that no other reader takes, or beyond float32"
+    )
 
 
-def _second(mi: Any, path: Path) -> "tuple[Second, str] | None":
-    """A mesh by the first second reader that takes it; None where none does, or where float32 does
-    not hold the numbers."""
-    for reader in READERS.get(path.suffix.lower(), ()):
-        with suppress(Exception):  # of a library: it may refuse what ours has read
-            second, source = reader(mi, path)
-            if np.isfinite(second.corners).all():
-                return second, source
-    return None
-
-
-def _arrays(mesh: Mesh) -> tuple[Any, Any, Any]:
-    normals = mesh.normals
-    if normals is not None:
-        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    return mesh.vertices, normals, mesh.uv
-
-
-def _of_mitsuba(mi: Any, path: Path) -> tuple[Second, str]:
-    kind = path.suffix[1:].lower()
-    own = {"flip_tex_coords": False} if kind == "obj" else {}
-    mesh = mi.load_dict({"type": kind, "filename": str(path), **own})
-    values = mi.traverse(mesh)
-    faces = np.array(values["faces"], np.int64).reshape(-1, 3)
-    columns: list[Any] = []
-    for name, width, is_there in (
-        ("vertex_positions", 3, True),
-        ("vertex_normals", 3, _has_normals(path)),
-        ("vertex_texcoords", 2, mesh.has_vertex_texcoords()),
-    ):
-        rows = np.array(values[name], np.float64).reshape(-1, width) if is_there else None
-        columns.append(None if rows is None else rows[faces])
-    return Second(*columns), "Mitsuba's loader"
-
-
-def _has_normals(path: Path) -> bool:
-    """Whether a file has vertex normals: where it has none Mitsuba makes its own."""
-    content = path.read_bytes()
-    if path.suffix.lower() == ".obj":
-        return b"\nvn " in content or content.startswith(b"vn ")
-    return b" nx\n" in content[: content.find(b"end_header")].replace(b"\r", b"\n")
-
-
-TRIMESH = "trimesh"
-
-
-def _of_trimesh(mi: Any, path: Path) -> tuple[Second, str]:
-    import trimesh
-
-    if path.suffix.lower() in (".gltf", ".glb") and b'"sparse"' in path.read_bytes():
-        raise ValueError("trimesh ignores sparse accessors")
-    scene = trimesh.load(path, process=False, force="scene")
-    parts = [
-        trimesh.transform_points(scene.geometry[name].vertices, matrix)[scene.geometry[name].faces]
-        for matrix, name in (scene.graph[node] for node in scene.graph.nodes_geometry)
-        if hasattr(scene.geometry[name], "faces")
-    ]
-    return Second(np.concatenate(parts), None, None), TRIMESH
-
-
-READERS: dict[str, tuple[Callable[[Any, Path], tuple[Second, str]], ...]] = {
-    ".obj": (_of_mitsuba, _of_trimesh),
-    ".ply": (_of_mitsuba, _of_trimesh),  # Mitsuba refuses polygons
-    **dict.fromkeys((".stl", ".off", ".gltf", ".glb"), (_of_trimesh,)),
-}
-"""The second readers of each format: never the library that ours reads it with."""
-
-
-def _compare(
-    where: str,
-    source: str,
-    table: Any,
-    second: Second,
-    matrix: FloatArray,
-    found: Found,
-    made: bool = False,
-) -> None:
-    """A table of triangles against a second source under a transform.  made: whether normals that
-    the source does not have are made."""
-    linear, offset = matrix[:3, :3], matrix[:3, 3]
+def _compare(where: str, table: Any, second: Corners, m: affine.Affine, found: Found) -> None:
+    """A table of triangles against a second source under a transform."""
+    linear, offset, source = m[:, :3], m[:, 3], second.source
     order = [0, 2, 1] if np.linalg.det(linear) < 0.0 else [0, 1, 2]  # the front stays the front
-    corners = (second.corners @ linear.T + offset)[:, order]
+    corners = (second.points @ linear.T + offset)[:, order]
     kept: IntArray = table.face
     if len(kept) and kept.max() >= len(corners):
         found.differences.append(
@@ -295,7 +180,7 @@ def _compare(
     sides = corners[:, 1:] - corners[:, :1]
     area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     # A product of three rounded numbers, of the size of the coordinates.
-    size = np.abs(second.corners) @ np.abs(linear).T + np.abs(offset)
+    size = np.abs(second.points) @ np.abs(linear).T + np.abs(offset)
     rounding = 4.0 * FLOAT32 * float(size.max(initial=0.0)) + LEAST32 * float(np.abs(linear).max())
     longest = np.linalg.norm(sides, axis=-1).max(axis=1, initial=0.0)
     lost = np.ones(len(corners), bool)
@@ -306,8 +191,6 @@ def _compare(
         )
         return
     n = len(kept)
-    if source == TRIMESH:
-        corners[kept] = _matched(table.vertices.reshape(n, 3, 3), corners)
     expected: list[tuple[str, FloatArray | None, FloatArray | None, float]] = [
         ("is at", table.vertices.reshape(n, 3, 3), corners[kept], rounding)
     ]
@@ -315,15 +198,19 @@ def _compare(
         normals = second.normals[kept][:, order] @ np.linalg.inv(linear)
         normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
         ours = None if table.normals is None else table.normals.reshape(n, 3, 3)
-        bent = 16.0 * FLOAT32 * float(np.linalg.cond(linear))
+        bent = (SLIVERS if second.made else 16.0 * FLOAT32) * float(np.linalg.cond(linear))
         expected.append(("has the normal", ours, normals, bent))
-    elif table.normals is not None and not made:
+    elif table.normals is not None and "normals" not in second.silent:
         found.differences.append(f"{where}: has vertex normals; {source} finds none")
     if second.uv is not None:
         uv = second.uv[kept][:, order]
         ours = None if table.uvs is None else table.uvs.reshape(n, 3, 2)
         most = 4.0 * FLOAT32 * float(np.abs(uv).max(initial=1.0))
         expected.append(("has the uv", ours, uv, most))
+    if second.colours is not None:
+        colours = second.colours[kept][:, order]
+        ours = None if table.colours is None else table.colours.reshape(n, 3, 3)
+        expected.append(("has the colour", ours, colours, 4.0 * FLOAT32))
     for what, ours, theirs, most in expected:
         if theirs is None:
             continue
@@ -337,17 +224,6 @@ def _compare(
                 f"{where}: corner {corner} of triangle {kept[k]} {what} "
                 f"{_text(ours[k, corner])}; {source} has {_text(theirs[k, corner])}"
             )
-
-
-def _matched(ours: FloatArray, theirs: FloatArray) -> FloatArray:
-    """For each of our triangles (n, 3, 3) the nearest of theirs, which may have another order, and
-    may begin at another corner."""
-    _, near = cKDTree(theirs.mean(axis=1)).query(ours.mean(axis=1), k=min(4, len(theirs)))
-    near = near.reshape(len(ours), -1)
-    candidates = np.stack([np.roll(theirs[near], k, axis=2) for k in range(3)], axis=2)
-    candidates = candidates.reshape(len(ours), -1, 3, 3)
-    best = np.abs(candidates - ours[:, None]).max(axis=(2, 3)).argmin(axis=1)
-    return np.asarray(candidates[np.arange(len(ours)), best])
 
 
 def _text(numbers: Any) -> str:
@@ -366,11 +242,11 @@ NAMES = {kind: "boxes" if kind is Box else f"{kind.__name__.lower()}s" for kind 
 }
 
 
-def _check_equation(mi: Any, where: str, shape: Shape, found: Found) -> None:
+def _check_equation(where: str, shape: Shape, found: Found) -> None:
     """Rays at places within the shape, from everywhere; they must meet it where its equation holds,
     and reach as far as it does."""
-    surface, matrix = EQUATIONS[type(shape)](shape), _matrix(mi, shape)
-    linear, offset = matrix[:3, :3], matrix[:3, 3]
+    surface, m = EQUATIONS[type(shape)](shape), affine.of_steps(shape.transform)
+    linear, offset = m[:, :3], m[:, 3]
     inverse = np.linalg.inv(linear)
     rng = np.random.default_rng(38)
     half, middle = np.array(surface.half, float), np.array(surface.middle, float)
@@ -419,24 +295,6 @@ def _is_flat(shape: Shape) -> bool:
 # ---- images --------------------------------------------------------------------------------------
 
 
-def _image(mi: Any, path: Path, encoding: str) -> FloatArray | None:
-    """An image (h, w, 3) as Mitsuba reads it, in linear values; None where it does not."""
-    try:
-        bitmap = mi.Bitmap(str(path))
-    except RuntimeError:
-        return None
-    if encoding in ("raw", "srgb"):
-        bitmap.set_srgb_gamma(encoding == "srgb")
-    formats = mi.Bitmap.PixelFormat
-    if bitmap.pixel_format() not in (formats.Y, formats.YA, formats.RGB, formats.RGBA):
-        return None
-    return np.array(bitmap.convert(formats.RGB, mi.Struct.Type.Float64, False), np.float64)
-
-
-_INEXACT = (".jpg", ".jpeg")
-"""Formats whose decoders may differ by a few codes."""
-
-
 def _compare_images(
     where: str, path: Path, ours: FloatArray, theirs: FloatArray, scale: float, found: Found
 ) -> None:
@@ -447,12 +305,7 @@ def _compare_images(
         )
         return
     theirs = theirs * scale
-    # Mitsuba decodes sRGB in float32: a power, and a few operations; floats are the same.
-    is_decoded = path.suffix.lower() not in (".exr", ".hdr", ".pfm")
-    allowed = 2.0**-19 * np.abs(theirs) + (2.0**-24 * scale if is_decoded else 0.0)
-    if path.suffix.lower() in _INEXACT:
-        allowed = 0.02 * scale + 0.05 * np.abs(theirs)
-    error = np.abs(ours - theirs) - allowed
+    error = np.abs(ours - theirs) - rounding_of(path, theirs, scale)
     if (error > 0.0).any():
         y, x, _ = np.unravel_index(int(error.argmax()), error.shape)
         found.differences.append(
@@ -462,11 +315,10 @@ def _compare_images(
     found.count("images")
 
 
-def _check_bitmap(mi: Any, where: str, bitmap: Bitmap, folder: Path, found: Found) -> None:
+def _check_bitmap(where: str, bitmap: Bitmap, folder: Path, found: Found) -> None:
     path = folder / bitmap.file
-    encoding = bitmap.encoding
-    theirs = None if bitmap.layer or encoding == "radiance" else _image(mi, path, encoding)
-    if theirs is None or getattr(open_image(path), "gamma", None) is not None:
+    theirs = image(path, bitmap.encoding, bitmap.layer)
+    if theirs is None:
         found.unread.append(path.suffix.lower())
         return
     texels = bitmap.read(folder)
@@ -479,16 +331,17 @@ def _check_bitmap(mi: Any, where: str, bitmap: Bitmap, folder: Path, found: Foun
     _compare_images(where, path, ours, theirs, bitmap.scale, found)
 
 
-def _check_environment(
-    mi: Any, where: str, light: EnvironmentMap, folder: Path, found: Found
-) -> None:
+def _check_environment(where: str, light: EnvironmentMap, folder: Path, found: Found) -> None:
     path, table = folder / light.file, light.tabulate(folder)
-    theirs = None if light.layer or light.encoding == "radiance" else _image(mi, path, "auto")
+    theirs = image(path, light.encoding, light.layer)
     if theirs is None:
         found.unread.append(path.suffix.lower())
     else:
         _compare_images(where, path, table.texels, theirs, light.scale, found)
-    to_map, expected = table.to_map.reshape(3, 3), np.linalg.inv(_matrix(mi, light)[:3, :3])
+    to_map, expected = (
+        table.to_map.reshape(3, 3),
+        np.linalg.inv(affine.of_steps(light.transform)[:, :3]),
+    )
     if np.abs(to_map - expected).max() > 1e-5:  # seven digits are taken for a rotation
         found.differences.append(
             f"{where}: turns directions by {_text(to_map)}; its transform undone is "

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from comparisons.geometry import affine
 from comparisons.geometry.exact.referee import Referee, identity_of
 from comparisons.geometry.frame import round32
 from comparisons.geometry.sizes import LeafSizes, ShapeSizes
@@ -21,7 +22,6 @@ from comparisons.rungs.rays.comparer import DISCRETE, KINDS, Comparer
 from comparisons.rungs.rays.rays import Rays, described, joined, mixed_rays, random_rays
 from comparisons.rungs.rays.resolution import resolution
 from reference_rt.cameras.film import Film
-from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators import RayCast
 from reference_rt.integrators.scene_tables import SceneTables
@@ -115,7 +115,7 @@ def _spots(sizes: ShapeSizes, rng: np.random.Generator) -> FloatArray:
                 if len(spots) > MOST_SPOTS:
                     spots = spots[rng.choice(len(spots), MOST_SPOTS, replace=False)]
                 local[id(leaf)] = spots
-            found.append(transform.apply_points(copy.outer, local[id(leaf)][:share]))
+            found.append(affine.apply_points(copy.outer, local[id(leaf)][:share]))
     return np.concatenate(found)
 
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from comparisons.geometry import affine
 from comparisons.geometry.flatten import Copy, Leaf, copies_of, place_of
 from comparisons.geometry.frame import Frame
 from comparisons.mitsuba.backend import mitsuba, scalar
@@ -60,7 +61,7 @@ def to_mitsuba(scene: Scene, native: bool = False) -> dict[str, Any]:
     """The scene as a dict for `mitsuba.load_dict`, without its solids; our shape i has the id
     "shape_<i>", or several ids with suffixes.
 
-    Meshes are Mitsuba objects already, made of the triangles of our tables.  Ray casting has no
+    Meshes are Mitsuba objects already, of what a second reader reads.  Ray casting has no
     integrator in Mitsuba.  native: use Mitsuba's own materials even where our plugins are more
     exact, to measure Mitsuba's speed.  Raises UntranslatableError, SceneError for a file that
     cannot be used, ReferenceUnavailableError without Mitsuba.
@@ -146,7 +147,7 @@ def _reach(scene: Scene, copies: list[Copy]) -> float:
     found = float(np.abs([scene.camera.eye, scene.camera.target]).max())
     for copy in copies:
         for leaf in (leaf for member in copy.members for leaf in member.leaves):
-            m = leaf.shape.map_in(place_of(scene, leaf, copy.outer))
+            m = affine.map_in(leaf.shape, place_of(scene, leaf, copy.outer))
             found = max(found, float((np.abs(m[:, 3]) + np.abs(m[:, :3]).sum(axis=1)).max()))
     return found
 

@@ -5,16 +5,19 @@ from functools import singledispatch
 from typing import Any
 
 import numpy as np
+from scipy.linalg import polar
 
+from comparisons.geometry import affine
+from comparisons.geometry.affine import is_similarity
 from comparisons.geometry.flatten import Copy, Leaf, Member
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.second import described_image
 from comparisons.mitsuba.translate.textures import (
     TranslationContext,
     UntranslatableError,
     projected,
     rgb,
 )
-from reference_rt.core.transform import is_similarity
 from reference_rt.integrators import Direct
 from reference_rt.lights import (
     Ambient,
@@ -27,6 +30,7 @@ from reference_rt.lights import (
 )
 from reference_rt.shapes import Box, Disk, Mesh, Rectangle, Sphere, Triangle
 from reference_rt.shapes.shape import TabulationContext
+from reference_rt.textures.image_file import read_image
 
 SAMPLED = (Sphere, Rectangle, Disk, Box, Triangle, Mesh)
 """Emissive shapes of which `reference_rt` samples points, unless a map makes a sphere an ellipsoid.
@@ -44,7 +48,7 @@ def never_samples(
     shape = leaf.shape
     if copy.instance >= 0 or member.tree is not None or not isinstance(shape, SAMPLED):
         return True
-    return isinstance(shape, Sphere) and not is_similarity(shape.map_in(place)[:, :3])
+    return isinstance(shape, Sphere) and not is_similarity(affine.map_in(shape, place)[:, :3])
 
 
 @singledispatch
@@ -122,13 +126,15 @@ def _(light: Constant, context: TranslationContext) -> dict[str, Any]:
 
 @translate_light.register
 def _(light: EnvironmentMap, context: TranslationContext) -> dict[str, Any]:
-    """From the texels of our table, scale included."""
-    table = light.tabulate(context.folder)
+    path = context.folder / light.file
+    ours = read_image(path, light.encoding, light.scale, light.layer)
+    texels = described_image(path, light.encoding, light.scale, light.layer, ours)
+    # Written with seven digits, a rotation is not quite one.
     to_world = np.eye(4)
-    to_world[:3, :3] = table.to_map.reshape(3, 3).T
+    to_world[:3, :3] = polar(affine.of_steps(light.transform)[:, :3])[0]
     return {
         "type": "envmap",
-        "bitmap": mitsuba().Bitmap(np.ascontiguousarray(table.texels, dtype=np.float32)),
+        "bitmap": mitsuba().Bitmap(np.ascontiguousarray(texels, dtype=np.float32)),
         "to_world": mitsuba().ScalarTransform4f(to_world),
     }
 

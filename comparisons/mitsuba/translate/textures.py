@@ -10,6 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.second import described_image
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.materials.material import Material
@@ -137,10 +138,11 @@ def _(texture: Checker, name: str, context: TranslationContext, as_number: bool)
 
 @translate_texture.register
 def _(texture: Bitmap, name: str, context: TranslationContext, as_number: bool) -> dict[str, Any]:
-    """From our own linear texels: the decoding of files is not compared."""
     key = (name, as_number)
     if key not in context.images:
-        context.images[key] = _image(texture.read(context.folder).linear, as_number)
+        path, ours = context.folder / texture.file, texture.read(context.folder).linear
+        texels = described_image(path, texture.encoding, texture.scale, texture.layer, ours)
+        context.images[key] = _image(texels, as_number)
     return _lookup(context.images[key], texture.filter, texture.wrap, texture.uv)
 
 

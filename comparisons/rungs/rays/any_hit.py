@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from comparisons.geometry import affine
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.scene import for_rays
 from comparisons.rungs.rays.rays import Rays, random_rays
-from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering import query
@@ -166,7 +166,7 @@ def _triangles(sizes: ShapeSizes, rng: np.random.Generator) -> FloatArray:
     for (copy, leaf), count in zip(meshes, counts.tolist(), strict=True):
         rows = _some(len(leaf.table.vertices), count, rng)
         corners = leaf.table.vertices[rows].reshape(-1, 3)
-        found.append(transform.apply_points(copy.outer, corners).reshape(-1, 3, 3))
+        found.append(affine.apply_points(copy.outer, corners).reshape(-1, 3, 3))
     return np.concatenate(found)
 
 

@@ -1,17 +1,20 @@
 """Shapes that are exact as triangles: meshes and polygons; infinite planes as large finite meshes.
 
-A mesh has the triangles of our table in our order, so that Mitsuba's prim_index is a row of our
-table.  The table lacks the file's triangles without area, but keeps the file's numbers.
+A mesh has the triangles of its file, as a second reader reads it, in the order of the file, so that
+Mitsuba's prim_index tells our face number.  Triangles without area are left out.
 """
 
+from pathlib import Path
 from typing import Any
 
 import manifold3d
 import numpy as np
 
+from comparisons.geometry import affine
 from comparisons.geometry.sizes import heights_of
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.hits import Extent, Plugin, same_uv
+from comparisons.mitsuba.second import described
 from comparisons.mitsuba.translate.shapes.site import (
     Site,
     instance_of,
@@ -19,12 +22,9 @@ from comparisons.mitsuba.translate.shapes.site import (
     with_mesh_light,
 )
 from comparisons.mitsuba.translate.textures import VERTEX_COLOUR, VERTEX_LUMINANCE
-from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.shapes import Mesh, Plane, Polygon, Triangle
-from reference_rt.shapes.meshes.triangle import Triangles
-from reference_rt.shapes.shape import TabulationContext
 
 MOST_TRIANGLES = 4_000_000
 """Most triangles of all copies of a mesh together, 0.3 kB each.  With more Mitsuba gets instances,
@@ -56,7 +56,7 @@ class Soup:
         self.positions, self.normals, self.uvs, self.colours = positions, normals, uvs, colours
         self.faces = np.arange(len(positions)).reshape(-1, 3) if faces is None else faces
 
-    def moved(self, m: transform.Affine, mirrored: bool) -> "Soup":
+    def moved(self, m: affine.Affine, mirrored: bool) -> "Soup":
         """The mesh under an affine map;  mirrored: reverse the corners, and so the front.
 
         Normals are not made unit again: between vertices they are interpolated, and an instance
@@ -64,9 +64,9 @@ class Soup:
         """
         normals = None
         if self.normals is not None:
-            normals = self.normals @ transform.invert(m)[:, :3]
+            normals = self.normals @ affine.invert(m)[:, :3]
             normals /= np.abs(normals).max()
-        positions = transform.apply_points(m, self.positions)
+        positions = affine.apply_points(m, self.positions)
         if not mirrored:
             return Soup(positions, normals, self.uvs, self.colours, self.faces)
         uvs = self.uvs
@@ -115,7 +115,7 @@ class Soup:
 def _(shape: Triangle | Mesh, site: Site) -> list[Plugin]:
     key = ("triangles", id(shape))
     if key not in site.shared:
-        site.shared[key] = _soup(shape.tabulate(TabulationContext(folder=site.place.folder)))
+        site.shared[key] = _soup(shape, site.place.folder)
     soup: Soup = site.shared[key]
     site = with_mesh_light(site, normals=soup.normals is not None)
     key = ("mesh", id(shape))
@@ -123,7 +123,7 @@ def _(shape: Triangle | Mesh, site: Site) -> list[Plugin]:
     return [plugin._replace(uv=same_uv, faces=soup.numbers)]
 
 
-def placed(soup: Soup, key: Any, m: transform.Affine, mirrored: bool, site: Site) -> Plugin:
+def placed(soup: Soup, key: Any, m: affine.Affine, mirrored: bool, site: Site) -> Plugin:
     """Triangles under the map m: a mesh, or, with many copies that do not emit, an instance of the
     one mesh for `key`.  `mirrored`: see `Soup.moved`."""
     parts = site.parts if soup.colours is None else site.coloured
@@ -134,14 +134,20 @@ def placed(soup: Soup, key: Any, m: transform.Affine, mirrored: bool, site: Site
     return instance_of(str(key), lambda: soup.mesh(parts), m, site)
 
 
-def _soup(table: Triangles) -> Soup:
-    return Soup(
-        table.vertices.reshape(-1, 3),
-        None if table.normals is None else table.normals.reshape(-1, 3),
-        None if table.uvs is None else table.uvs.reshape(-1, 2),
-        None if table.colours is None else table.colours.reshape(-1, 3),
-        numbers=table.face,
-    )
+def _soup(shape: Triangle | Mesh, folder: Path) -> Soup:
+    """The triangles of a description under its own transform, but for those without area."""
+    mesh = described(shape, folder)
+    edges = np.diff(mesh.points, axis=1)
+    edges /= np.maximum(np.abs(edges).max(axis=(1, 2), keepdims=True), np.finfo(float).tiny)
+    numbers = np.flatnonzero(np.cross(edges[:, 0], edges[:, 1]).any(axis=1))
+    columns = (mesh.points, mesh.normals, mesh.uv, mesh.colours)
+    rows = (None if c is None else c[numbers].reshape(-1, c.shape[2]) for c in columns)
+    m = affine.of_steps(shape.transform)
+    soup = Soup(*rows).moved(m, affine.mirrors(m))  # type: ignore[arg-type]
+    soup.numbers = numbers
+    if mesh.normals is not None:  # of its own transform: unit at the vertices, as in a file
+        soup.normals = affine.apply_normals(m, mesh.normals[numbers].reshape(-1, 3))
+    return soup
 
 
 # ---- infinite planes and polygons ----------------------------------------------------------------
@@ -158,8 +164,8 @@ SIDES = 16
 
 @translate_shape.register
 def _(shape: Plane, site: Site) -> list[Plugin]:
-    m = shape.map_in(site.place)
-    n = transform.apply_normals(m, np.array([[0.0, 0.0, 1.0]]))[0]
+    m = affine.map_in(shape, site.place)
+    n = affine.apply_normals(m, np.array([[0.0, 0.0, 1.0]]))[0]
     middle = (n @ m[:, 3]) * n  # the point nearest to the origin
     unit = max(1.0, float(np.linalg.norm(middle)))
     across = np.linalg.svd(n[None])[2][1:]
@@ -170,8 +176,8 @@ def _(shape: Plane, site: Site) -> list[Plugin]:
     spokes = np.cos(phi)[:, None] * across[0] + np.sin(phi)[:, None] * across[1]
     rings = (radii[:, None, None] * spokes).reshape(-1, 3)
     positions = middle + np.vstack([np.zeros(3), rings])
-    inverse = transform.invert(m)
-    uvs = transform.apply_points(inverse, positions)[:, :2]
+    inverse = affine.invert(m)
+    uvs = affine.apply_points(inverse, positions)[:, :2]
     soup = Soup(positions, uvs=uvs, faces=_web(len(radii)))
     extent = Extent(middle, float(radii[-1] * np.cos(np.pi / SIDES)))
     heights = heights_of(soup.positions[soup.faces])
@@ -194,8 +200,8 @@ def _web(rings: int) -> IntArray:
 @translate_shape.register
 def _(shape: Polygon, site: Site) -> list[Plugin]:
     soup = polygon_soup(shape)
-    m = transform.compose(transform.affine(shape.transform), site.place.outer)
-    placed = soup.moved(m, transform.flips_orientation(m))
+    m = affine.map_in(shape, site.place)
+    placed = soup.moved(m, affine.mirrors(m))
     heights = heights_of(placed.positions[placed.faces])
     mesh = placed.mesh(with_mesh_light(site).parts)
     return [Plugin(mesh, faces=soup.all_of_face(0), uv=same_uv, heights=heights)]

@@ -1,4 +1,4 @@
-"""Shapes that Mitsuba has too, made from the float64 numbers of our own tables.
+"""Shapes that Mitsuba has too, made from the float64 numbers of the descriptions.
 
 Under a mirroring transform Mitsuba's rectangles, cubes and spheres turn inside out, or are
 inconsistent (a rectangle's geometric normal follows the winding, its shading normal the transform);
@@ -6,10 +6,10 @@ ours keep their outward side.  So these get no mirroring transform.  Mitsuba's d
 every affine map, its spheres only under similarities.
 """
 
-from typing import Any
-
 import numpy as np
 
+from comparisons.geometry import affine
+from comparisons.geometry.affine import Affine, apply_points, is_similarity
 from comparisons.geometry.frame import UNIT_ROUNDOFF
 from comparisons.mitsuba.hits import CURVED, Plugin, same_uv
 from comparisons.mitsuba.plugins.exact_coordinates import Round
@@ -25,7 +25,6 @@ from comparisons.mitsuba.translate.shapes.site import (
 from comparisons.mitsuba.translate.shapes.stand_ins import stand_in
 from comparisons.mitsuba.translate.shapes.surfaces import Implicit, Patch
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.transform import Affine, apply_points, is_similarity
 from reference_rt.shapes import Box, Disk, Rectangle, Sphere
 
 CELLS = (384, 192)
@@ -38,7 +37,7 @@ CUBE_FACES = (1, 4, 3, 5, 0, 2)
 
 @translate_shape.register
 def _(shape: Sphere, site: Site) -> list[Plugin]:
-    m = shape.map_in(site.place)
+    m = affine.map_in(shape, site.place)
     if not is_similarity(m[:, :3]):
         m = m @ np.vstack([np.column_stack([shape.radius * np.eye(3), shape.center]), [0, 0, 0, 1]])
         least = float(np.linalg.svd(m[:, :3], compute_uv=False)[-1])
@@ -48,11 +47,11 @@ def _(shape: Sphere, site: Site) -> list[Plugin]:
         if thin or "emitter" in site.parts:
             return [_ellipsoid(shape, site)]
         return [curved_instance("sphere", m, site)._replace(uv=same_uv)]
-    table: Any = shape.tabulate(site.place)
-    rotation = np.linalg.inv(table.to_local[0].reshape(3, 3))
+    center = affine.apply_points(m, np.array([shape.center]))[0]
+    rotation = m[:, :3]
     plugin = {
         "type": "sphere",
-        "to_world": to_world(rotation * table.radius[0], table.center[0]),
+        "to_world": to_world(rotation * shape.radius, center),
         # A mirrored sphere keeps its mirrored uv; flipping makes its normals point outwards.
         "flip_normals": bool(np.linalg.det(rotation) < 0.0),
         **site.parts,
@@ -86,7 +85,7 @@ def sphere_surface(shape: Sphere) -> tuple[list[Patch], Implicit]:
 
 @translate_shape.register
 def _(shape: Rectangle, site: Site) -> list[Plugin]:
-    m = shape.map_in(site.place)
+    m = affine.map_in(shape, site.place)
     mirrored = bool(np.linalg.det(m[:, :3]) < 0.0)
     # The third column has no effect but on orientation.
     columns = np.column_stack([m[:, 0], m[:, 1], -m[:, 2] if mirrored else m[:, 2]])
@@ -101,7 +100,7 @@ def _(shape: Rectangle, site: Site) -> list[Plugin]:
 
 @translate_shape.register
 def _(shape: Disk, site: Site) -> list[Plugin]:
-    m = shape.map_in(site.place)
+    m = affine.map_in(shape, site.place)
     return [
         Plugin({"type": "disk", "to_world": to_world(m[:, :3], m[:, 3]), **site.parts}, uv=same_uv)
     ]
@@ -109,7 +108,7 @@ def _(shape: Disk, site: Site) -> list[Plugin]:
 
 @translate_shape.register
 def _(shape: Box, site: Site) -> list[Plugin]:
-    m = shape.map_in(site.place)
+    m = affine.map_in(shape, site.place)
     if site.textured:
         return [_box_of_triangles(m, site)]
     edges = m[:, :3].copy()

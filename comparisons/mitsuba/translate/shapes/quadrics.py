@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from comparisons.geometry import affine
 from comparisons.geometry.sizes import heights_of
 from comparisons.mitsuba.hits import Plugin, same_uv
 from comparisons.mitsuba.plugins.exact_coordinates import Round, of_cone, of_quadric
@@ -29,7 +30,6 @@ from comparisons.mitsuba.translate.shapes.surfaces import (
     heights_over_uv,
     region,
 )
-from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray
 from reference_rt.shapes import Cone, Cylinder, Quadric, Torus
 
@@ -124,7 +124,7 @@ BOTTOM, TOP = 3, 6
 
 @translate_shape.register
 def _(shape: Cylinder, site: Site) -> list[Plugin]:
-    m = shape.map_in(site.place)
+    m = affine.map_in(shape, site.place)
     r, height = shape.radius, shape.z_max - shape.z_min
     unit = _followed(m, np.array([r, r, height]), shape.z_min)
     least = np.linalg.svd(m[:, :2], compute_uv=False)[-1] * r
@@ -147,14 +147,12 @@ def _(shape: Cylinder, site: Site) -> list[Plugin]:
     return found
 
 
-def _followed(m: transform.Affine, scale: FloatArray, z: float) -> transform.Affine:
+def _followed(m: affine.Affine, scale: FloatArray, z: float) -> affine.Affine:
     """The map that scales, moves along z, then applies m."""
-    return transform.compose(transform.scale(tuple(scale)), transform.translate((0.0, 0.0, z)), m)
+    return affine.compose(np.column_stack([np.diag(scale), (0.0, 0.0, z)]), m)
 
 
-def _disk(
-    m: transform.Affine, radius: float, z: float, face: int, reach: float, site: Site
-) -> Plugin:
+def _disk(m: affine.Affine, radius: float, z: float, face: int, reach: float, site: Site) -> Plugin:
     """A cap across the axis; its uv are x and y over a square of half side `reach`."""
     if site.textured:
         return _disk_of_triangles(m, radius, z, face, reach, site)
@@ -175,7 +173,7 @@ def _disk(
 
 
 def _disk_of_triangles(
-    m: transform.Affine, radius: float, z: float, face: int, reach: float, site: Site
+    m: affine.Affine, radius: float, z: float, face: int, reach: float, site: Site
 ) -> Plugin:
     """The same with our uv, which Mitsuba's disk has not."""
     flat = disk_soup(z, radius, face, reach)
@@ -196,7 +194,7 @@ def _(shape: Cone, site: Site) -> list[Plugin]:
     of = of_cone(bottom, (top - bottom) / height, 0.0, height)
     found = [stand_in(shape, [patch], surface, None, site, of)]
     if shape.capped:
-        m, reach = shape.map_in(site.place), max(bottom, top)
+        m, reach = affine.map_in(shape, site.place), max(bottom, top)
         found.append(_disk(m, bottom, 0.0, BOTTOM, reach, site))
         if top > 0.0:
             found.append(_disk(m, top, height, TOP, reach, site))
@@ -254,7 +252,7 @@ def _(shape: Quadric, site: Site) -> list[Plugin]:
             site.shared[key] = cap_faces(surface.value, box)
         soup, faces = site.shared[key]
         if len(faces) > 0:
-            m = shape.map_in(site.place)
+            m = affine.map_in(shape, site.place)
             mirrored = bool(np.linalg.det(m[:, :3]) < 0.0)
             plugin = placed(soup, key, m, mirrored, with_mesh_light(site))
             plugin = plugin._replace(suffix="_caps", faces=faces, uv=same_uv, faceted=True)

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from comparisons.geometry.affine import Affine, is_similarity
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.hits import Plugin, ShapeGroup
 from comparisons.mitsuba.translate.textures import UntranslatableError
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.transform import Affine, is_similarity
 from reference_rt.shapes.shape import TabulationContext
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from comparisons.geometry import affine
 from comparisons.geometry.frame import round32
 from comparisons.geometry.sizes import heights_of
 from comparisons.mitsuba.hits import Plugin, StandIn
@@ -21,7 +22,6 @@ from comparisons.mitsuba.translate.shapes.meshes import (
 from comparisons.mitsuba.translate.shapes.site import Site, with_mesh_light
 from comparisons.mitsuba.translate.shapes.surfaces import Box, Implicit, Patch, meshed
 from comparisons.mitsuba.translate.textures import UntranslatableError
-from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray
 from reference_rt.shapes.shape import Shape
 
@@ -38,12 +38,12 @@ WEIGHTS /= WEIGHTS.sum(axis=1, keepdims=True)
 sides."""
 
 
-def measured_error(soup: Soup, surface: Implicit, m: transform.Affine) -> tuple[float, float]:
+def measured_error(soup: Soup, surface: Implicit, m: affine.Affine) -> tuple[float, float]:
     """The largest distance and the largest angle, in radians, between a mesh and its surface.
 
     The distance is f over its gradient in the scene, exact but for terms of second order.
     """
-    inverse = transform.invert(m)[:, :3]
+    inverse = affine.invert(m)[:, :3]
     faces = soup.faces[:: max(1, len(soup.faces) // MEASURED)]
     assert soup.normals is not None
     corners, normals = soup.positions[faces], soup.normals[faces]
@@ -98,7 +98,7 @@ any direction on a mesh."""
 
 
 def measured_twist(
-    soup: Soup, of: Coordinates, surface: Implicit, m: transform.Affine, exact: bool
+    soup: Soup, of: Coordinates, surface: Implicit, m: affine.Affine, exact: bool
 ) -> float:
     """The angle in the scene, in radians, between the derivatives of the position by u of mesh and
     surface.
@@ -111,16 +111,16 @@ def measured_twist(
     """
     assert soup.uvs is not None
     assert soup.normals is not None
-    linear, inverse = m[:, :3], transform.invert(m)
+    linear, inverse = m[:, :3], affine.invert(m)
     faces = soup.faces[:: max(1, len(soup.faces) // MEASURED)]
     uv = round32(soup.uvs)[faces]
-    mapped = round32(transform.apply_points(m, soup.positions))[faces]
+    mapped = round32(affine.apply_points(m, soup.positions))[faces]
     a, b = mapped[:, 1] - mapped[:, 0], mapped[:, 2] - mapped[:, 0]
     (du1, dv1), (du2, dv2) = (uv[:, k].T - uv[:, 0].T for k in (1, 2))
     of_triangle = (dv2[:, None] * a - dv1[:, None] * b) * np.sign(du1 * dv2 - dv1 * du2)[:, None]
     angles = []
     for weights in INNER if exact else WEIGHTS:
-        q = transform.apply_points(inverse, weights @ mapped)
+        q = affine.apply_points(inverse, weights @ mapped)
         gradient = surface.gradient(q)
         steepness = np.sum(gradient * gradient, axis=1)
         step = np.divide(
@@ -139,13 +139,13 @@ def measured_twist(
     return float(angle[order][np.searchsorted(area, RARE * area[-1])])
 
 
-def aspects(soup: Soup, m: transform.Affine) -> FloatArray:
+def aspects(soup: Soup, m: affine.Affine) -> FloatArray:
     """(faces,): the longest side of each triangle, mapped by m, over its height on it.
 
     Float32's error of the barycentric coordinates moves a point along the surface by its common
     error times this: by hundreds of times on the long triangles of a cylinder.
     """
-    corners = transform.apply_points(m, soup.positions)[soup.faces]
+    corners = affine.apply_points(m, soup.positions)[soup.faces]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     heights = heights_of(corners)
     return np.asarray(np.divide(longest, heights, out=np.zeros_like(heights), where=heights > 0.0))
@@ -181,7 +181,7 @@ def stand_in(
     """The mesh that stands in for a shape, and its error in the scene; patches, surface, box and
     `of` are in the shape's own coordinates.  with_uv: adds texture coordinates, where there is a
     texture."""
-    own = transform.affine(shape.transform)
+    own = affine.of_steps(shape.transform)
     most = 2.0 * sum(patch.cells[0] * patch.cells[1] for patch in patches) * _fineness.get() ** 2
     exact = _has_exact_coordinates(site, most)
     fineness = _fineness.get()
@@ -206,7 +206,7 @@ def stand_in(
         if key not in site.shared:
             site.shared[key] = measured_slip(soup, patches[0], box)
         found = found._replace(slip=site.shared[key], shift=0.0 if exact else site.shared[key])
-    m = transform.compose(own, site.place.outer)
+    m = affine.compose(own, site.place.outer)
     if site.oriented and soup.uvs is not None:
         twist = measured_twist(soup, of, surface, m, exact)
         if not exact and (_is_bumped(site.parts) or twist > MOST_TWIST):
@@ -248,14 +248,14 @@ def _has_exact_coordinates(site: Site, triangles: float) -> bool:
     return few or "emitter" in site.parts
 
 
-def _with_coordinates(bsdf: dict[str, Any], of: Coordinates, m: transform.Affine) -> dict[str, Any]:
+def _with_coordinates(bsdf: dict[str, Any], of: Coordinates, m: affine.Affine) -> dict[str, Any]:
     """A BSDF inside the plugin `comparisons.mitsuba.plugins.exact_coordinates`, on a surface under
     the map m."""
     linear, inverse = m[:, :3], np.linalg.inv(m[:, :3])
     found = {"type": "exact_coordinates", "nested": bsdf, **of.numbers()}
     for letter, matrix in (("m", linear), ("i", inverse)):
         found |= {f"{letter}_{j}{k}": float(matrix[j, k]) for j in range(3) for k in range(3)}
-    place = transform.apply_points(m, np.array([of.origin]))[0]
+    place = affine.apply_points(m, np.array([of.origin]))[0]
     return {**found, **{f"o_{k}": float(place[k]) for k in range(3)}}
 
 

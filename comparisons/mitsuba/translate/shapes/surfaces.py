@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from comparisons.geometry import affine
 from comparisons.geometry.sizes import heights_of
 from comparisons.mitsuba.translate.shapes.meshes import Soup
-from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IntArray
 
 # ---- triangles clipped along the zeros of a function ---------------------------------------------
@@ -191,7 +191,7 @@ def cap_faces(value: Form, box: Box) -> tuple[Soup, IntArray]:
     return soup, np.concatenate(numbers)
 
 
-def heights_over_uv(soup: Soup, m: transform.Affine) -> FloatArray:
+def heights_over_uv(soup: Soup, m: affine.Affine) -> FloatArray:
     """(faces,): the smallest height of each triangle, mapped by m, over its longest side in uv.
 
     Float32 moves a hit by e across the triangle, and so its barycentrics by e over the height:
@@ -200,7 +200,7 @@ def heights_over_uv(soup: Soup, m: transform.Affine) -> FloatArray:
     assert soup.uvs is not None
     uv = soup.uvs[soup.faces]
     sides = np.linalg.norm(uv - np.roll(uv, 1, axis=1), axis=2).max(axis=1)
-    heights = heights_of(transform.apply_points(m, soup.positions)[soup.faces])
+    heights = heights_of(affine.apply_points(m, soup.positions)[soup.faces])
     return np.asarray(np.divide(heights, sides, out=np.zeros_like(heights), where=sides > 0.0))
 
 

@@ -1,0 +1,304 @@
+"""Meshes and images by other readers than ours: Mitsuba's own loaders, and trimesh.
+
+The rung `files` holds our tables against them, and the counterpart is made from them: a mesh that
+we read 5 % too large is then too large in one renderer only.
+"""
+
+import functools
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from comparisons.mitsuba.backend import mitsuba
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.image_files import open_image
+from reference_rt.shapes import Mesh, Triangle
+
+ROUNDING = 2.0**-22
+"""Of the largest number: a few roundings to float32, in which Mitsuba holds numbers."""
+
+SLIVERS = 2.0**-12
+"""Of made normals: plain sums lose half of their digits where triangles have hardly any width."""
+
+
+# ---- meshes --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Corners:
+    """A mesh before its transform, by corners: points (n, 3, 3), and of these, or None, unit
+    normals (n, 3, 3), uv (n, 3, 2) and colours (n, 3, 3).
+
+    source: who says so;  silent: names of what it says nothing of;  made: whether the normals are
+    made, of those of the triangles around.
+    """
+
+    points: FloatArray
+    normals: FloatArray | None = None
+    uv: FloatArray | None = None
+    colours: FloatArray | None = None
+    source: str = "the description"
+    silent: tuple[str, ...] = ()
+    made: bool = False
+
+
+def by_us(shape: Mesh | Triangle, folder: Path) -> Corners:
+    """A mesh as our readers read it."""
+    if isinstance(shape, Triangle):
+        return Corners(np.array([[shape.v0, shape.v1, shape.v2]]))
+    data = shape.data(folder)
+    arrays = (data.vertices, data.normals, data.uv, data.colours)
+    return Corners(*(None if a is None else a[data.faces] for a in arrays))  # type: ignore[arg-type]
+
+
+def by_second(shape: Mesh | Triangle, folder: Path) -> Corners | None:
+    """A mesh as its description and a second reader say, in our order if it has as many triangles.
+    None where no second reader takes the file, or float32 does not hold it."""
+    if isinstance(shape, Triangle):
+        return by_us(shape, folder)
+    if shape.file is None:
+        faces = np.asarray(shape.faces)
+        arrays = (shape.vertices, shape.normals, shape.uv, shape.colours)
+        found = Corners(*(None if a is None else np.asarray(a)[faces] for a in arrays))  # type: ignore[arg-type]
+        if found.normals is not None:
+            found = replace(found, normals=_unit(found.normals))
+    else:
+        path = folder / shape.file
+        known = None if shape.data(folder).doubtful else _read(path, path.stat().st_mtime_ns)
+        if known is None:
+            return None
+        found = _in_order(known, by_us(shape, folder))
+    if shape.face_normals:
+        found = replace(found, normals=None, silent=tuple({*found.silent} - {"normals"}))
+    elif shape.smooth and found.normals is None:
+        known_uv = by_us(shape, folder).uv if "uv" in found.silent else found.uv
+        normals = _smoothed(replace(found, uv=known_uv))
+        found = replace(found, normals=normals, made=True)
+    return found
+
+
+def described(shape: Mesh | Triangle, folder: Path) -> Corners:
+    """A mesh for the counterpart: by the second reader.  Ours is taken for what that one does not
+    say, and where it is the same in float32, for the digits which that lacks."""
+    ours, theirs = by_us(shape, folder), by_second(shape, folder)
+    if isinstance(shape, Mesh) and shape.face_normals:
+        ours = replace(ours, normals=None)
+    elif isinstance(shape, Mesh) and shape.smooth and ours.normals is None:
+        ours = replace(ours, normals=_smoothed(ours))
+    if theirs is None:
+        return ours
+    if len(theirs.points) != len(ours.points):
+        return theirs
+    found: dict[str, Any] = {
+        name: getattr(ours, name)
+        if name in theirs.silent
+        else _refined(getattr(theirs, name), getattr(ours, name))
+        for name in ("points", "normals", "uv", "colours")
+    }
+    return replace(theirs, **found)
+
+
+def _refined(theirs: FloatArray | None, ours: FloatArray | None) -> FloatArray | None:
+    if theirs is None or ours is None:
+        return theirs
+    same = np.abs(theirs - ours) <= ROUNDING * np.abs(theirs).max(initial=0.0)
+    return np.where(same, ours, theirs)
+
+
+def _unit(v: FloatArray) -> FloatArray:
+    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
+
+
+def _smoothed(mesh: Corners) -> FloatArray:
+    """Normals of vertices: the mean of the triangles around, weighted by angle, where points and uv
+    are equal (Thürmer and Wüthrich 1998, "Computing vertex normals from polygonal facets")."""
+    n = len(mesh.points)
+    key = mesh.points if mesh.uv is None else np.concatenate([mesh.points, mesh.uv], axis=2)
+    _, vertex = np.unique(key.reshape(3 * n, -1) + 0.0, axis=0, return_inverse=True)
+    after = _direction(np.roll(mesh.points, -1, axis=1) - mesh.points)
+    before = -np.roll(after, 1, axis=1)
+    normal = _direction(np.cross(after[:, 0], after[:, 1]))
+    angle = np.arccos(np.clip((after * before).sum(axis=2), -1.0, 1.0))
+    total = np.zeros((vertex.max() + 1, 3))
+    np.add.at(total, vertex.ravel(), (angle[:, :, None] * normal[:, None]).reshape(-1, 3))
+    found = _direction(total)[vertex].reshape(n, 3, 3)
+    return np.asarray(np.where((found == 0.0).all(axis=2, keepdims=True), normal[:, None], found))
+
+
+def _direction(v: FloatArray) -> FloatArray:
+    """Vectors of any length but 0, made unit; 0 stays 0."""
+    most = np.abs(v).max(axis=-1, keepdims=True)
+    v = np.divide(v, most, out=np.zeros_like(v), where=most > 0.0)
+    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    return np.asarray(np.divide(v, length, out=v, where=length > 0.0))
+
+
+@functools.lru_cache(maxsize=4)
+def _read(path: Path, modified: int) -> Corners | None:
+    """A file's mesh by the first second reader that takes it; None where none does, or where
+    float32 does not hold its numbers."""
+    for reader in READERS.get(path.suffix.lower(), ()):
+        with suppress(Exception):  # of a library: it may refuse what ours has read
+            found = reader(path)
+            if np.isfinite(found.points).all():
+                return found
+    return None
+
+
+def _by_mitsuba(path: Path) -> Corners:
+    mi, kind = mitsuba(), path.suffix[1:].lower()
+    own = {"flip_tex_coords": False} if kind == "obj" else {}
+    mesh = mi.load_dict({"type": kind, "filename": str(path), **own})
+    values = mi.traverse(mesh)
+    faces = np.array(values["faces"], np.int64).reshape(-1, 3)
+
+    def column(name: str, width: int) -> FloatArray:
+        return np.array(values[f"vertex_{name}"], np.float64).reshape(-1, width)[faces]
+
+    return Corners(
+        column("positions", 3),
+        column("normals", 3) if _has_normals(path) else None,
+        column("texcoords", 2) if mesh.has_vertex_texcoords() else None,
+        _colours(path, len(values["vertex_positions"]) // 3, faces) if kind == "ply" else None,
+        source="Mitsuba's loader",
+        silent=() if kind == "ply" else ("colours",),
+    )
+
+
+def _colours(path: Path, vertices: int, faces: IntArray) -> FloatArray | None:
+    """Colours of a .ply file's vertices, of 8 bits, by trimesh; decoded as IEC 61966-2-1 says."""
+    import trimesh
+
+    mesh: Any = trimesh.load(path, process=False)
+    if mesh.visual.kind != "vertex":
+        return None
+    if len(mesh.vertices) != vertices:
+        raise ValueError("trimesh finds another number of vertices")
+    encoded = mesh.visual.vertex_colors[faces, :3] / 255.0
+    linear = np.where(encoded > 0.04045, ((encoded + 0.055) / 1.055) ** 2.4, encoded / 12.92)
+    return np.asarray(linear)
+
+
+def _has_normals(path: Path) -> bool:
+    """Whether a file has vertex normals: where it has none Mitsuba makes its own."""
+    content = path.read_bytes()
+    if path.suffix.lower() == ".obj":
+        return b"\nvn " in content or content.startswith(b"vn ")
+    return b" nx\n" in content[: content.find(b"end_header")].replace(b"\r", b"\n")
+
+
+TRIMESH = "trimesh"
+
+
+def _by_trimesh(path: Path) -> Corners:
+    import trimesh
+
+    content, is_gltf = path.read_bytes(), path.suffix.lower() in (".gltf", ".glb")
+    if is_gltf and b'"sparse"' in content:
+        raise ValueError("trimesh ignores sparse accessors")
+    scene = trimesh.load(path, process=False, force="scene")
+    columns: dict[str, list[Any]] = {"points": [], "normals": [], "uv": []}
+    for node in scene.graph.nodes_geometry:
+        matrix, name = scene.graph[node]
+        mesh = scene.geometry[name]
+        if hasattr(mesh, "faces"):
+            columns["points"].append(trimesh.transform_points(mesh.vertices, matrix)[mesh.faces])
+            normals = mesh.vertex_normals[mesh.faces] @ np.linalg.inv(matrix[:3, :3])
+            columns["normals"].append(_direction(normals))
+            columns["uv"].append(getattr(mesh.visual, "uv", None))
+            if columns["uv"][-1] is not None:
+                columns["uv"][-1] = columns["uv"][-1][mesh.faces]
+    found: dict[str, Any] = {}
+    silent = ["colours"]
+    for name, key in (("points", b"POSITION"), ("normals", b"NORMAL"), ("uv", b"TEXCOORD_0")):
+        said = content.count(b'"%s"' % key)
+        if name == "points" or (is_gltf and said == content.count(b'"POSITION"')):
+            found[name] = np.concatenate(columns[name])
+        elif said or not is_gltf:
+            silent.append(name)  # trimesh makes normals where a file has none
+    return Corners(**found, source=TRIMESH, silent=tuple(silent))
+
+
+READERS: dict[str, tuple[Callable[[Path], Corners], ...]] = {
+    ".obj": (_by_mitsuba, _by_trimesh),
+    ".ply": (_by_mitsuba, _by_trimesh),  # Mitsuba refuses polygons
+    **dict.fromkeys((".stl", ".off", ".gltf", ".glb"), (_by_trimesh,)),
+}
+"""The second readers of each format: never the library that ours reads it with."""
+
+
+def _in_order(theirs: Corners, ours: Corners) -> Corners:
+    """trimesh's triangles may have another order, and begin at another corner: the nearest one of
+    theirs for each of ours."""
+    if theirs.source != TRIMESH or len(theirs.points) != len(ours.points):
+        return theirs
+    if np.abs(theirs.points - ours.points).max() <= ROUNDING * np.abs(ours.points).max():
+        return theirs
+    near = (
+        cKDTree(theirs.points.mean(axis=1))
+        .query(ours.points.mean(axis=1), k=min(4, len(theirs.points)))[1]
+        .reshape(len(ours.points), -1)
+    )
+    turned = (np.arange(3) + np.arange(3)[:, None]) % 3  # by one, two, no corners
+    candidates = theirs.points[near][:, :, turned]
+    error = np.abs(candidates - ours.points[:, None, None]).max(axis=(3, 4))
+    best = error.reshape(len(near), -1).argmin(axis=1)
+    rows = near[np.arange(len(near)), best // 3][:, None]
+    columns: dict[str, Any] = {
+        name: None if (c := getattr(theirs, name)) is None else c[rows, turned[best % 3]]
+        for name in ("points", "normals", "uv")
+    }
+    return replace(theirs, **columns)
+
+
+# ---- images --------------------------------------------------------------------------------------
+
+
+def image(path: Path, encoding: str, layer: str) -> FloatArray | None:
+    """An image (h, w, 3) as Mitsuba reads it, in linear values, `encoding` and `layer` as of
+    `Bitmap`; None where it does not, or reads something else."""
+    if layer or encoding == "radiance" or getattr(open_image(path), "gamma", None) is not None:
+        return None
+    mi = mitsuba()
+    try:
+        bitmap = mi.Bitmap(str(path))
+    except RuntimeError:
+        return None
+    if encoding in ("raw", "srgb"):
+        bitmap.set_srgb_gamma(encoding == "srgb")
+    formats = mi.Bitmap.PixelFormat
+    if bitmap.pixel_format() not in (formats.Y, formats.YA, formats.RGB, formats.RGBA):
+        return None
+    return np.array(bitmap.convert(formats.RGB, mi.Struct.Type.Float64, False), np.float64)
+
+
+INEXACT = (".jpg", ".jpeg")
+"""Formats whose decoders may differ by a few codes."""
+
+
+def rounding_of(path: Path, theirs: FloatArray, scale: float) -> FloatArray:
+    """By how much an image, times `scale`, may differ between readers.  Mitsuba decodes sRGB in
+    float32: a power, and a few operations; floats are the same."""
+    if path.suffix.lower() in INEXACT:
+        return 0.02 * scale + 0.05 * np.abs(theirs)
+    is_decoded = path.suffix.lower() not in (".exr", ".hdr", ".pfm")
+    return 2.0**-19 * np.abs(theirs) + (2.0**-24 * scale if is_decoded else 0.0)
+
+
+def described_image(
+    path: Path, encoding: str, scale: float, layer: str, ours: FloatArray
+) -> FloatArray:
+    """An image for the counterpart, times `scale`: as Mitsuba reads it.  Ours (h, w, 3) is taken
+    where Mitsuba does not read it, and where it is the same but for rounding."""
+    theirs = image(path, encoding, layer)
+    if theirs is None:
+        return ours
+    theirs = theirs * scale
+    if theirs.shape != ours.shape:
+        return theirs
+    return np.where(np.abs(ours - theirs) <= rounding_of(path, theirs, scale), ours, theirs)
