@@ -36,8 +36,8 @@ def fuzz(
         str | None,
         typer.Option(
             metavar="NAMES",
-            help="Only these, comma-separated: render, identities, film, geometry, direct, "
-            "whitted, layers, statistics.",
+            help="Only these, comma-separated: render, identities, files, film, geometry, direct, "
+            "whitted, layers, statistics.  `files` alone: random files of every format.",
         ),
     ] = None,
     features: Annotated[

@@ -76,9 +76,12 @@ def by_second(shape: Mesh | Triangle, folder: Path) -> Corners | None:
     if shape.face_normals:
         found = replace(found, normals=None, silent=tuple({*found.silent} - {"normals"}))
     elif shape.smooth and found.normals is None:
-        known_uv = by_us(shape, folder).uv if "uv" in found.silent else found.uv
-        normals = _smoothed(replace(found, uv=known_uv))
-        found = replace(found, normals=normals, made=True)
+        ours = by_us(shape, folder)
+        if "normals" not in found.silent or ours.normals is None:
+            known_uv = ours.uv if "uv" in found.silent else found.uv
+            normals = _smoothed(replace(found, uv=known_uv))
+            silent = tuple({*found.silent} - {"normals"})
+            found = replace(found, normals=normals, made=True, silent=silent)
     return found
 
 
@@ -179,9 +182,7 @@ def _colours(path: Path, vertices: int, faces: IntArray) -> FloatArray | None:
         return None
     if len(mesh.vertices) != vertices:
         raise ValueError("trimesh finds another number of vertices")
-    encoded = mesh.visual.vertex_colors[faces, :3] / 255.0
-    linear = np.where(encoded > 0.04045, ((encoded + 0.055) / 1.055) ** 2.4, encoded / 12.92)
-    return np.asarray(linear)
+    return _decoded(mesh.visual.vertex_colors[faces, :3] / 255.0)
 
 
 def _has_normals(path: Path) -> bool:
@@ -217,10 +218,12 @@ def _by_trimesh(path: Path) -> Corners:
     silent = ["colours"]
     for name, key in (("points", b"POSITION"), ("normals", b"NORMAL"), ("uv", b"TEXCOORD_0")):
         said = content.count(b'"%s"' % key)
-        if name == "points" or (is_gltf and said == content.count(b'"POSITION"')):
+        whole = is_gltf and said == content.count(b'"POSITION"')
+        if name == "points" or (whole and not any(c is None for c in columns[name])):
             found[name] = np.concatenate(columns[name])
         elif said or not is_gltf:
-            silent.append(name)  # trimesh makes normals where a file has none
+            # trimesh makes normals where a file has none, and drops uv without a material.
+            silent.append(name)
     return Corners(**found, source=TRIMESH, silent=tuple(silent))
 
 
@@ -274,7 +277,17 @@ def image(path: Path, encoding: str, layer: str) -> FloatArray | None:
     formats = mi.Bitmap.PixelFormat
     if bitmap.pixel_format() not in (formats.Y, formats.YA, formats.RGB, formats.RGBA):
         return None
-    return np.array(bitmap.convert(formats.RGB, mi.Struct.Type.Float64, False), np.float64)
+    # Mitsuba's own decoding approximates the curve, and beyond 1 it is another one.
+    is_srgb = bitmap.srgb_gamma()
+    bitmap.set_srgb_gamma(False)
+    values = np.array(bitmap.convert(formats.RGB, mi.Struct.Type.Float64, False), np.float64)
+    return _decoded(values) if is_srgb else values
+
+
+def _decoded(encoded: FloatArray) -> FloatArray:
+    """Linear values of sRGB, by IEC 61966-2-1."""
+    high = ((np.maximum(encoded, 0.0) + 0.055) / 1.055) ** 2.4
+    return np.asarray(np.where(encoded > 0.04045, high, encoded / 12.92))
 
 
 INEXACT = (".jpg", ".jpeg")
@@ -282,12 +295,11 @@ INEXACT = (".jpg", ".jpeg")
 
 
 def rounding_of(path: Path, theirs: FloatArray, scale: float) -> FloatArray:
-    """By how much an image, times `scale`, may differ between readers.  Mitsuba decodes sRGB in
-    float32: a power, and a few operations; floats are the same."""
+    """By how much an image, times `scale`, may differ between readers: Mitsuba divides codes by 255
+    in float32, which the curve's power makes 2.4 times as inexact."""
     if path.suffix.lower() in INEXACT:
         return 0.02 * scale + 0.05 * np.abs(theirs)
-    is_decoded = path.suffix.lower() not in (".exr", ".hdr", ".pfm")
-    return 2.0**-19 * np.abs(theirs) + (2.0**-24 * scale if is_decoded else 0.0)
+    return 2.0**-21 * np.abs(theirs)
 
 
 def described_image(

@@ -229,20 +229,21 @@ def write(folder: Path) -> Path:
 def bring(scene: Data, folder: Path, to: Path) -> None:
     """Copy the files that a scene names from its own folder to another one."""
     to.mkdir(parents=True, exist_ok=True)
-    for name in _named(scene):
+    for name in named(scene):
         source, target = folder / name, to / name
         if source.exists() and source.resolve() != target.resolve():
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, target)
 
 
-def _named(part: Any) -> Iterator[str]:
+def named(part: Any) -> Iterator[str]:
+    """The files that a scene names."""
     if isinstance(part, dict):
         for key, value in part.items():
             if key == "file" and isinstance(value, str):
                 yield value
             else:
-                yield from _named(value)
+                yield from named(value)
     elif isinstance(part, list):
         for value in part:
-            yield from _named(value)
+            yield from named(value)

@@ -94,7 +94,7 @@ def copy_of(data: Any) -> Any:
 # ---- effort -------------------------------------------------------------------------------------
 
 
-DETERMINISTIC = ("film", "geometry", "direct", "whitted", "layers")
+DETERMINISTIC = ("files", "film", "geometry", "direct", "whitted", "layers")
 """Rungs without noise."""
 
 RUNGS = ("render", "identities", *DETERMINISTIC, "statistics")

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from comparisons.compare.pictures import mitsuba_cast
-from comparisons.experiments.fuzz import assets
+from comparisons.experiments.fuzz import assets, random_files
 from comparisons.experiments.fuzz import finding as stored
 from comparisons.experiments.fuzz.check import FAILED, check, of_rung
 from comparisons.experiments.fuzz.fields import types_in
@@ -197,13 +197,21 @@ def scene_of(request: Request) -> Data:
     """The scene of a request."""
     if request.scene is not None:
         return request.scene
+    if request.effort.rungs == random_files.ALONE:
+        return random_files.scene(request.seed, request.number, request.files)
     return generate(request.seed, request.number, request.grammar, request.files)
 
 
 def do_scene(request: Request) -> None:
     """Check a scene and store what is found."""
     assets.write(request.files)
-    stored.add(request.out, checked(request, scene_of(request), request.effort))
+    scene = scene_of(request)
+    found = checked(request, scene, request.effort)
+    stored.add(request.out, found)
+    is_ours = request.scene is None and request.effort.rungs == random_files.ALONE
+    if is_ours and not found.findings:
+        for name in assets.named(scene):
+            (request.files / name).unlink()
 
 
 def do_reduce(request: Request) -> None:

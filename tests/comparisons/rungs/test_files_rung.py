@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 from builders import SCENES
-from mesh_writers import FACES, SQUARE, TRIANGLES, XYZ, Gltf, binary_stl, ply
+from mesh_writers import FACES, POINTS, SQUARE, TRIANGLES, XYZ, Gltf, binary_stl, ply
 
+from comparisons.experiments.fuzz import random_files
 from comparisons.rungs import files
 from reference_rt.core import transform
 from reference_rt.core.image_files import hdr
 from reference_rt.lights.emitters import environment_map
 from reference_rt.rendering.scene import Scene
-from reference_rt.shapes import Cylinder, Sphere, Torus, shape
+from reference_rt.shapes import Cylinder, Sphere, Torus, instances, shape
 from reference_rt.shapes.meshes import mesh as meshes
 from reference_rt.textures import image_file
 
@@ -201,3 +202,47 @@ def test_what_nobody_else_reads_is_named(tmp_path: Path) -> None:
 def test_many_shapes_take_as_long_as_some(tmp_path: Path) -> None:
     balls = [{"type": "sphere", "center": [k, 0, 0]} for k in range(1001)]
     assert files(parsed(tmp_path, shapes=balls)).numbers["checked"] == {"spheres": 167}
+
+
+@pytest.mark.parametrize("number", range(5))
+def test_random_files(number: int, tmp_path: Path, monkeypatch: Patch) -> None:
+    """`fuzz --rungs files`: no reader of ours differs, and one that is wrong does."""
+    scene = Scene.parse(json.dumps(random_files.scene(38, number, tmp_path)), folder=tmp_path)
+    right = files(scene)
+    assert right.status == "agree", right.reason
+    assert right.numbers["checked"]["images"] == len(random_files.IMAGES)
+    assert right.numbers["checked"]["meshes"] >= len(random_files.MESHES) - 1  # some .ply
+    plant = ("meshes too large", "faces wound in reverse", "sRGB decoded twice")[number % 3]
+    PLANTED[plant][1](monkeypatch)
+    assert files(scene).status == "differ"
+
+
+@pytest.mark.parametrize("what", ["normals", "uv"])
+def test_normals_and_uv_of_gltf(what: str, tmp_path: Path, monkeypatch: Patch) -> None:
+    file, rng = Gltf(), np.random.default_rng(3)
+    normals = rng.normal(size=POINTS.shape)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    file.primitive["material"] = 0
+    file.root["materials"] = [{}]
+    file.primitive["attributes"] |= {
+        "NORMAL": file.add(normals.astype("<f4")),
+        "TEXCOORD_0": file.add(rng.uniform(size=(len(POINTS), 2)).astype("<f4")),
+    }
+    file.root["nodes"][0]["scale"] = [1, 2, 3]
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    scene = parsed(tmp_path, shapes=[{"type": "mesh", "file": "a.glb"}])
+    right = files(scene)
+    assert right.status == "agree", right.reason
+    _data(lambda d: {what: getattr(d, what)[::-1]})(monkeypatch)
+    assert f"has the {what.removesuffix('s')}" in files(scene).reason
+
+
+def test_maps_of_instances(tmp_path: Path, monkeypatch: Patch) -> None:
+    np.save(tmp_path / "maps.npy", np.random.default_rng(2).normal(size=(3, 3, 4)))
+    copies = {"type": "instance", "group": "g", "file": "maps.npy"}
+    turn = [{"rotate": {"axis": [1, 2, 3], "degrees": 40}}]
+    ball = {"g": [{"type": "sphere"}]}
+    scene = parsed(tmp_path, groups=ball, shapes=[{**copies, "transform": turn}])
+    assert files(scene).status == "agree"
+    _result(instances, "composed", lambda maps: maps[::-1])(monkeypatch)
+    assert "has the map" in files(scene).reason
