@@ -174,15 +174,18 @@ def _by_mitsuba(path: Path) -> Corners:
 
 
 def _colours(path: Path, vertices: int, faces: IntArray) -> FloatArray | None:
-    """Colours of a .ply file's vertices, of 8 bits, by trimesh; decoded as IEC 61966-2-1 says."""
+    """Colours of a .ply file's vertices, by trimesh; decoded as IEC 61966-2-1 says."""
     import trimesh
 
-    mesh: Any = trimesh.load(path, process=False)
-    if mesh.visual.kind != "vertex":
-        return None
-    if len(mesh.vertices) != vertices:
+    element = trimesh.load(path, process=False).metadata["_ply_raw"]["vertex"]
+    if element["length"] != vertices:
         raise ValueError("trimesh finds another number of vertices")
-    return _decoded(mesh.visual.vertex_colors[faces, :3] / 255.0)
+    names = ("red", "green", "blue")
+    if not {*names} <= {*element["properties"]}:
+        return None
+    encoded = np.stack([np.ravel(element["data"][name]) for name in names], axis=1)
+    kind = np.dtype(element["properties"]["red"])
+    return _decoded(encoded[faces] / (np.iinfo(kind).max if kind.kind == "u" else 1.0))
 
 
 def _has_normals(path: Path) -> bool:

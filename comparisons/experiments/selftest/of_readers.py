@@ -53,8 +53,8 @@ OF_MESHES = (
         "return self.smooth and data.normals is None", "return False",
     ),
     SourceFault(
-        "smooth normals not weighted", "layers", "shapes/meshes/vertex_normals.py",
-        "terms = weights[:, :, None] * n", "terms = np.ones_like(weights)[:, :, None] * n",
+        "smooth normals not smooth", "layers", "shapes/meshes/vertex_normals.py",
+        "np.linalg.norm(sums, axis=1) > error", "np.linalg.norm(sums, axis=1) < error",
     ),
     SourceFault(
         "mirrored meshes turned inside out", PETAL, "shapes/meshes/triangle_table.py",
@@ -91,7 +91,7 @@ OF_TRANSFORMS = (
         "np.diag(factors)", "np.diag([factors[0]] * 3)",
     ),
     SourceFault(
-        "row for column", MOVED, MAPS,
+        "row for column", PETAL, MAPS,
         "x * m[:, 0] + y * m[:, 1] + z * m[:, 2]", "x * m[0, :3] + y * m[1, :3] + z * m[2, :3]",
     ),
     SourceFault(
@@ -103,7 +103,7 @@ OF_TRANSFORMS = (
         "(r, r, self.z_max)", "(r, r, 1.05 * self.z_max)",
     ),
     SourceFault(
-        "tori too thick", "mesh_knot", "shapes/curved/torus.py",
+        "tori too thick", MOVED, "shapes/curved/torus.py",
         "minor=np.array([self.minor_radius])", "minor=np.array([1.05 * self.minor_radius])",
     ),
     SourceFault(

@@ -20,6 +20,7 @@ from reference_rt.lights.emitters import environment_map
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Cylinder, Sphere, Torus, instances, shape
 from reference_rt.shapes.meshes import mesh as meshes
+from reference_rt.shapes.meshes import vertex_normals
 from reference_rt.textures import image_file
 
 Patch = pytest.MonkeyPatch
@@ -235,6 +236,30 @@ def test_normals_and_uv_of_gltf(what: str, tmp_path: Path, monkeypatch: Patch) -
     assert right.status == "agree", right.reason
     _data(lambda d: {what: getattr(d, what)[::-1]})(monkeypatch)
     assert f"has the {what.removesuffix('s')}" in files(scene).reason
+
+
+def test_smooth_normals(tmp_path: Path, monkeypatch: Patch) -> None:
+    corners = np.random.default_rng(4).normal(size=(7, 3)).tolist()
+    faces = [[0, k, k + 1] for k in range(1, 6)]
+    mesh = {"type": "mesh", "vertices": corners, "faces": faces, "smooth": True}
+    scene = parsed(tmp_path, shapes=[{**mesh, "transform": [{"scale": [1, -2, 0.5]}]}])
+    right = files(scene)
+    assert right.status == "agree", right.reason
+    by_angle = vertex_normals._normals_and_angles
+
+    def equally(corners: Any) -> Any:
+        normals, angles = by_angle(corners)
+        return normals, np.ones_like(angles)
+
+    monkeypatch.setattr(vertex_normals, "_normals_and_angles", equally)
+    assert "has the normal" in files(scene).reason
+
+
+def test_colours_of_vertices(monkeypatch: Patch) -> None:
+    scene = Scene.load(SCENES / "mesh_colours.yaml")
+    assert files(scene).status == "agree"
+    _data(lambda d: {"colours": d.colours[:, [2, 1, 0]]})(monkeypatch)
+    assert "has the colour" in files(scene).reason
 
 
 def test_maps_of_instances(tmp_path: Path, monkeypatch: Patch) -> None:
