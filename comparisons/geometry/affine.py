@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.transform import Matrix, Rotate, Scale, Step, Translate
 from reference_rt.shapes.shape import Shape, TabulationContext
+from reference_rt.textures.texture import UvMap
 
 Affine = FloatArray
 
@@ -44,6 +45,14 @@ def of_steps(steps: Sequence[Step]) -> Affine:
                 one = np.array(rows)
         total = compose(total, one)
     return total
+
+
+def of_uv(uv: UvMap) -> FloatArray:
+    """The map (3, 3) of a texture's coordinates, homogeneous: scaled, turned, moved."""
+    if uv.matrix is not None:
+        return np.vstack([uv.matrix, [0.0, 0.0, 1.0]])
+    turn = _rotate((0.0, 0.0, 1.0), uv.rotate)[:2, :2]
+    return np.vstack([np.column_stack([turn @ np.diag(uv.scale), uv.offset]), [0.0, 0.0, 1.0]])
 
 
 def map_in(shape: Shape, place: TabulationContext) -> Affine:

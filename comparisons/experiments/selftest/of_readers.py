@@ -175,7 +175,7 @@ VIEW = "cameras/view_rectangle.py"
 
 OF_UNITS = (
     SourceFault(
-        "fov along the other axis", "camera_oblong", VIEW, '"x": n_x,', '"x": n_y,'
+        "fov along the other axis", "light_spot", VIEW, '"x": n_x,', '"x": n_y,'
     ),
     SourceFault(
         "half the fov", "cornell_box", VIEW,
@@ -183,6 +183,14 @@ OF_UNITS = (
     ),
     SourceFault(
         "the camera's right is its left", "cornell_box", MAPS, "    u /= sine", "    u /= -sine"
+    ),
+    SourceFault(
+        "a lens in focus at half the distance", "camera_thin_lens", "cameras/thin_lens.py",
+        "or math.dist(self.eye, self.target)", "or math.dist(self.eye, self.target) / 2.0",
+    ),
+    SourceFault(
+        "textures turned backwards", TILES, "textures/texture.py",
+        "[c * a, -s * b, du, s * a, c * b, dv]", "[c * a, s * b, du, -s * a, c * b, dv]",
     ),
     SourceFault(
         "another default of a spot's beam", "light_spot", "lights/emitters/spot.py",

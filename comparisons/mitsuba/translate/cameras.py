@@ -5,15 +5,12 @@ import math
 from functools import singledispatch
 from typing import Any
 
-import numpy as np
-
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.translate.textures import UntranslatableError
 from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens, filters
 from reference_rt.cameras.camera import Camera
 from reference_rt.cameras.film import Film
 from reference_rt.cameras.view_rectangle import CentralCamera
-from reference_rt.core.arrays import FloatArray
 from reference_rt.sampling import Grid, Independent, Sobol
 
 # ---- film, filters, samplers ---------------------------------------------------------------------
@@ -104,13 +101,13 @@ def _(camera: Perspective, film: Film) -> dict[str, Any]:
 def _(camera: ThinLens, film: Film) -> dict[str, Any]:
     off_axis = max(map(abs, _principal_point(camera))) > UNIT_ROUNDOFF
     if camera.view is not None and (off_axis or not _is_square(camera, film)):
-        lens = {"aperture_radius": camera.aperture_radius, "focus_distance": camera.focus}
+        lens = {"aperture_radius": camera.aperture_radius, "focus_distance": focus_of(camera)}
         return {**_rectangle(camera, film), **lens}
     return {
         "type": "thinlens",
         **_angle(camera, film),
         "aperture_radius": camera.aperture_radius,
-        "focus_distance": camera.focus,
+        "focus_distance": focus_of(camera),
         **_place(camera),
     }
 
@@ -124,34 +121,44 @@ def _(camera: Pinhole, film: Film) -> dict[str, Any]:
 
 @translate_camera.register
 def _(camera: Orthographic, film: Film) -> dict[str, Any]:
-    l, r, b, t = camera.rectangle(film.width, film.height)
+    l, r, b, t = _edges(camera, film)
     # Mitsuba's picture is 2 wide and 2 height / width high in the sensor's coordinates.
     right, up = (r - l) / 2.0, (t - b) / 2.0 * (film.width / film.height)
-    u, v, _ = camera.basis
-    middle = (l + r) / 2.0 * u + (b + t) / 2.0 * v
-    return {"type": "orthographic", **_place(camera, right=right, up=up, shift=middle)}
+    middle = (l + r) / 2.0, (b + t) / 2.0
+    return {"type": "orthographic", **_place(camera, right=right, up=up, middle=middle)}
+
+
+def _edges(camera: CentralCamera | Orthographic, film: Film) -> tuple[float, ...]:
+    """Left, right, bottom and top edge of the rectangle that the camera sees: at distance 1 from
+    the eye of a central one."""
+    if camera.view is not None:
+        distance = getattr(camera, "distance", None) or 1.0
+        return tuple(edge / distance for edge in camera.view)
+    assert isinstance(camera, Orthographic)
+    x = 1.0 if camera.width is None else camera.width / 2.0
+    y = x * film.height / film.width
+    return -x, x, -y, y
 
 
 def _angle(camera: CentralCamera, film: Film) -> dict[str, Any]:
     """The field of view, of square pixels."""
     if camera.view is None:
-        fov, axis = camera.angle
-        return {"fov": fov, "fov_axis": axis}
-    l, r, _, _ = camera.rectangle(film.width, film.height)
+        fov = 45.0 if camera.fov is None else camera.fov
+        return {"fov": fov, "fov_axis": camera.fov_axis or "x"}
+    l, r, _, _ = _edges(camera, film)
     return _spanning((r - l) / 2.0)
 
 
 def _is_square(camera: CentralCamera, film: Film) -> bool:
     """Whether pixels are square, as Mitsuba's are."""
-    l, r, b, t = camera.rectangle(film.width, film.height)
+    l, r, b, t = _edges(camera, film)
     oblong = (r - l) / (t - b) * (film.height / film.width)
     return abs(oblong - 1.0) <= UNIT_ROUNDOFF
 
 
 def _rectangle(camera: CentralCamera, film: Film) -> dict[str, Any]:
     """Our plugin `comparisons.mitsuba.plugins.view_rectangle`."""
-    edges = camera.rectangle(film.width, film.height)
-    named = zip(("left", "right", "bottom", "top"), edges, strict=True)
+    named = zip(("left", "right", "bottom", "top"), _edges(camera, film), strict=True)
     return {"type": "view_rectangle", **dict(named), **_place(camera)}
 
 
@@ -169,13 +176,22 @@ def _principal_point(camera: CentralCamera) -> tuple[float, float]:
     return (l + r) / 2.0 / (r - l), -(b + t) / 2.0 / (t - b)
 
 
+def focus_of(camera: ThinLens) -> float:
+    """The distance of the plane in focus: that of the target by default."""
+    if camera.focus_distance is not None:
+        return camera.focus_distance
+    return math.dist(camera.eye, camera.target)
+
+
 def _place(
-    camera: Camera, right: float = 1.0, up: float = 1.0, shift: FloatArray | float = 0.0
+    camera: Camera,
+    right: float = 1.0,
+    up: float = 1.0,
+    middle: tuple[float, float] = (0.0, 0.0),
 ) -> dict[str, Any]:
-    """to_world, whose columns are left, up, forward, eye, with left and up scaled and the eye
-    shifted; and the clipping planes."""
-    u, v, w = camera.basis
-    matrix = np.eye(4)
-    matrix[:3] = np.column_stack([-right * u, up * v, -w, np.add(camera.eye, shift)])
-    to_world = mitsuba().ScalarTransform4d(matrix)
-    return {"to_world": to_world, **clipping(camera)}
+    """to_world, by Mitsuba's look_at, whose x points left: with left and up scaled, and the eye
+    moved by `middle` to the right and up; and the clipping planes."""
+    known = mitsuba().ScalarTransform4d
+    look = known().look_at(list(camera.eye), list(camera.target), list(camera.up))
+    moved = look @ known().translate([-middle[0], middle[1], 0.0])
+    return {"to_world": moved @ known().scale([right, up, 1.0]), **clipping(camera)}

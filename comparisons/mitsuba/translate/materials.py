@@ -6,6 +6,7 @@ from functools import singledispatch
 from typing import Any
 
 import reference_rt as rt
+from comparisons.geometry import affine
 from comparisons.mitsuba.plugins.exact_coat import COLOURS, SUBSTITUTE, accepted
 from comparisons.mitsuba.translate.textures import (
     TranslationContext,
@@ -285,7 +286,7 @@ def _(material: Bump, context: TranslationContext) -> dict[str, Any]:
         "scale": material.scale,
         "height": translate_texture(upright, material.height, context, True),
         "base": base,
-        **dict(zip(names, texture.uv.coefficients().tolist(), strict=True)),
+        **dict(zip(names, affine.of_uv(texture.uv)[:2].ravel().tolist(), strict=True)),
         **_tilt(material),
     }
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from comparisons.geometry.frame import Frame, frame_for
 from comparisons.geometry.sizes import ShapeSizes
+from comparisons.mitsuba.translate.cameras import focus_of
 from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
 from reference_rt.cameras.camera import Camera
 from reference_rt.core.transform import Scale, Translate
@@ -84,7 +85,7 @@ def _(camera: Orthographic, scale: float) -> dict[str, Any]:
 def _(camera: ThinLens, scale: float) -> dict[str, Any]:
     return {
         "aperture_radius": scale * camera.aperture_radius,
-        "focus_distance": scale * camera.focus,
+        "focus_distance": scale * focus_of(camera),
     }
 
 

@@ -9,6 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from comparisons.geometry import affine
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.second import described_image
 from reference_rt.core.arrays import FloatArray
@@ -132,7 +133,7 @@ def _(texture: Checker, name: str, context: TranslationContext, as_number: bool)
         "type": "checkerboard",
         "color0": places[0],
         "color1": places[1],
-        "to_uv": _to_uv(_homogeneous(texture.uv)),
+        "to_uv": _to_uv(affine.of_uv(texture.uv)),
     }
 
 
@@ -172,12 +173,8 @@ def _lookup(image: Any, filter_type: str, wrap: str, uv: UvMap) -> dict[str, Any
         "format": "variant",  # never half floats
         "filter_type": filter_type,
         "wrap_mode": wrap,
-        "to_uv": _to_uv(FLIP @ _homogeneous(uv)),
+        "to_uv": _to_uv(FLIP @ affine.of_uv(uv)),
     }
-
-
-def _homogeneous(uv: UvMap) -> FloatArray:
-    return np.vstack([uv.coefficients().reshape(2, 3), [0.0, 0.0, 1.0]])
 
 
 def _to_uv(matrix: FloatArray) -> Any:
