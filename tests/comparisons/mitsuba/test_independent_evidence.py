@@ -17,11 +17,7 @@ DERIVED |= {"uv.coefficients"}
 
 EXCEPTIONS = {
     "affine.py": {"core.transform"},  # the types of steps
-    "moved.py": {
-        "tabulate",
-        "core.transform",
-        "camera.focus",
-    },  # where a mesh lies chooses the frame; the types
+    "moved.py": {"tabulate", "core.transform"},  # where a mesh lies chooses the frame; the types
     "lights.py": {"read_image"},  # digits beyond float32's, where Mitsuba's reader says the same
     "textures.py": {"read"},  # the same
     "sizes.py": {"tabulate"},  # sizes, of which bounds of errors are made
