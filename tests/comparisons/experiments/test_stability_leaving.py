@@ -128,6 +128,7 @@ def test_mitsuba_skips_gaps_of_its_epsilon(tmp_path):
     assert found.failures == found.cases > 0
 
 
+@pytest.mark.slow
 def test_light_comes_in_under_the_cube_by_one_gap():
     gap = 1e-3
     at = np.array([[1.0 - 0.5 * gap, 0.0, 0.0], [1.0 - 2.0 * gap, 0.0, 0.0]])

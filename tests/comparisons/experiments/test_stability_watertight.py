@@ -192,6 +192,7 @@ def test_pictures():
 # ---- hierarchies --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_box_that_is_too_small_is_seen(tmp_path, monkeypatch):
     """Planes of boxes moved inwards by a millionth: rays in them miss what they hold."""
     honest = hierarchy.rt.build_tables

@@ -54,7 +54,7 @@ def fast() -> None:
         pytest.skip("needs a variant of Mitsuba that takes many rays at once")
 
 
-@pytest.mark.cases(9)
+@pytest.mark.cases(5)
 @pytest.mark.parametrize("kind", ["sphere", "rectangle"])
 @pytest.mark.parametrize("name", BSDFS)
 def test_light_of_bsdfs_is_that_of_mitsuba(name, kind, images):
@@ -99,6 +99,7 @@ LAMPS: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.cases(8)
 @pytest.mark.parametrize("base", [None, CLAY], ids=["alone", "on_clay"])
 @pytest.mark.parametrize("name", LAMPS)
 def test_light_of_lamps_is_that_of_mitsuba(name, base, images):

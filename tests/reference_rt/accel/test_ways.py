@@ -354,7 +354,7 @@ def test_one_primitive_and_bounds_that_touch_infinity():
 # ---- beneath the law ----------------------------------------------------------------------------
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["two kinds", "spheres", "three kinds"])
 def test_brute_force_of_specialised_kernels(name):
     """Rays side by side against one shape, and one ray against shapes side by side."""

@@ -209,6 +209,7 @@ def _bases(bumps, maps, textures, u, v, tangents, out):
         out[k, 6], out[k, 7], out[k, 8] = frame.n
 
 
+@pytest.mark.slow
 def test_compiled():
     """The same bits as in plain Python."""
     rng = np.random.default_rng(6)

@@ -277,6 +277,7 @@ def test_de_morgan(way, mesh):
 # ---- where they fail ----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_coincident_faces_leave_a_film_here_and_none_where_it_renders():
     """A side of a box taken out of it, turned: rays to points in what is gone."""
     turn = transform.Rotate(rotate=transform.Turn(axis=(1.0, 2.0, 3.0), degrees=71.0))
