@@ -148,6 +148,8 @@ def _check_mesh(where: str, mesh: Mesh | Triangle, folder: Path, found: Found) -
     if found.triangles > MOST_TRIANGLES:
         found.unread.append(f"meshes beyond {MOST_TRIANGLES:,} triangles")
         return
+    if isinstance(mesh, Mesh) and mesh.file is not None:
+        where = where.replace("(mesh)", f"({mesh.file})")
     table = mesh.tabulate(TabulationContext(folder=folder))
     found.triangles += len(table.face)
     second = by_second(mesh, folder)
