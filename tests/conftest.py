@@ -170,8 +170,6 @@ def pytest_runtest_makereport(
     """Write the cost of a test into its last report.  The first test of a file sets up what others
     share, such as a browser: that is not its own cost."""
     report = yield
-    if call.when == "teardown" and (left := _variant_left()):
-        report.outcome, report.longrepr = "failed", left
     if call.when == "setup" and item.path not in _files_begun and item.nodeid in _begun:
         _files_begun.add(item.path)
         _begun[item.nodeid] = _cpu(), _begun[item.nodeid][1]
@@ -190,17 +188,18 @@ def pytest_runtest_makereport(
     return report
 
 
-def _variant_left() -> str:
-    """Complaint about a test that left Mitsuba in another variant than the one that comparisons
-    use: a later test would fail."""
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Iterator[None]:
+    """A file that leaves Mitsuba in another variant than the one that comparisons use fails: else
+    tests of later files would."""
+    yield
     used = sys.modules.get("comparisons.mitsuba.backend")
-    if used is None or not used.mitsuba.cache_info().currsize:
-        return ""
-    variant, expected = used.mitsuba().variant(), used.backend().variant
-    if variant == expected:
-        return ""
-    used.mitsuba().set_variant(expected)
-    return f"left Mitsuba's variant as {variant}; expected {expected} as before"
+    is_last = nextitem is None or nextitem.path != item.path
+    if is_last and used is not None and used.mitsuba.cache_info().currsize:
+        variant, expected = used.mitsuba().variant(), used.backend().variant
+        if variant != expected:
+            used.mitsuba().set_variant(expected)
+            pytest.fail(f"left Mitsuba's variant as {variant}; expected {expected} as before")
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:

@@ -56,7 +56,7 @@ CASES: tuple[tuple[AnyCamera, tuple[int, int]], ...] = (
 )
 
 
-@pytest.fixture(params=["fastest", "scalar_rgb"])
+@pytest.fixture(params=["fastest", "scalar_rgb"], scope="module")  # to switch is slow
 def variant(request: pytest.FixtureRequest) -> Iterator[str]:
     mi = mitsuba()
     with in_variant(mi.variant() if request.param == "fastest" else request.param):
