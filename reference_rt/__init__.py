@@ -33,5 +33,15 @@ materials, lights, integrators, scene, rendering, textbook, cli.
 
 import lazy_loader as _lazy_loader
 
-# There is no `__all__`: `help` would print all types with all their methods, 30,000 lines.
-__getattr__, __dir__, _ = _lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, _names = _lazy_loader.attach_stub(__name__, __file__)
+
+
+class _All(list[str]):
+    """The names that `import *` gives.  `help` asks which names are in it, and would print all
+    types with all their methods: 30,000 lines."""
+
+    def __contains__(self, name: object) -> bool:
+        return False
+
+
+__all__ = _All(_names)

@@ -59,6 +59,13 @@ def test_every_public_name_is_where_the_stub_says():
     assert sorted(itertools.chain(*PUBLIC.values())) == dir(reference_rt)
 
 
+def test_the_star_gives_every_public_name():
+    found: dict[str, object] = {}
+    exec("from reference_rt import *", found)
+    del found["__builtins__"]
+    assert found == {name: getattr(reference_rt, name) for name in dir(reference_rt)}
+
+
 def test_help_is_short_and_names_everything():
     names = {getattr(reference_rt, name) and name for name in dir(reference_rt)} - {"__version__"}
     lines = pydoc.plain(pydoc.render_doc(reference_rt)).splitlines()
