@@ -231,8 +231,10 @@ def test_what_is_no_file(tmp_path):
         ("zero.stl", "is a device, not a regular file"),
         ("loop.obj", "Too many levels of symbolic links"),
         ("no.obj", "No such file or directory"),
-        ("null\0.obj", "embedded null byte"),
+        ("null\0.obj", "embedded null"),  # byte, or character in path: by Python's version
     ):
         with pytest.raises(ValueError, match=r"^cannot read mesh ") as caught:
             read_mesh(tmp_path / name)
-        assert str(caught.value) == f"cannot read mesh {tmp_path / name}: {reason}; expected a file"
+        assert str(caught.value).startswith(f"cannot read mesh {tmp_path / name}: ")
+        assert reason in str(caught.value)
+        assert str(caught.value).endswith("; expected a file")
