@@ -35,7 +35,7 @@ class Corners:
     normals (n, 3, 3), uv (n, 3, 2) and colours (n, 3, 3).
 
     source: who says so;  silent: names of what it says nothing of;  made: whether the normals are
-    made, of those of the triangles around.
+    made, of those of the triangles around;  doubtful: what other programs read otherwise.
     """
 
     points: FloatArray
@@ -45,6 +45,7 @@ class Corners:
     source: str = "the description"
     silent: tuple[str, ...] = ()
     made: bool = False
+    doubtful: tuple[str, ...] = ()
 
 
 def by_us(shape: Mesh | Triangle, folder: Path) -> Corners:
@@ -53,14 +54,15 @@ def by_us(shape: Mesh | Triangle, folder: Path) -> Corners:
         return Corners(np.array([[shape.v0, shape.v1, shape.v2]]))
     data = shape.data(folder)
     arrays = (data.vertices, data.normals, data.uv, data.colours)
-    return Corners(*(None if a is None else a[data.faces] for a in arrays))  # type: ignore[arg-type]
+    corners = (None if a is None else a[data.faces] for a in arrays)
+    return replace(Corners(*corners), doubtful=data.doubtful)  # type: ignore[arg-type]
 
 
-def by_second(shape: Mesh | Triangle, folder: Path) -> Corners | None:
+def by_second(shape: Mesh | Triangle, folder: Path, ours: Corners) -> Corners | None:
     """A mesh as its description and a second reader say, in our order if it has as many triangles.
     None where no second reader takes the file, or float32 does not hold it."""
     if isinstance(shape, Triangle):
-        return by_us(shape, folder)
+        return ours
     if shape.file is None:
         faces = np.asarray(shape.faces)
         arrays = (shape.vertices, shape.normals, shape.uv, shape.colours)
@@ -69,32 +71,38 @@ def by_second(shape: Mesh | Triangle, folder: Path) -> Corners | None:
             found = replace(found, normals=_unit(found.normals))
     else:
         path = folder / shape.file
-        known = None if shape.data(folder).doubtful else _read(path, path.stat().st_mtime_ns)
+        known = None if ours.doubtful else _read(path, path.stat().st_mtime_ns)
         if known is None:
             return None
-        found = _in_order(known, by_us(shape, folder))
+        found = _in_order(known, ours)
     if shape.face_normals:
         found = replace(found, normals=None, silent=tuple({*found.silent} - {"normals"}))
-    elif shape.smooth and found.normals is None:
-        ours = by_us(shape, folder)
-        if "normals" not in found.silent or ours.normals is None:
-            known_uv = ours.uv if "uv" in found.silent else found.uv
-            normals = _smoothed(replace(found, uv=known_uv))
-            silent = tuple({*found.silent} - {"normals"})
-            found = replace(found, normals=normals, made=True, silent=silent)
+    elif shape.smooth and found.normals is None and not _has(ours.normals, found.silent):
+        # float32 would turn the small triangles of a mesh that is far away.
+        points = _refined(found.points, ours.points)
+        known_uv = ours.uv if "uv" in found.silent else found.uv
+        normals = _smoothed(replace(found, points=points, uv=known_uv))
+        silent = tuple({*found.silent} - {"normals"})
+        found = replace(found, normals=normals, made=True, silent=silent)
     return found
+
+
+def _has(normals: FloatArray | None, silent: tuple[str, ...]) -> bool:
+    """Whether a file has normals of which a second reader does not speak."""
+    return normals is not None and "normals" in silent
 
 
 def described(shape: Mesh | Triangle, folder: Path) -> Corners:
     """A mesh for the counterpart: by the second reader.  Ours is taken for what that one does not
     say, and where it is the same in float32, for the digits which that lacks."""
-    ours, theirs = by_us(shape, folder), by_second(shape, folder)
-    if isinstance(shape, Mesh) and shape.face_normals:
-        ours = replace(ours, normals=None)
-    elif isinstance(shape, Mesh) and shape.smooth and ours.normals is None:
-        ours = replace(ours, normals=_smoothed(ours))
+    ours = by_us(shape, folder)
+    theirs = by_second(shape, folder, ours)
     if theirs is None:
-        return ours
+        assert isinstance(shape, Mesh)
+        if shape.face_normals:
+            return replace(ours, normals=None)
+        is_made = shape.smooth and ours.normals is None
+        return replace(ours, normals=_smoothed(ours)) if is_made else ours
     if len(theirs.points) != len(ours.points):
         return theirs
     found: dict[str, Any] = {
@@ -106,8 +114,8 @@ def described(shape: Mesh | Triangle, folder: Path) -> Corners:
     return replace(theirs, **found)
 
 
-def _refined(theirs: FloatArray | None, ours: FloatArray | None) -> FloatArray | None:
-    if theirs is None or ours is None:
+def _refined(theirs: Any, ours: FloatArray | None) -> Any:
+    if theirs is None or ours is None or theirs.shape != ours.shape:
         return theirs
     same = np.abs(theirs - ours) <= ROUNDING * np.abs(theirs).max(initial=0.0)
     return np.where(same, ours, theirs)
@@ -141,7 +149,7 @@ def _direction(v: FloatArray) -> FloatArray:
     return np.asarray(np.divide(v, length, out=v, where=length > 0.0))
 
 
-@functools.lru_cache(maxsize=4)
+@functools.lru_cache(maxsize=2)
 def _read(path: Path, modified: int) -> Corners | None:
     """A file's mesh by the first second reader that takes it; None where none does, or where
     float32 does not hold its numbers."""

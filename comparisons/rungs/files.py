@@ -25,7 +25,7 @@ import numpy as np
 from comparisons.geometry import affine
 from comparisons.geometry.equations import EQUATIONS
 from comparisons.geometry.flatten import maps_of
-from comparisons.mitsuba.second import SLIVERS, Corners, by_second, image, rounding_of
+from comparisons.mitsuba.second import SLIVERS, Corners, by_second, by_us, image, rounding_of
 from comparisons.results.case import RungResult
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.lights import EnvironmentMap
@@ -152,7 +152,8 @@ def _check_mesh(where: str, mesh: Mesh | Triangle, folder: Path, found: Found) -
         where = where.replace("(mesh)", f"({mesh.file})")
     table = mesh.tabulate(TabulationContext(folder=folder))
     found.triangles += len(table.face)
-    second = by_second(mesh, folder)
+    ours = by_us(mesh, folder)
+    second = by_second(mesh, folder, ours)
     if second is not None:
         _compare(where, table, second, affine.of_steps(mesh.transform), found)
         found.count("meshes" if isinstance(mesh, Mesh) else "triangles")
@@ -160,10 +161,9 @@ def _check_mesh(where: str, mesh: Mesh | Triangle, folder: Path, found: Found) -
     assert isinstance(mesh, Mesh)
     assert mesh.file is not None
     suffix = Path(mesh.file).suffix.lower()
-    doubtful = mesh.data(folder).doubtful
     found.unread.append(
         f"{suffix} of concave polygons, or with uv and normals in part"
-        if doubtful
+        if ours.doubtful
         else f"{suffix} that no other reader takes, or beyond float32"
     )
 
