@@ -62,6 +62,7 @@ def test_numbers_become_simple_and_stay_where_they_matter(files):
     assert found["camera"]["eye"] == [1, 2, 6]
 
 
+@pytest.mark.slow
 def test_limits_are_kept(files):
     scene = generate(2, 7, Grammar(), files)
     tried = []

@@ -139,6 +139,7 @@ def test_a_film_may_show_or_not(gap, either, tmp_path):
     assert not met.allows(np.array([1, -1, 0, 2]), 5.0)
 
 
+@pytest.mark.slow
 def test_edges_are_found(tmp_path):
     """Two thirds of the rays pass an edge closely: a move of theirs changes what they hit."""
     scene = scenes.things(tmp_path)

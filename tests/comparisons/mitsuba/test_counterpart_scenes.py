@@ -162,7 +162,7 @@ FAULTS: tuple[tuple[str, Any, str, str], ...] = (
 )
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "rung", "right", "wrong"), FAULTS)
 def test_a_planted_fault_is_seen(
     name: str, rung: Any, right: str, wrong: str, whole: dict[str, Scene], image_folder: Path

@@ -73,7 +73,7 @@ def test_light_of_bsdfs_is_that_of_mitsuba(name, kind, images):
     assert abs(found.mean()) * np.sqrt(found.size / 3) < MOST
 
 
-@pytest.mark.cases(8)
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("name", EMITTERS)
 def test_light_of_emitters_is_that_of_mitsuba(name, images):
     fast()

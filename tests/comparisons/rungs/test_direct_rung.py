@@ -37,7 +37,7 @@ def text_of(source: str) -> str:
     return source if "\n" in source else path.read_text(encoding="utf-8")
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", FAULTS)
 def test_faults_are_found(name: str) -> None:
     source, right, wrong = FAULTS[name]

@@ -32,6 +32,7 @@ from reference_rt.jit.links import STRIDE, Link, Linkable, Linker, is_absent
 needs_jit = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
 
+@pytest.mark.cases(4)
 @needs_jit
 @pytest.mark.parametrize("present", list(itertools.product((True, False), repeat=3)), ids=str)
 def test_all_codes_give_what_they_give_on_tables(present):

@@ -130,7 +130,7 @@ def read(value, put):
     assert ends.tolist() == [table.before, table.after]
 
 
-@pytest.mark.cases(8)
+@pytest.mark.cases(4)
 @needs_jit
 @pytest.mark.parametrize("case", CASES)
 def test_what_is_written_is_read(case, monkeypatch):

@@ -173,6 +173,7 @@ def test_more_copies_than_fit_are_refused(tmp_path, monkeypatch):
         _ = scene.tables
 
 
+@pytest.mark.slow
 def test_no_copy_hits_itself_when_left(tmp_path):
     """Unequal scales up to 1 : 1e6, far from the origin."""
     rng = np.random.default_rng(6)
