@@ -42,7 +42,7 @@ def open_image(path: Path, layer: str = "", radiance: bool = False) -> ImageFile
     if not start:
         raise ValueError("is empty; expected an image")
     if layer and not start.startswith(_BEGINNINGS[0][0]):
-        raise ValueError(f"has no layer '{layer}': only EXR has layers")
+        raise ValueError(f"has no layer '{layer}'; expected an .exr file, or no 'layer'")
     if layer:
         return open_exr(path, layer)
     if start.startswith(b"#?"):
