@@ -27,17 +27,6 @@ from reference_rt.jit import kernel_cache, parallel_compile  # noqa: E402
 
 LONGEST_FIRST = (
     "test_extremes",  # compiles the kernels of all tests that use `worlds`
-    # Meanwhile, ones that need no kernels: they would be compiled twice.
-    "test_gate_driver",
-    "test_gate_renderers",
-    "test_translate_cameras",
-    "test_odd_replicate",
-    "test_statistics",
-    "test_interrupt",
-    "test_output_lost",
-    "test_layout",
-    "test_backend",
-    # Those that take longest.
     "test_counterpart_light",
     "test_plain_python",
     "test_reading_plugins",
@@ -60,9 +49,9 @@ LONGEST_FIRST = (
     "test_stability_watertight",
     "test_stability",
 )
-"""The files that start first, so that no process is left alone with a long one at the end, nor
-compiles what another one is compiling.  Files that share kernels are kept apart in the list: the
-second one then finds them compiled."""
+"""Files that take more than some ten seconds without compiled kernels.  They start first, so that
+no process is left alone with one at the end.  Files that share kernels are kept apart in the list:
+the second one then finds them compiled."""
 
 
 LIMIT = 5.0

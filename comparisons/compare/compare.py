@@ -232,7 +232,7 @@ def _gather(
 ) -> Evidence:
     """The same in the current variant of Mitsuba."""
     clock = time.perf_counter()
-    scene, moved = with_float32_vertices(budgeted(subject.scene, budget))
+    scene, judged_by, moved = with_float32_vertices(budgeted(subject.scene, budget))
     tables = build_tables(scene)
     seconds: dict[str, dict[str, float]] = {
         "candidate": {"load": time.perf_counter() - clock},
@@ -240,9 +240,8 @@ def _gather(
     }
     left_out = _left_out(scene, tables)
     clock = time.perf_counter()
-    judged_by = scene
     if subject.reference is not None:
-        judged_by, _ = with_float32_vertices(budgeted(subject.reference, budget))
+        _, judged_by, _ = with_float32_vertices(budgeted(subject.reference, budget))
     own = _own_file(judged_by)
     try:
         counterpart = load(judged_by)

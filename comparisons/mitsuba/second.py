@@ -18,13 +18,10 @@ from comparisons.mitsuba.backend import mitsuba
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.image_files import open_image
 from reference_rt.shapes import Mesh, Triangle
+from reference_rt.shapes.meshes.vertex_normals import smooth_normals
 
 ROUNDING = 2.0**-22
 """Of the largest number: a few roundings to float32, in which Mitsuba holds numbers."""
-
-SLIVERS = 2.0**-12
-"""Of made normals: plain sums lose half of their digits where triangles have hardly any width."""
-
 
 # ---- meshes --------------------------------------------------------------------------------------
 
@@ -34,8 +31,9 @@ class Corners:
     """A mesh before its transform, by corners: points (n, 3, 3), and of these, or None, unit
     normals (n, 3, 3), uv (n, 3, 2) and colours (n, 3, 3).
 
-    source: who says so;  silent: names of what it says nothing of;  made: whether the normals are
-    made, of those of the triangles around;  doubtful: what other programs read otherwise.
+    source: who says so;  silent: names of what it says nothing of;  bent: of normals that are made
+    of those of the triangles around, by how much rounding may change each (n, 3);  doubtful: what
+    other programs read otherwise.
     """
 
     points: FloatArray
@@ -44,18 +42,25 @@ class Corners:
     colours: FloatArray | None = None
     source: str = "the description"
     silent: tuple[str, ...] = ()
-    made: bool = False
+    bent: FloatArray | None = None
     doubtful: tuple[str, ...] = ()
 
 
 def by_us(shape: Mesh | Triangle, folder: Path) -> Corners:
-    """A mesh as our readers read it."""
+    """A mesh as our readers read it, with normals that we make."""
     if isinstance(shape, Triangle):
         return Corners(np.array([[shape.v0, shape.v1, shape.v2]]))
     data = shape.data(folder)
     arrays = (data.vertices, data.normals, data.uv, data.colours)
-    corners = (None if a is None else a[data.faces] for a in arrays)
-    return replace(Corners(*corners), doubtful=data.doubtful)  # type: ignore[arg-type]
+    points, normals, uv, colours = (None if a is None else a[data.faces] for a in arrays)
+    bent = None
+    if shape.makes_normals(data):
+        normals = smooth_normals(data.vertices, data.faces, data.uv).reshape(-1, 3, 3)
+        bent = np.zeros(normals.shape[:2])
+    elif shape.face_normals:
+        normals = None
+    assert points is not None
+    return Corners(points, normals, uv, colours, bent=bent, doubtful=data.doubtful)
 
 
 def by_second(shape: Mesh | Triangle, folder: Path, ours: Corners) -> Corners | None:
@@ -77,19 +82,12 @@ def by_second(shape: Mesh | Triangle, folder: Path, ours: Corners) -> Corners | 
         found = _in_order(known, ours)
     if shape.face_normals:
         found = replace(found, normals=None, silent=tuple({*found.silent} - {"normals"}))
-    elif shape.smooth and found.normals is None and not _has(ours.normals, found.silent):
-        # float32 would turn the small triangles of a mesh that is far away.
+    elif found.normals is None and ours.bent is not None:
+        # In float32 the small triangles of a mesh that is far away would have other normals.
         points = _refined(found.points, ours.points)
-        known_uv = ours.uv if "uv" in found.silent else found.uv
-        normals = _smoothed(replace(found, points=points, uv=known_uv))
-        silent = tuple({*found.silent} - {"normals"})
-        found = replace(found, normals=normals, made=True, silent=silent)
+        uv = ours.uv if "uv" in found.silent else found.uv
+        found = _smoothed(replace(found, points=points), uv)
     return found
-
-
-def _has(normals: FloatArray | None, silent: tuple[str, ...]) -> bool:
-    """Whether a file has normals of which a second reader does not speak."""
-    return normals is not None and "normals" in silent
 
 
 def described(shape: Mesh | Triangle, folder: Path) -> Corners:
@@ -98,47 +96,58 @@ def described(shape: Mesh | Triangle, folder: Path) -> Corners:
     ours = by_us(shape, folder)
     theirs = by_second(shape, folder, ours)
     if theirs is None:
-        assert isinstance(shape, Mesh)
-        if shape.face_normals:
-            return replace(ours, normals=None)
-        is_made = shape.smooth and ours.normals is None
-        return replace(ours, normals=_smoothed(ours)) if is_made else ours
+        return ours
     if len(theirs.points) != len(ours.points):
         return theirs
     found: dict[str, Any] = {
         name: getattr(ours, name)
         if name in theirs.silent
         else _refined(getattr(theirs, name), getattr(ours, name))
-        for name in ("points", "normals", "uv", "colours")
+        for name in ("points", "uv", "colours")
     }
-    return replace(theirs, **found)
+    bent = None if theirs.bent is None else theirs.bent[:, :, None]
+    normals = _refined(theirs.normals, ours.normals, bent)
+    return replace(theirs, normals=ours.normals if "normals" in theirs.silent else normals, **found)
 
 
-def _refined(theirs: Any, ours: FloatArray | None) -> Any:
+def _refined(theirs: Any, ours: FloatArray | None, most: FloatArray | None = None) -> Any:
+    """Ours where they differ by at most so much, by default by the rounding of float32."""
     if theirs is None or ours is None or theirs.shape != ours.shape:
         return theirs
-    same = np.abs(theirs - ours) <= ROUNDING * np.abs(theirs).max(initial=0.0)
-    return np.where(same, ours, theirs)
+    allowed = ROUNDING * np.abs(theirs).max(initial=0.0) if most is None else most
+    return np.where(np.abs(theirs - ours) <= allowed, ours, theirs)
 
 
 def _unit(v: FloatArray) -> FloatArray:
     return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
 
 
-def _smoothed(mesh: Corners) -> FloatArray:
-    """Normals of vertices: the mean of the triangles around, weighted by angle, where points and uv
-    are equal (Thürmer and Wüthrich 1998, "Computing vertex normals from polygonal facets")."""
+def _smoothed(mesh: Corners, uv: FloatArray | None) -> Corners:
+    """With normals of vertices: the mean of the triangles around, weighted by angle, where points
+    and uv are equal (Thürmer and Wüthrich 1998, "Computing vertex normals from polygonal facets").
+    """
     n = len(mesh.points)
-    key = mesh.points if mesh.uv is None else np.concatenate([mesh.points, mesh.uv], axis=2)
+    key = mesh.points if uv is None else np.concatenate([mesh.points, uv], axis=2)
     _, vertex = np.unique(key.reshape(3 * n, -1) + 0.0, axis=0, return_inverse=True)
+    vertex = vertex.reshape(n, 3)
     after = _direction(np.roll(mesh.points, -1, axis=1) - mesh.points)
     before = -np.roll(after, 1, axis=1)
+    sine = np.linalg.norm(np.cross(after, before), axis=2)
     normal = _direction(np.cross(after[:, 0], after[:, 1]))
-    angle = np.arccos(np.clip((after * before).sum(axis=2), -1.0, 1.0))
-    total = np.zeros((vertex.max() + 1, 3))
-    np.add.at(total, vertex.ravel(), (angle[:, :, None] * normal[:, None]).reshape(-1, 3))
-    found = _direction(total)[vertex].reshape(n, 3, 3)
-    return np.asarray(np.where((found == 0.0).all(axis=2, keepdims=True), normal[:, None], found))
+    angle = np.arctan2(sine, (after * before).sum(axis=2))
+    # The sides are rounded: of a triangle without width they do not tell where it faces.
+    thinnest = sine.min(axis=1, initial=1.0)
+    unknown = np.minimum(2.0, 2.0**-46 / np.maximum(thinnest, 2.0**-53))
+    count = vertex.max() + 1
+    total, error = np.zeros((count, 3)), np.zeros(count)
+    np.add.at(total, vertex, angle[:, :, None] * normal[:, None])
+    np.add.at(error, vertex, (angle + 2.0**-46) * unknown[:, None])
+    length = np.linalg.norm(total, axis=1)
+    known = np.asarray(length > error, np.bool_)
+    bent = np.where(known, np.minimum(2.0, 2.0 * error / np.maximum(length, error)), 2.0)
+    found = np.where(known[vertex][..., None], _direction(total)[vertex], normal[:, None])
+    silent = tuple({*mesh.silent} - {"normals"})
+    return replace(mesh, normals=found, bent=bent[vertex], silent=silent)
 
 
 def _direction(v: FloatArray) -> FloatArray:
@@ -183,6 +192,8 @@ def _by_mitsuba(path: Path) -> Corners:
 
 def _colours(path: Path, vertices: int, faces: IntArray) -> FloatArray | None:
     """Colours of a .ply file's vertices, by trimesh; decoded as IEC 61966-2-1 says."""
+    if b" red" not in path.read_bytes()[:_HEADER]:  # trimesh need not read it all
+        return None
     import trimesh
 
     element = trimesh.load(path, process=False).metadata["_ply_raw"]["vertex"]
@@ -194,6 +205,10 @@ def _colours(path: Path, vertices: int, faces: IntArray) -> FloatArray | None:
     encoded = np.stack([np.ravel(element["data"][name]) for name in names], axis=1)
     kind = np.dtype(element["properties"]["red"])
     return _decoded(encoded[faces] / (np.iinfo(kind).max if kind.kind == "u" else 1.0))
+
+
+_HEADER = 1 << 14
+"""Bytes that hold the header of a .ply file."""
 
 
 def _has_normals(path: Path) -> bool:
@@ -220,11 +235,11 @@ def _by_trimesh(path: Path) -> Corners:
         mesh = scene.geometry[name]
         if hasattr(mesh, "faces"):
             columns["points"].append(trimesh.transform_points(mesh.vertices, matrix)[mesh.faces])
-            normals = mesh.vertex_normals[mesh.faces] @ np.linalg.inv(matrix[:3, :3])
-            columns["normals"].append(_direction(normals))
-            columns["uv"].append(getattr(mesh.visual, "uv", None))
-            if columns["uv"][-1] is not None:
-                columns["uv"][-1] = columns["uv"][-1][mesh.faces]
+            if is_gltf:
+                normals = mesh.vertex_normals[mesh.faces] @ np.linalg.inv(matrix[:3, :3])
+                columns["normals"].append(_direction(normals))
+                uv = getattr(mesh.visual, "uv", None)
+                columns["uv"].append(None if uv is None else uv[mesh.faces])
     found: dict[str, Any] = {}
     silent = ["colours"]
     for name, key in (("points", b"POSITION"), ("normals", b"NORMAL"), ("uv", b"TEXCOORD_0")):
@@ -253,18 +268,17 @@ def _in_order(theirs: Corners, ours: Corners) -> Corners:
         return theirs
     if np.abs(theirs.points - ours.points).max() <= ROUNDING * np.abs(ours.points).max():
         return theirs
-    near = (
-        cKDTree(theirs.points.mean(axis=1))
-        .query(ours.points.mean(axis=1), k=min(4, len(theirs.points)))[1]
-        .reshape(len(ours.points), -1)
-    )
+    tree, n = cKDTree(theirs.points.mean(axis=1)), len(ours.points)
     turned = (np.arange(3) + np.arange(3)[:, None]) % 3  # by one, two, no corners
-    candidates = theirs.points[near][:, :, turned]
-    error = np.abs(candidates - ours.points[:, None, None]).max(axis=(3, 4))
-    best = error.reshape(len(near), -1).argmin(axis=1)
-    rows = near[np.arange(len(near)), best // 3][:, None]
+    rows, turns = np.empty((n, 1), np.int64), np.empty((n, 3), np.int64)
+    for block in np.array_split(np.arange(n), n // 65536 + 1):  # each triangle takes a kilobyte
+        own = ours.points[block]
+        near = tree.query(own.mean(axis=1), k=min(4, n))[1].reshape(len(block), -1)
+        error = np.abs(theirs.points[near][:, :, turned] - own[:, None, None]).max(axis=(3, 4))
+        best = error.reshape(len(block), -1).argmin(axis=1)
+        rows[block, 0], turns[block] = near[np.arange(len(block)), best // 3], turned[best % 3]
     columns: dict[str, Any] = {
-        name: None if (c := getattr(theirs, name)) is None else c[rows, turned[best % 3]]
+        name: None if (c := getattr(theirs, name)) is None else c[rows, turns]
         for name in ("points", "normals", "uv")
     }
     return replace(theirs, **columns)

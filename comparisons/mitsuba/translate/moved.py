@@ -9,6 +9,7 @@ import numpy as np
 from comparisons.geometry.frame import Frame, frame_for
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.translate.cameras import focus_of
+from comparisons.mitsuba.translate.shapes.meshes import Soup, soup_of
 from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
 from reference_rt.cameras.camera import Camera
 from reference_rt.core.transform import Scale, Translate
@@ -117,18 +118,19 @@ the triangles): beyond it the mesh would be another one, and the comparison is t
 precision.  The same hundredth as `geometry.frame.SHARE`."""
 
 
-def with_float32_vertices(scene: Scene) -> tuple[Scene, float]:
+def with_float32_vertices(scene: Scene) -> tuple[Scene, Scene, float]:
     """The scene with the meshes and triangles that stand in it by themselves, not in groups or
-    solids, moved to the nearest float32 vertices of the counterpart's frame; and the largest
-    distance by which a vertex moves, 0 if the scene is as it was.
+    solids, moved to the nearest float32 vertices of the counterpart's frame: for us, by our
+    tables, and for Mitsuba, by the second reader; and the largest distance by which a vertex moves,
+    0 if both scenes are as they were.
 
     A mesh stays as it is where float32 is too coarse for it (SHARE), and where it cannot be used,
     for the error that `build_tables` raises.
     """
     if not any(isinstance(shape, Mesh | Triangle) for shape in scene.shapes):
-        return scene, 0.0
-    frame = frame_of(scene)
-    shapes, largest = list(scene.shapes), 0.0
+        return scene, scene, 0.0
+    frame, largest = frame_of(scene), 0.0
+    ours, theirs = list(scene.shapes), list(scene.shapes)
     for k, shape in enumerate(scene.shapes):
         if not isinstance(shape, Mesh | Triangle):
             continue
@@ -141,29 +143,47 @@ def with_float32_vertices(scene: Scene) -> tuple[Scene, float]:
             table = shape.tabulate(TabulationContext(folder=scene.folder, warn=warn))
         except ValueError:
             continue
-        rounded, moved = _rounded(table, shape.material, frame)
+        own = _by_corners(table)
+        rounded, moved = _rounded(own, shape.material, frame)
         if 0.0 < moved <= SHARE * _edge(table):
-            shapes[k], largest = rounded, max(largest, moved)
+            ours[k] = theirs[k] = rounded
+            second = soup_of(shape, scene.folder).at_corners()
+            if not own.is_like(second):
+                theirs[k] = _rounded(second, shape.material, frame)[0]
+            largest = max(largest, moved)
             for message in warned:
                 scene.warn(message, "shapes", k)
-    return (scene.changed(shapes=tuple(shapes)) if largest > 0.0 else scene), largest
+    if largest == 0.0:
+        return scene, scene, 0.0
+    found = scene.changed(shapes=tuple(ours))
+    same = all(one is other for one, other in zip(ours, theirs, strict=True))
+    return found, found if same else scene.changed(shapes=tuple(theirs)), largest
 
 
-def _rounded(table: Triangles, material: str | None, frame: Frame) -> tuple[Mesh, float]:
-    """The triangles of a table as a mesh with rounded vertices, and how far a vertex moves."""
-    corners = table.vertices.reshape(-1, 3)
+def _by_corners(table: Triangles) -> Soup:
+    normals, uvs, colours = (
+        None if column is None else column.reshape(3 * len(table.face), -1)
+        for column in (table.normals, table.uvs, table.colours)
+    )
+    return Soup(table.vertices.reshape(-1, 3), normals, uvs, colours, numbers=table.face)
+
+
+def _rounded(soup: Soup, material: str | None, frame: Frame) -> tuple[Mesh, float]:
+    """Triangles, by corners, as a mesh with rounded vertices, and how far a vertex moves."""
+    corners, numbers = soup.positions, soup.numbers
+    assert numbers is not None
     vertices = frame.rounded(corners)
     moved = float(np.linalg.norm(vertices - corners, axis=1).max())
-    # Faces that the table left out, as they have no area, are left out again: numbers stay.
-    faces = np.zeros((int(table.face.max()) + 1, 3), np.int64)
-    faces[table.face] = np.arange(len(corners)).reshape(-1, 3)
+    # Faces that are left out, as they have no area, are left out again: numbers stay.
+    faces = np.zeros((int(numbers.max()) + 1, 3), np.int64)
+    faces[numbers] = np.arange(len(corners)).reshape(-1, 3)
     mesh = Mesh(
         material=material,
         vertices=vertices,
         faces=faces,
-        normals=None if table.normals is None else table.normals.reshape(-1, 3),
-        uv=None if table.uvs is None else table.uvs.reshape(-1, 2),
-        colours=None if table.colours is None else table.colours.reshape(-1, 3),
+        normals=soup.normals,
+        uv=soup.uvs,
+        colours=soup.colours,
     )
     return mesh, moved
 

@@ -70,7 +70,7 @@ def scene_of(name: str, steps: str) -> Scene:
 @pytest.mark.parametrize("name", meshes())
 def test_mitsuba_holds_our_vertices_and_nothing_else_changes(name: str, steps: str) -> None:
     scene = scene_of(name, steps)
-    rounded, moved = with_float32_vertices(scene)
+    rounded, _, moved = with_float32_vertices(scene)
     tables = [s.shapes[0].tabulate(TabulationContext()) for s in (scene, rounded)]
     frame = frame_of(rounded)
     assert frame == frame_of(scene)
@@ -100,17 +100,17 @@ def test_meshes_that_float32_would_break_stay(name: str) -> None:
     )
     scene = Scene(film=Film(width=16, height=12), shapes=(shape, Sphere()))
     assert frame_of(scene).is_ours
-    rounded, moved = with_float32_vertices(scene)
+    rounded, _, moved = with_float32_vertices(scene)
     assert rounded is scene
     assert moved == 0.0
 
 
 def test_scenes_without_meshes_and_rounded_ones_stay() -> None:
     ball = Scene(shapes=(Sphere(),))
-    assert with_float32_vertices(ball) == (ball, 0.0)
-    once, moved = with_float32_vertices(scene_of("all", "turned"))
+    assert with_float32_vertices(ball) == (ball, ball, 0.0)
+    once, _, moved = with_float32_vertices(scene_of("all", "turned"))
     assert moved > 0.0
-    again, rest = with_float32_vertices(once)
+    again, _, rest = with_float32_vertices(once)
     assert again is once
     assert rest == 0.0
 
@@ -133,7 +133,7 @@ def test_a_fine_mesh_of_glass_agrees() -> None:
         lights=(Point(position=(2, 4, 3), intensity=(30, 30, 30)),),
         camera={"type": "perspective", "eye": (0.3, 0.4, 5.0), "target": (0.1, 0, 0), "fov": 36},
     )
-    rounded, _ = with_float32_vertices(scene)
+    rounded, _, _ = with_float32_vertices(scene)
     found = [whitted(s, build_tables(s), load(s), 1000) for s in (scene, rounded)]
     assert found[1].status in ("agree", "not-applicable"), found[1].reason
     assert found[1].numbers["explained"] <= found[0].numbers["explained"]
@@ -142,7 +142,7 @@ def test_a_fine_mesh_of_glass_agrees() -> None:
 def test_the_frame_of_hits_is_kept() -> None:
     """Rays through the middles of triangles hit the same ones, at nearly the same points."""
     scene = scene_of("normals", "moved")
-    rounded, moved = with_float32_vertices(scene)
+    rounded, _, moved = with_float32_vertices(scene)
     before, after = build_tables(scene), build_tables(rounded)
     corners = ShapeSizes(scene).leaves[0].table.vertices.reshape(-1, 3, 3)
     p = corners.mean(axis=1)

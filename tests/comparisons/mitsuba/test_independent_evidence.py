@@ -1,12 +1,21 @@
 """What Mitsuba renders is made of descriptions and other readers than ours, not of our tables."""
 
 import ast
+import dataclasses
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from builders import SCENES
 
 import comparisons.geometry
 import comparisons.mitsuba.translate
+from comparisons.compare.budget import Budget
+from comparisons.compare.compare import Subject, gather
+from reference_rt.core import transform
+from reference_rt.rendering.scene import Scene
+from reference_rt.shapes.meshes import mesh as meshes
 
 OURS = {"tabulate", "map_in", "tables", "read_mesh", "read_image", "read", "core.transform"}
 """Names of our tables, readers and maps."""
@@ -17,7 +26,7 @@ DERIVED |= {"uv.coefficients"}
 
 EXCEPTIONS = {
     "affine.py": {"core.transform"},  # the types of steps
-    "moved.py": {"tabulate", "core.transform"},  # where a mesh lies chooses the frame; the types
+    "moved.py": {"tabulate", "core.transform"},  # our side's vertices; the types of steps
     "lights.py": {"read_image"},  # digits beyond float32's, where Mitsuba's reader says the same
     "textures.py": {"read"},  # the same
     "sizes.py": {"tabulate"},  # sizes, of which bounds of errors are made
@@ -47,3 +56,33 @@ def test_no_table_and_no_reader_of_ours(path: Path) -> None:
 def test_exceptions_are_needed() -> None:
     by_name = {path.name: _names(path) for path in SOURCES}
     assert {name: by_name[name] for name in EXCEPTIONS} == EXCEPTIONS
+
+
+FAULTS: dict[str, tuple[str, Any, str, Any]] = {
+    "meshes too large": (
+        "mesh_knot", meshes, "read_mesh",
+        lambda data: dataclasses.replace(data, vertices=1.05 * data.vertices),
+    ),
+    "rotations backwards": ("transforms", transform, "rotate", transform.invert),
+    "left for right": (
+        "cornell_box", transform, "look_at", lambda m: m * np.array([-1.0, 1.0, 1.0, 1.0]),
+    ),
+}  # fmt: skip
+"""(scene, owner and name of a function of ours, what is done to its result)"""
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_faults_of_ours_are_not_in_what_mitsuba_renders(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without the rung `files`: the rays tell."""
+    which, owner, function, change = FAULTS[name]
+    right = getattr(owner, function)
+    monkeypatch.setattr(owner, function, lambda *given: change(right(*given)))
+    scene = Scene.load(SCENES / f"{which}.yaml")
+    subject = Subject(scene)
+    case = gather(
+        subject, Budget(pixels=40, replicates=2, spp=1), lambda step: None, 1, ("geometry",)
+    )
+    (found,) = [rung for rung in case.rungs if rung.name == "geometry"]
+    assert found.status == "differ", found.reason

@@ -80,6 +80,7 @@ PLANTED: dict[str, tuple[str, Callable[[Patch], None], str]] = {
         "is at",
     ),
     "corners turned": ("mesh_knot", _data(lambda d: {"faces": d.faces[:, [1, 2, 0]]}), "is at"),
+    "uv made up": ("mesh_knot", _data(lambda d: {"uv": d.vertices[:, :2]}), "finds none"),
     "normals lost": ("mesh_knot", _data(lambda d: {"normals": None}), "has the normal"),
     "normals by the matrix": (
         "stretched",
@@ -253,6 +254,21 @@ def test_smooth_normals(tmp_path: Path, monkeypatch: Patch) -> None:
 
     monkeypatch.setattr(vertex_normals, "_normals_and_angles", equally)
     assert "has the normal" in files(scene).reason
+
+
+@pytest.mark.parametrize("width", [1e-16, 1e-12, 1e-6])
+def test_smooth_normals_of_needles(width: float) -> None:
+    """Triangles of hardly any width have no normal that rounding leaves alone."""
+    rng = np.random.default_rng(5)
+    for _ in range(10):
+        points = rng.normal(size=(12, 3))
+        along = points[0] + (points[1] - points[0]) * rng.uniform(size=(4, 1))
+        points[4:8] = along + width * rng.normal(size=(4, 3))
+        faces = [rng.permutation(12)[:3].tolist() for _ in range(14)]
+        faces += [[0, 1, k] for k in range(4, 8)]
+        mesh = {"type": "mesh", "vertices": points.tolist(), "faces": faces, "smooth": True}
+        found = files(parsed(Path(), shapes=[mesh]))
+        assert found.status == "agree", found.reason
 
 
 def test_colours_of_vertices(monkeypatch: Patch) -> None:

@@ -75,6 +75,26 @@ class Soup:
             uvs = np.tile([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], (len(self.faces), 1))
         return Soup(positions, normals, uvs, self.colours, self.faces[:, [0, 2, 1]])
 
+    def at_corners(self) -> "Soup":
+        """The same with a vertex for each corner."""
+        at = self.faces.ravel()
+        normals, uvs, colours = (
+            None if column is None else column[at]
+            for column in (self.normals, self.uvs, self.colours)
+        )
+        return Soup(self.positions[at], normals, uvs, colours, numbers=self.numbers)
+
+    def is_like(self, other: "Soup") -> bool:
+        """Whether another one has the same numbers, but for some roundings of float64."""
+        for name in ("numbers", "positions", "normals", "uvs", "colours"):
+            a, b = getattr(self, name), getattr(other, name)
+            if a is None or b is None:
+                if a is not b:
+                    return False
+            elif a.shape != b.shape or np.abs(a - b).max() > 2.0**-44 * np.abs(a).max():
+                return False
+        return True
+
     def all_of_face(self, number: int) -> IntArray:
         """`Plugin.faces` of a mesh whose triangles are all one face of ours."""
         return np.full(len(self.faces), number)
@@ -115,7 +135,7 @@ class Soup:
 def _(shape: Triangle | Mesh, site: Site) -> list[Plugin]:
     key = ("triangles", id(shape))
     if key not in site.shared:
-        site.shared[key] = _soup(shape, site.place.folder)
+        site.shared[key] = soup_of(shape, site.place.folder)
     soup: Soup = site.shared[key]
     site = with_mesh_light(site, normals=soup.normals is not None)
     key = ("mesh", id(shape))
@@ -134,19 +154,22 @@ def placed(soup: Soup, key: Any, m: affine.Affine, mirrored: bool, site: Site) -
     return instance_of(str(key), lambda: soup.mesh(parts), m, site)
 
 
-def _soup(shape: Triangle | Mesh, folder: Path) -> Soup:
+def soup_of(shape: Triangle | Mesh, folder: Path) -> Soup:
     """The triangles of a description under its own transform, but for those without area."""
     mesh = described(shape, folder)
     edges = np.diff(mesh.points, axis=1)
     edges /= np.maximum(np.abs(edges).max(axis=(1, 2), keepdims=True), np.finfo(float).tiny)
     numbers = np.flatnonzero(np.cross(edges[:, 0], edges[:, 1]).any(axis=1))
-    columns = (mesh.points, mesh.normals, mesh.uv, mesh.colours)
-    rows = (None if c is None else c[numbers].reshape(-1, c.shape[2]) for c in columns)
+    points, normals, uv, colours = (
+        None if c is None else c[numbers].reshape(-1, c.shape[2])
+        for c in (mesh.points, mesh.normals, mesh.uv, mesh.colours)
+    )
+    assert points is not None
     m = affine.of_steps(shape.transform)
-    soup = Soup(*rows).moved(m, affine.mirrors(m))  # type: ignore[arg-type]
+    soup = Soup(points, None, uv, colours).moved(m, affine.mirrors(m))
     soup.numbers = numbers
-    if mesh.normals is not None:  # of its own transform: unit at the vertices, as in a file
-        soup.normals = affine.apply_normals(m, mesh.normals[numbers].reshape(-1, 3))
+    if normals is not None:  # under its own transform they are unit at the vertices
+        soup.normals = affine.apply_normals(m, normals)
     return soup
 
 
