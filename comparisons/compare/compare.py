@@ -232,7 +232,7 @@ def _gather(
 ) -> Evidence:
     """The same in the current variant of Mitsuba."""
     clock = time.perf_counter()
-    scene, judged_by, moved = with_float32_vertices(budgeted(subject.scene, budget))
+    scene, moved, theirs = with_float32_vertices(budgeted(subject.scene, budget))
     tables = build_tables(scene)
     seconds: dict[str, dict[str, float]] = {
         "candidate": {"load": time.perf_counter() - clock},
@@ -241,7 +241,8 @@ def _gather(
     left_out = _left_out(scene, tables)
     clock = time.perf_counter()
     if subject.reference is not None:
-        _, judged_by, _ = with_float32_vertices(budgeted(subject.reference, budget))
+        _, _, theirs = with_float32_vertices(budgeted(subject.reference, budget))
+    judged_by = theirs()
     own = _own_file(judged_by)
     try:
         counterpart = load(judged_by)

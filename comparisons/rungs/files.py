@@ -99,7 +99,7 @@ def files(scene: Scene) -> RungResult:
         return RungResult(
             "files", "not-applicable", "no file or shape has a second source", numbers
         )
-    facts = ", ".join(f"{count} {kind}" for kind, count in sorted(found.checked.items()))
+    facts = ", ".join(f"{kind} {count}" for kind, count in sorted(found.checked.items()))
     left_out = f"; without a second source: {', '.join(numbers['unread'])}"
     reason = f"as second sources say: {facts}{left_out if found.unread else ''}"
     return RungResult("files", "agree", reason, numbers)

@@ -1,6 +1,7 @@
 """A scene as float32 can hold it: in its counterpart's frame, every length scaled and every
 radiance unchanged; and with float32 vertices."""
 
+from collections.abc import Callable
 from functools import singledispatch
 from typing import Any
 
@@ -118,19 +119,19 @@ the triangles): beyond it the mesh would be another one, and the comparison is t
 precision.  The same hundredth as `geometry.frame.SHARE`."""
 
 
-def with_float32_vertices(scene: Scene) -> tuple[Scene, Scene, float]:
+def with_float32_vertices(scene: Scene) -> tuple[Scene, float, Callable[[], Scene]]:
     """The scene with the meshes and triangles that stand in it by themselves, not in groups or
-    solids, moved to the nearest float32 vertices of the counterpart's frame: for us, by our
-    tables, and for Mitsuba, by the second reader; and the largest distance by which a vertex moves,
-    0 if both scenes are as they were.
+    solids, moved to the nearest float32 vertices of the counterpart's frame; the largest distance
+    by which a vertex moves, 0 if the scene is as it was; and what makes the same of the second
+    reader's vertices, for Mitsuba.
 
     A mesh stays as it is where float32 is too coarse for it (SHARE), and where it cannot be used,
     for the error that `build_tables` raises.
     """
     if not any(isinstance(shape, Mesh | Triangle) for shape in scene.shapes):
-        return scene, scene, 0.0
+        return scene, 0.0, lambda: scene
     frame, largest = frame_of(scene), 0.0
-    ours, theirs = list(scene.shapes), list(scene.shapes)
+    shapes, changed = list(scene.shapes), {}
     for k, shape in enumerate(scene.shapes):
         if not isinstance(shape, Mesh | Triangle):
             continue
@@ -143,21 +144,26 @@ def with_float32_vertices(scene: Scene) -> tuple[Scene, Scene, float]:
             table = shape.tabulate(TabulationContext(folder=scene.folder, warn=warn))
         except ValueError:
             continue
-        own = _by_corners(table)
-        rounded, moved = _rounded(own, shape.material, frame)
+        rounded, moved = _rounded(_by_corners(table), shape.material, frame)
         if 0.0 < moved <= SHARE * _edge(table):
-            ours[k] = theirs[k] = rounded
-            second = soup_of(shape, scene.folder).at_corners()
-            if not own.is_like(second):
-                theirs[k] = _rounded(second, shape.material, frame)[0]
-            largest = max(largest, moved)
+            shapes[k], changed[k], largest = rounded, table, max(largest, moved)
             for message in warned:
                 scene.warn(message, "shapes", k)
-    if largest == 0.0:
-        return scene, scene, 0.0
-    found = scene.changed(shapes=tuple(ours))
-    same = all(one is other for one, other in zip(ours, theirs, strict=True))
-    return found, found if same else scene.changed(shapes=tuple(theirs)), largest
+    if not changed:
+        return scene, 0.0, lambda: scene
+    found = scene.changed(shapes=tuple(shapes))
+
+    def theirs() -> Scene:
+        same = True
+        for k, table in changed.items():
+            shape = scene.shapes[k]
+            assert isinstance(shape, Mesh | Triangle)
+            second = soup_of(shape, scene.folder).at_corners()
+            if not second.is_like(_by_corners(table)):
+                shapes[k], same = _rounded(second, shape.material, frame)[0], False
+        return found if same else scene.changed(shapes=tuple(shapes))
+
+    return found, largest, theirs
 
 
 def _by_corners(table: Triangles) -> Soup:
