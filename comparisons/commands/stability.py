@@ -51,13 +51,9 @@ def stability(
     Exact arithmetic and closed forms decide which answer is right.
     """
     with compare_extra():
-        from comparisons.experiments.stability.harness import table
-        from comparisons.experiments.stability.harness.core import Effort
-        from comparisons.experiments.stability.harness.display import Display
-        from comparisons.experiments.stability.harness.family import MODULES
-        from comparisons.experiments.stability.harness.family import family as family_of
-        from comparisons.experiments.stability.harness.page import write_page
-        from comparisons.experiments.stability.harness.results_json import again, write
+        from comparisons.experiments.stability.harness import outputs
+        from comparisons.experiments.stability.harness.core import MODULES, Effort, summaries
+        from comparisons.experiments.stability.harness.core import family as family_of
         from comparisons.experiments.stability.harness.run import (
             Choice,
             mitsuba_is_there,
@@ -95,24 +91,24 @@ def stability(
     where = Where(workers, scheduler, cluster)
     with (
         closing(where.open(Threads, os.cpu_count() or 1)) as opened,
-        Display(len(choice.settings())) as display,
+        outputs.Display(len(choice.settings())) as display,
     ):
         display.line(f"seed {seed}; Mitsuba {facts['mitsuba']}")
-        found = run(choice, out, opened, display.done, fresh).found
-        write(out, found, effort, seed, facts)
+        found = run(choice, out, opened, display.done, fresh)
+        outputs.write_results(out, found, effort, seed, facts)
         display.line("pictures and page")
         pictures = shoot(choice, found, out, opened)
-        write_page(page, found, pictures, effort, seed, facts)
+        outputs.write_page(page, found, pictures, effort, seed, facts)
     console = terminal.console()
-    console.print(table.terminal(found, console.width))
+    console.print(outputs.terminal(found, console.width))
     if markdown is not None:
-        templates.rewrite(markdown, "stability", table.markdown(found, effort, seed, facts))
+        templates.rewrite(markdown, "stability", outputs.markdown(found, effort, seed, facts))
     holds = True
-    for one in (s for some in table.summaries(found).values() for s in some):
+    for one in (s for some in summaries(found).values() for s in some):
         holds &= one.holds
         for f in one.found:
             if f.broken or f.x in one.failed:
-                say(f"again: {again(f, effort, seed)}", err=True)
+                say(f"again: {outputs.again(f, effort, seed)}", err=True)
                 for example in f.ours.examples if f.ours else ():
                     say(f"  {dict(example)}", err=True)
     say(f"{out / 'results.json'}, results.csv, stability.html", err=True)

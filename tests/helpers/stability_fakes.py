@@ -7,9 +7,18 @@ import time
 
 import numpy as np
 
-from comparisons.experiments.stability.harness import family, worker
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Outcome, Shot
-from comparisons.experiments.stability.harness.family import Family, Series, Sweep, alone, decades
+from comparisons.experiments.stability.harness import core, run
+from comparisons.experiments.stability.harness.core import (
+    MITSUBA,
+    OURS,
+    Family,
+    Outcome,
+    Series,
+    Shot,
+    Sweep,
+    alone,
+    decades,
+)
 
 METHOD = "sphere.algebraic"
 
@@ -78,10 +87,10 @@ def install():
         fake = type(module)(f"comparisons.experiments.stability.{name}")
         fake.FAMILY = one
         sys.modules[fake.__name__] = fake
-    family.MODULES.clear()
-    family.MODULES.update({name: name for name in FAMILIES})
+    core.MODULES.clear()
+    core.MODULES.update({name: name for name in FAMILIES})
 
 
 if __name__ == "__main__":
     install()
-    worker.main()
+    run.main()

@@ -3,8 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from comparisons.experiments.stability.harness.core import Draw, Outcome, generator
-from comparisons.experiments.stability.harness.family import family
+from comparisons.experiments.stability.harness.core import Draw, Outcome, family, generator
 
 
 def measured(

@@ -30,13 +30,16 @@ from comparisons.experiments.stability.harness.core import (
     MITSUBA,
     OURS,
     Draw,
+    Family,
     Outcome,
+    Series,
     Shot,
+    Sweep,
     U,
+    decades,
     outcome,
     together,
 )
-from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.harness.leaving import CONTACT, PIXELS, bound, lit, picture
 from comparisons.experiments.stability.harness.steps import matrix
 from comparisons.geometry import frame

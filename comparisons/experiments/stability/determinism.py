@@ -30,8 +30,16 @@ import numpy as np
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
 from comparisons.experiments.stability.harness.bits import MAKES, on_threads, over, same_bits
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
-from comparisons.experiments.stability.harness.family import Family, Series, Sweep
+from comparisons.experiments.stability.harness.core import (
+    MITSUBA,
+    OURS,
+    Draw,
+    Family,
+    FloatArray,
+    Outcome,
+    Series,
+    Sweep,
+)
 from comparisons.mitsuba.backend import LLVM, SCALAR, backend, variant
 from comparisons.mitsuba.scene import picture
 from comparisons.mitsuba.translate import load

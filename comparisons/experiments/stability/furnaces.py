@@ -39,7 +39,10 @@ from comparisons.experiments.stability.harness.core import (
     MITSUBA,
     OURS,
     Draw,
+    Family,
     Outcome,
+    Series,
+    Sweep,
     of_errors,
     one_case,
     plain,
@@ -47,7 +50,6 @@ from comparisons.experiments.stability.harness.core import (
     unit_of,
 )
 from comparisons.experiments.stability.harness.densities import integral
-from comparisons.experiments.stability.harness.family import Family, Series, Sweep
 from comparisons.experiments.stability.harness.worlds import closed, measure, ours, shells, theirs
 from reference_rt.materials import Material
 

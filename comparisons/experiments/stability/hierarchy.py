@@ -31,11 +31,14 @@ from comparisons.experiments.stability.harness.core import (
     OURS,
     Draw,
     Effort,
+    Family,
     FloatArray,
     Outcome,
+    Series,
+    Sweep,
+    decades,
     outcome,
 )
-from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.harness.meshes import cube, write
 from comparisons.experiments.stability.harness.steps import any_turn, at, scaled
 from comparisons.geometry.exact.dyadic import BoolArray

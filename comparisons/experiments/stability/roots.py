@@ -31,12 +31,15 @@ import numpy as np
 from comparisons.experiments.stability.harness.core import (
     OURS,
     Draw,
+    Family,
     FloatArray,
     Outcome,
+    Series,
+    Sweep,
     U,
+    decades,
     outcome,
 )
-from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.harness.steps import Rays
 from comparisons.geometry.exact.curved import torus_quartic
 from comparisons.geometry.exact.dyadic import CERTAIN, BoolArray, Dyadic

@@ -30,13 +30,16 @@ from comparisons.experiments.stability.harness.core import (
     MITSUBA,
     OURS,
     Draw,
+    Family,
     FloatArray,
     Outcome,
+    Series,
     Shot,
+    Sweep,
+    decades,
     outcome,
     together,
 )
-from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.harness.meshes import (
     AWAY,
     Closed,

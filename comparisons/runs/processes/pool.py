@@ -1,10 +1,10 @@
 """Requests carried out by child processes, on this machine or on those of a cluster: one that dies
 or hangs is replaced, and the others go on."""
 
-import functools
 import json
 import queue
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Generator, Hashable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,6 +42,7 @@ def run(
     seconds: float,
     progress: Callable[[R, str], None],
     module: Sequence[str],
+    kin: Callable[[R], Hashable] = lambda request: None,
 ) -> Generator[Outcome[R], None, None]:
     """Have requests carried out, and yield outcomes as they come.
 
@@ -49,11 +50,12 @@ def run(
     workers have child processes of their own and send back the files that these write;  seconds:
     time limit of a request;  progress: called with a request and what is being done for it, ""
     when it begins; steps are not reported by clusters;  module: of a worker that keeps to
-    `protocol`, and options of its command line.  Closing the iterator ends the processes of this
-    machine.  Raises ReferenceUnavailableError where none can be carried out; WorkersError.
+    `protocol`, and options of its command line;  kin: requests of equal kin need the same kernels:
+    on this machine they follow each other, see `_Turns`.  Closing the iterator ends the processes
+    of this machine.  Raises ReferenceUnavailableError where none can be carried out; WorkersError.
     """
     if isinstance(workers, Threads):
-        with closing(_run_here(requests, workers, seconds, progress, module)) as found:
+        with closing(_run_here(requests, workers, seconds, progress, module, kin)) as found:
             yield from found
         return
     folder, sources = str(Path.cwd()), everything_fingerprint()
@@ -71,13 +73,41 @@ def run(
             yield Outcome(**vars(ended), request=request)
 
 
+class _Turns(Generic[R]):
+    """Hands out requests such that as few of one kin as possible run at the same time: two
+    processes would both compile the kernels that the first one stores for the others.  A kin that
+    has begun comes before others, so that it goes on in the process that has its kernels."""
+
+    def __init__(self, requests: Sequence[R], kin: Callable[[R], Hashable]) -> None:
+        self._kin, self._left = kin, list(requests)
+        self._running: Counter[Hashable] = Counter()
+        self._begun: set[Hashable] = set()
+
+    def __iter__(self) -> Iterator[tuple[R]]:
+        while self._left:
+            request = self._left.pop(min(range(len(self._left)), key=self._rank))
+            kin = self._kin(request)
+            self._running[kin] += 1
+            self._begun.add(kin)
+            yield (request,)
+
+    def ended(self, request: R) -> None:
+        self._running[self._kin(request)] -= 1
+
+    def _rank(self, number: int) -> tuple[int, bool]:
+        kin = self._kin(self._left[number])
+        return self._running[kin], kin not in self._begun
+
+
 def _run_here(
     requests: Sequence[R],
     workers: Threads,
     seconds: float,
     progress: Callable[[R, str], None],
     module: Sequence[str],
+    kin: Callable[[R], Hashable],
 ) -> Generator[Outcome[R], None, None]:
+    turns = _Turns(requests, kin)
     steps: queue.SimpleQueue[tuple[R, str]] = queue.SimpleQueue()
 
     def watch() -> None:
@@ -86,18 +116,21 @@ def _run_here(
 
     with closing(Children()) as children:
 
-        def carry_out(request: R) -> Ended:
-            say = functools.partial(_put, steps, request)
-            return children.carry_out(tuple(module), "", request.model_dump_json(), seconds, say)
+        def carry_out(request: R) -> Outcome[R]:
+            ended = children.carry_out(
+                tuple(module),
+                "",
+                request.model_dump_json(),
+                seconds,
+                lambda step: steps.put((request, step)),
+            )
+            return Outcome(**vars(ended), request=request)
 
-        with closing(run_all(workers, carry_out, zip(requests), watch)) as results:
-            for number, ended in results:
+        with closing(run_all(workers, carry_out, turns, watch)) as results:
+            for _, outcome in results:
                 watch()
-                yield Outcome(**vars(ended), request=requests[number])
-
-
-def _put(steps: "queue.SimpleQueue[tuple[R, str]]", request: R, step: str) -> None:
-    steps.put((request, step))
+                turns.ended(outcome.request)
+                yield outcome
 
 
 # ---- on other machines --------------------------------------------------------------------------

@@ -10,11 +10,15 @@ is a message about it:
     {"unavailable": text}  nothing can be made here, and why
 """
 
+import faulthandler
 import json
 import os
+import sys
 import traceback
 from collections.abc import Callable
-from typing import Any, TextIO
+from typing import Any, TextIO, TypeVar
+
+from pydantic import BaseModel
 
 from reference_rt.util.errors import ReferenceRtError, ReferenceUnavailableError, SceneError
 
@@ -49,3 +53,15 @@ def carry_out(task: Callable[[], None], answers: TextIO) -> None:
         send(answers, failed=f"{type(error).__name__}: {' '.join(str(error).split())}")
     else:
         send(answers, done=True)
+
+
+M = TypeVar("M", bound=BaseModel)
+
+
+def serve(kind: type[M], task: Callable[[M], None]) -> None:
+    """Carry out requests of this kind until standard input ends."""
+    faulthandler.enable()
+    answers = private_stdout()
+    for line in sys.stdin:
+        request = kind.model_validate_json(line)
+        carry_out(lambda request=request: task(request), answers)  # type: ignore[misc]

@@ -16,15 +16,24 @@ from builders import HELPERS
 from typer.testing import CliRunner
 
 from comparisons.commands import register
-from comparisons.experiments.stability.harness import family, run, table
-from comparisons.experiments.stability.harness.core import OURS, Found, Outcome, generator, outcome
-from comparisons.experiments.stability.harness.family import Family, Series, Sweep
-from comparisons.experiments.stability.harness.table import summarise
+from comparisons.experiments.stability.harness import core, outputs, run
+from comparisons.experiments.stability.harness.core import (
+    OURS,
+    Family,
+    Found,
+    Outcome,
+    Series,
+    Sweep,
+    generator,
+    outcome,
+)
+from comparisons.experiments.stability.harness.outputs import summarise
+from comparisons.runs.engine import store
 
 
 @pytest.fixture
 def fakes(monkeypatch):
-    monkeypatch.setattr(family, "MODULES", dict(family.MODULES))
+    monkeypatch.setattr(core, "MODULES", dict(core.MODULES))
     monkeypatch.setattr(run, "WORKER", ("stability_fakes",))
     before = os.environ.get("PYTHONPATH", "")
     monkeypatch.setenv("PYTHONPATH", f"{HELPERS}{os.pathsep}{before}".rstrip(os.pathsep))
@@ -203,13 +212,13 @@ def test_a_lead_that_is_too_small_must_be_explained():
         assert one.further == 2.0
         assert one.holds
         assert one.unexplained == (not explained)
-        assert table.where(one, OURS) == "holds to float64's end, 4"
-        assert table.where(one, "mitsuba") == "fails from 4 on"
+        assert outputs.where(one, OURS) == "holds to float64's end, 4"
+        assert outputs.where(one, "mitsuba") == "fails from 4 on"
 
 
 def test_found_is_read_with_its_key_alone(tmp_path):
     found = Found("T", "far", 0.1, {OURS: Outcome(2, 1, math.inf, 0, ({"t": "inf"},))}, 1.5)
-    found.write(tmp_path / "x.json", "key")
+    store(tmp_path / "x.json", "key", found)
     assert Found.read(tmp_path / "x.json", "key") == found
     assert Found.read(tmp_path / "x.json", "other") is None
     assert Found.read(tmp_path / "y.json", "key") is None

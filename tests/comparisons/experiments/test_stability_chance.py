@@ -18,9 +18,9 @@ from comparisons.experiments.stability.harness.core import (
     Draw,
     FloatArray,
     Outcome,
+    family,
     generator,
 )
-from comparisons.experiments.stability.harness.family import family
 from comparisons.experiments.stability.harness.worlds import judge
 from comparisons.experiments.stability.radiometry import lights as f12_lamps
 

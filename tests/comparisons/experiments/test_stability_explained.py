@@ -5,10 +5,16 @@ import importlib
 import pytest
 from stability_runs import measured
 
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS
-from comparisons.experiments.stability.harness.family import MODULES, family
+from comparisons.experiments.stability.harness.core import (
+    FURTHER,
+    MITSUBA,
+    MODULES,
+    OURS,
+    SeriesSummary,
+    family,
+    summarise,
+)
 from comparisons.experiments.stability.harness.run import Choice, mitsuba_is_there, run
-from comparisons.experiments.stability.harness.table import FURTHER, SeriesSummary, summarise
 
 # Cases have triangles without area on purpose: what a mesh leaves out is no news here.
 pytestmark = pytest.mark.filterwarnings("ignore::reference_rt.util.errors.SceneWarning")

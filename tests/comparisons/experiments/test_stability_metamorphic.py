@@ -11,8 +11,7 @@ import pytest
 import reference_rt as rt
 from comparisons.experiments.stability import metamorphic as f09_metamorphic
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw
-from comparisons.experiments.stability.harness.family import family
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, family
 from comparisons.experiments.stability.harness.meshes import write_obj
 from comparisons.experiments.stability.metamorphic import light, rays
 from comparisons.experiments.stability.metamorphic import motion as f09_motion

@@ -32,7 +32,7 @@ from comparisons.experiments.stability.bsdfs.samples import (
     MATCHED,
     ROUGHNESS,
 )
-from comparisons.experiments.stability.harness.family import Family
+from comparisons.experiments.stability.harness.core import Family
 
 # ---- the series ----------------------------------------------------------------------------------
 

@@ -15,6 +15,9 @@ from comparisons.experiments.stability.harness.core import (
     Draw,
     FloatArray,
     Outcome,
+    Series,
+    Sweep,
+    decades,
     hexed,
     of_errors,
     plain,
@@ -22,7 +25,6 @@ from comparisons.experiments.stability.harness.core import (
     together,
     unit_of,
 )
-from comparisons.experiments.stability.harness.family import Series, Sweep, decades
 from comparisons.geometry.frame import round32
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays

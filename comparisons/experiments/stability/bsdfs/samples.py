@@ -23,6 +23,9 @@ from comparisons.experiments.stability.harness.core import (
     Draw,
     FloatArray,
     Outcome,
+    Series,
+    Sweep,
+    decades,
     hexed,
     of_errors,
     one_case,
@@ -31,7 +34,6 @@ from comparisons.experiments.stability.harness.core import (
     unit_of,
 )
 from comparisons.experiments.stability.harness.densities import fit
-from comparisons.experiments.stability.harness.family import Series, Sweep, decades
 from reference_rt.materials import (
     Conductor,
     Dielectric,

@@ -32,8 +32,16 @@ import numpy as np
 
 from comparisons.experiments.stability.far import curved, spheres
 from comparisons.experiments.stability.far.curved import shoot
-from comparisons.experiments.stability.harness.core import Draw, FloatArray, Outcome, together
-from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
+from comparisons.experiments.stability.harness.core import (
+    Draw,
+    Family,
+    FloatArray,
+    Outcome,
+    Series,
+    Sweep,
+    decades,
+    together,
+)
 
 # ---- the series ----------------------------------------------------------------------------------
 

@@ -12,8 +12,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray
-from comparisons.experiments.stability.harness.family import Sweep
+from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Sweep
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from comparisons.mitsuba.translate.materials import translate_material

@@ -1,29 +1,62 @@
-"""Measures the sweep points of families in worker processes; reads those that are stored."""
+"""Measures the sweep points of families in worker processes, and makes images of failures; as a
+module it is the process, because extreme numbers crash native libraries."""
 
-import hashlib
-import json
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
-from dataclasses import dataclass, field
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
+from pydantic import BaseModel, ConfigDict
 
-from comparisons.experiments.stability.harness.core import OURS, Effort, Found
-from comparisons.experiments.stability.harness.family import Family, Series, family
-from comparisons.experiments.stability.harness.table import contestants, summarise
-from comparisons.experiments.stability.harness.worker import Request
+from comparisons.experiments.stability.harness.core import (
+    OURS,
+    Draw,
+    Effort,
+    Family,
+    Found,
+    Series,
+    contestants,
+    family,
+    generator,
+    summarise,
+)
 from comparisons.mitsuba.backend import backend
-from comparisons.runs.processes import pool
+from comparisons.runs import engine
+from comparisons.runs.processes.protocol import serve
 from comparisons.runs.provenance import everything_fingerprint
-from reference_rt.util.errors import ReferenceUnavailableError
+from reference_rt.util.errors import ReferenceUnavailableError, SceneWarning
+from reference_rt.util.files import replacing, temporary_folder
 from reference_rt.util.workers import Workers
 
-WORKER = ("comparisons.experiments.stability.harness.worker",)
+WORKER = ("comparisons.experiments.stability.harness.run",)
 
 SECONDS = {"quick": 300.0, "full": 1200.0}
 """Time limit of a point: many times what the slowest takes with cold kernels."""
+
+
+class Request(BaseModel):
+    """A sweep point to measure, or, where `shoot` names a contestant, to make an image of.
+
+    out: the file of the result, or of the image, a .png that holds its caption;  key: fingerprint
+    that is stored with it.
+    """
+
+    model_config = ConfigDict(extra="forbid")
+    output: ClassVar[str] = "out"
+
+    family: str
+    series: str
+    x: float
+    seed: int
+    effort: Effort
+    mitsuba: bool
+    out: Path
+    key: str
+    shoot: str = ""
 
 
 @dataclass(frozen=True)
@@ -50,6 +83,15 @@ class Choice:
             for x in ((self.at,) if self.at is not None else series.settings(self.effort))
         ]
 
+    def request(self, one: str, series: str, x: float, out: Path, shoot: str = "") -> Request:
+        """out: the folder of the run."""
+        name = f"{x!r}_{shoot.replace(' ', '_')}.png" if shoot else f"{x!r}.json"
+        folder = out / ("pictures" if shoot else "settings") / one / series.replace(" ", "_")
+        common = {"effort": self.effort, "seed": self.seed, "mitsuba": self.mitsuba}
+        key = engine.key_of(sources=everything_fingerprint(), **common)
+        place = {"family": one, "series": series, "x": x}
+        return Request(**common, **place, out=folder / name, key=key, shoot=shoot)
+
 
 class Picture(NamedTuple):
     """A stored image of a failure: whose, at which x, the file, and its caption."""
@@ -60,14 +102,6 @@ class Picture(NamedTuple):
     x: float
     path: Path
     caption: str
-
-
-@dataclass
-class Run:
-    """The results, in the order of the sweep points."""
-
-    found: list[Found] = field(default_factory=list)
-    pictures: list[Picture] = field(default_factory=list)
 
 
 Report = Callable[[Found, str], None]
@@ -83,54 +117,53 @@ def mitsuba_is_there() -> str:
     return ""
 
 
-def key_of(effort: Effort, seed: int) -> str:
-    """Fingerprint: a stored result is valid where sources, versions, effort and seed are these."""
-    parts = {"sources": everything_fingerprint(), "effort": effort, "seed": seed}
-    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
-
-
-def run(choice: Choice, out: Path, workers: Workers, report: Report, fresh: bool = False) -> Run:
+def run(
+    choice: Choice, out: Path, workers: Workers, report: Report, fresh: bool = False
+) -> list[Found]:
     """Measure what is not stored yet; each result is stored in `out`/settings at once."""
-    key = f"{key_of(choice.effort, choice.seed)} {choice.mitsuba}"
-    settings = choice.settings()
-    known: dict[tuple[str, str, float], Found] = {}
-    requests = []
-    for one, series, x in settings:
-        request = _request(choice, one.id, series.name, x, out / "settings", key)
-        done = None if fresh else Found.read(request.out, key)
-        if done is None:
-            requests.append(request)
-        else:
-            known[one.id, series.name, x] = done
-            report(done, "measured before")
-    for found in _measured(requests, workers, choice.effort):
-        known[found.family, found.series, found.x] = found
-        report(found, f"{found.seconds:.1f} s")
-    return Run([known[one.id, series.name, x] for one, series, x in settings])
+    requests = [choice.request(one.id, s.name, x, out) for one, s, x in choice.settings()]
+    known: dict[Path, Found] = {}
+    limit = SECONDS[choice.effort]
+    for request, found, ended in engine.measured(
+        requests, _found, workers, limit, WORKER, fresh=fresh, kin=_family
+    ):
+        if found is None:
+            assert ended is not None
+            why = ended.failure or "its file cannot be read"
+            found = Found(request.family, request.series, request.x, {}, ended.wall, why)
+        known[request.out] = found
+        report(found, f"{found.seconds:.1f} s" if ended else "measured before")
+    return [known[request.out] for request in requests]
+
+
+def _found(request: Request) -> Found | None:
+    return Found.read(request.out, request.key)
+
+
+def _family(request: Request) -> str:
+    """Its points share kernels."""
+    return request.family
 
 
 def shoot(choice: Choice, found: Sequence[Found], out: Path, workers: Workers) -> list[Picture]:
     """Images of each series at the first x at which the first contestant other than ours fails and
     its image differs from ours: both."""
-    key = f"{key_of(choice.effort, choice.seed)} {choice.mitsuba}"
     left = _failing(choice, found)
     seen: list[Picture] = []
     while left:
         pairs = {}
         for (one, series), (who, places) in left.items():
-            at = (one, series, places.pop(0), out / "pictures", key)
-            pairs[one, series] = [_request(choice, *at, name) for name in (who, OURS)]
-        wanted = [r for pair in pairs.values() for r in pair if _caption(r.out, key) is None]
-        limit = SECONDS["full"]
-        with closing(pool.run(wanted, workers, limit, lambda *_: None, WORKER)) as running:
-            for _ in running:
-                pass
+            x = places.pop(0)
+            pairs[one, series] = [choice.request(one, series, x, out, w) for w in (who, OURS)]
+        wanted = [request for pair in pairs.values() for request in pair]
+        made = engine.measured(wanted, _caption, workers, SECONDS["full"], WORKER, kin=_family)
+        captions = {request.out: caption for request, caption, _ in made}
         for place, pair in pairs.items():
-            captions = [_caption(request.out, key) for request in pair]
-            if None not in captions and _differ(*(request.out for request in pair)):
+            told = [captions[request.out] for request in pair]
+            if None not in told and _differ(*(request.out for request in pair)):
                 seen += [
                     Picture(*place, request.shoot, request.x, request.out, str(caption))
-                    for request, caption in zip(pair, captions, strict=True)
+                    for request, caption in zip(pair, told, strict=True)
                 ]
                 del left[place]
         left = {place: some for place, some in left.items() if some[1]}
@@ -161,41 +194,48 @@ def _differ(a: Path, b: Path) -> bool:
         return one.tobytes() != other.tobytes()
 
 
-def _caption(path: Path, key: str) -> str | None:
+def _caption(request: Request) -> str | None:
     """The caption of a stored image; None where there is none of this key."""
     try:
-        with Image.open(path) as picture:
+        with Image.open(request.out) as picture:
             facts = dict(picture.info)
     except (OSError, ValueError):
         return None
-    return str(facts["caption"]) if facts.get("key") == key and "caption" in facts else None
+    return facts.get("caption") if facts.get("key") == request.key else None
 
 
-def _request(
-    choice: Choice, one: str, series: str, x: float, folder: Path, key: str, shoot: str = ""
-) -> Request:
-    name = f"{x!r}_{shoot.replace(' ', '_')}.png" if shoot else f"{x!r}.json"
-    return Request(
-        family=one,
-        series=series,
-        x=x,
-        seed=choice.seed,
-        effort=choice.effort,
-        mitsuba=choice.mitsuba,
-        out=folder / one / series.replace(" ", "_") / name,
-        key=key,
-        shoot=shoot,
-    )
+# ---- the process --------------------------------------------------------------------------------
 
 
-def _measured(requests: Sequence[Request], workers: Workers, effort: Effort) -> Iterator[Found]:
-    running = pool.run(requests, workers, SECONDS[effort], lambda *_: None, WORKER)
-    with closing(running):
-        for outcome in running:
-            request = outcome.request
-            found = None if outcome.failure else Found.read(request.out, request.key)
-            if found is None:
-                why = outcome.failure or "its file cannot be read"
-                place = (request.family, request.series, request.x)
-                found = Found(*place, {}, outcome.wall, why)
-            yield found
+def carry_out(request: Request) -> None:
+    """Measure a sweep point and store the result, or make an image of a failure and store that."""
+    series = family(request.family).by_name[request.series]
+    if request.shoot:
+        assert series.shoot is not None
+        shot = series.shoot(request.shoot, request.x)
+        facts = PngInfo()
+        facts.add_text("caption", shot.caption)
+        facts.add_text("key", request.key)
+        with replacing(request.out) as temporary:
+            Image.fromarray(shot.pixels).save(temporary, pnginfo=facts)
+        return
+    start, place = time.perf_counter(), (request.family, request.series, request.x)
+    with temporary_folder() as folder:
+        rng, cases = generator(request.seed, *place), series.cases[request.effort]
+        draw = Draw(rng, cases, request.mitsuba, folder, request.effort)
+        outcomes = series.measure(draw, request.x)
+    if OURS not in outcomes:
+        raise RuntimeError(f"{request.family} {request.series}: nothing was said about ours")
+    found = Found(*place, dict(outcomes), time.perf_counter() - start)
+    engine.store(request.out, request.key, found)
+
+
+def main() -> None:
+    """Carry out requests until standard input ends."""
+    # Cases have triangles without area on purpose: what a mesh leaves out is no news here.
+    warnings.simplefilter("ignore", SceneWarning)
+    serve(Request, carry_out)
+
+
+if __name__ == "__main__":
+    main()

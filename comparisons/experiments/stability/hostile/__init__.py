@@ -32,8 +32,16 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.core import EXAMPLES, MITSUBA, OURS, Draw, Outcome
-from comparisons.experiments.stability.harness.family import Family, Series, Sweep
+from comparisons.experiments.stability.harness.core import (
+    EXAMPLES,
+    MITSUBA,
+    OURS,
+    Draw,
+    Family,
+    Outcome,
+    Series,
+    Sweep,
+)
 from comparisons.experiments.stability.hostile import rays
 from comparisons.experiments.stability.hostile.bases import (
     BASES,

@@ -11,8 +11,16 @@ from functools import cache
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Outcome, outcome
-from comparisons.experiments.stability.harness.family import Series, Sweep, alone
+from comparisons.experiments.stability.harness.core import (
+    OURS,
+    Draw,
+    FloatArray,
+    Outcome,
+    Series,
+    Sweep,
+    alone,
+    outcome,
+)
 from comparisons.experiments.stability.hostile.bases import BASES, write_files
 from comparisons.experiments.stability.hostile.damage import NUMBERS, as_text
 from comparisons.geometry.exact.dyadic import BoolArray

@@ -44,11 +44,14 @@ from comparisons.experiments.stability.harness.core import (
     MITSUBA,
     OURS,
     Draw,
+    Family,
     Outcome,
+    Series,
     Shot,
+    Sweep,
+    decades,
     pixel_grid,
 )
-from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.harness.leaving import EPSILON, PIXELS, lit, picture
 from comparisons.experiments.stability.leaving import mitsuba
 from comparisons.experiments.stability.leaving.judge import Judge, Tally

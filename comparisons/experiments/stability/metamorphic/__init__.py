@@ -36,8 +36,17 @@ import numpy.typing as npt
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
 from comparisons.experiments.stability.harness.bits import same_bits
-from comparisons.experiments.stability.harness.core import OURS, Draw, FloatArray, Shot, together
-from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
+from comparisons.experiments.stability.harness.core import (
+    OURS,
+    Draw,
+    Family,
+    FloatArray,
+    Series,
+    Shot,
+    Sweep,
+    decades,
+    together,
+)
 from comparisons.experiments.stability.metamorphic import light, rays
 from comparisons.experiments.stability.metamorphic.motion import (
     MIRRORS,

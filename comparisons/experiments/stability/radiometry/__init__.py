@@ -24,7 +24,7 @@ Passes.  No failure.
 
 `lights`: points and spots, and rendered pictures of lamps; `solid_angles`: densities."""
 
-from comparisons.experiments.stability.harness.family import Family
+from comparisons.experiments.stability.harness.core import Family
 from comparisons.experiments.stability.radiometry.lights import (
     AREA,
     DISTANCE,

@@ -13,13 +13,15 @@ from comparisons.experiments.stability.harness.core import (
     Draw,
     FloatArray,
     Outcome,
+    Series,
+    Sweep,
+    decades,
     hexed,
     of_errors,
     plain,
     together,
     unit_of,
 )
-from comparisons.experiments.stability.harness.family import Series, Sweep, decades
 from comparisons.experiments.stability.harness.steps import at, scaled, turned
 from comparisons.experiments.stability.harness.worlds import World, closed, grey, measure
 from comparisons.geometry.frame import round32

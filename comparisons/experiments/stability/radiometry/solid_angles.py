@@ -14,13 +14,15 @@ from comparisons.experiments.stability.harness.core import (
     Draw,
     FloatArray,
     Outcome,
+    Series,
+    Sweep,
+    decades,
     of_errors,
     plain,
     relative,
     together,
     unit_of,
 )
-from comparisons.experiments.stability.harness.family import Series, Sweep, decades
 from comparisons.experiments.stability.harness.meshes import mitsuba_mesh
 from comparisons.geometry.frame import round32
 from comparisons.geometry.vectors import unit_vectors

@@ -29,13 +29,16 @@ from comparisons.experiments.stability.harness.core import (
     MITSUBA,
     OURS,
     Draw,
+    Family,
     FloatArray,
     Outcome,
+    Series,
     Shot,
+    Sweep,
+    decades,
     pixel_grid,
     together,
 )
-from comparisons.experiments.stability.harness.family import Family, Series, Sweep, decades
 from comparisons.experiments.stability.harness.mitsubas import traced
 from comparisons.experiments.stability.slivers.judge import (
     SHAPES,

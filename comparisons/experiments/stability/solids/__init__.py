@@ -39,15 +39,18 @@ from comparisons.experiments.stability.harness import solids
 from comparisons.experiments.stability.harness.core import (
     OURS,
     Draw,
+    Family,
     FloatArray,
     Outcome,
+    Series,
     Shot,
+    Sweep,
+    alone,
     hexed,
     outcome,
     pixel_grid,
     together,
 )
-from comparisons.experiments.stability.harness.family import Family, Series, Sweep, alone
 from comparisons.experiments.stability.harness.meshes import write_smallest_ball
 from comparisons.experiments.stability.harness.solids import INSIDE_TESTS, INTERVALS, LISTS, Truth
 from comparisons.experiments.stability.harness.steps import at, scaled, turned, vector

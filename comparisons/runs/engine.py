@@ -1,0 +1,99 @@
+"""The engine of experiments: what is stored is read, the rest is measured and stored, and counted.
+
+What they have in common: an experiment is a list of requests.  Each has a key, the hash of all that
+its result depends on, and a place of its own in the output folder.  What is stored there with this
+key is read; everything else is measured, in worker processes that may crash or hang (`processes`),
+and each result is stored, whole, as soon as it is there, so that a run that was interrupted goes
+on.  Tables, results and the page are written from all of them, each whole or not at all.
+
+What differs is the experiment's own: what its requests ask for, what a result holds and the file
+that it is in, what becomes of a request that failed, and what is shown.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from contextlib import closing, suppress
+from pathlib import Path
+from typing import Any, TypeVar
+
+from rich.console import Console
+from rich.progress import MofNCompleteColumn, TimeElapsedColumn
+
+from comparisons.results.files import plain, sealed, unsealed
+from comparisons.runs.processes import pool
+from comparisons.runs.processes.child import Ended
+from comparisons.runs.processes.pool import R
+from reference_rt.util.console import Bar
+from reference_rt.util.files import read_text, replacing
+from reference_rt.util.workers import Workers
+
+T = TypeVar("T")
+
+
+def key_of(**parts: Any) -> str:
+    """SHA-256 of what a result depends on."""
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def store(path: Path, key: str, value: Any) -> None:
+    """Store a result in a file, whole or not at all.
+
+    value: of JSON's and NumPy's types, and dataclasses; infinity and NaN too: no other program
+    reads the file.
+    """
+    document = sealed({"key": key, "value": plain(value, lambda number: number)})
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(document, indent=1), encoding="utf-8")
+
+
+def stored(path: Path, key: str) -> Any:
+    """The result in a file; None where there is none of this key, or the file is damaged."""
+    with suppress(OSError, ValueError, KeyError, RecursionError):
+        document = unsealed(json.loads(read_text(path)))
+        return document["value"] if document["key"] == key else None
+    return None
+
+
+def measured(
+    requests: Sequence[R],
+    read: Callable[[R], T | None],
+    workers: Workers,
+    seconds: float,
+    module: Sequence[str],
+    *,
+    fresh: bool = False,
+    kin: Callable[[R], Hashable] = lambda request: None,
+    doing: Callable[[R, str], None] = lambda request, step: None,
+) -> Iterator[tuple[R, T | None, Ended | None]]:
+    """(request, result, how its process ended): of those that are stored first, with None for the
+    last; then of the others as they are measured, with None for the result of one that failed.
+
+    read: the stored result of a request, None where there is none;  fresh: measure all;  the others
+    as `pool.run` has them.
+    """
+    left = []
+    for request in requests:
+        found = None if fresh else read(request)
+        if found is None:
+            left.append(request)
+        else:
+            yield request, found, None
+    with closing(pool.run(left, workers, seconds, doing, module, kin)) as running:
+        for ended in running:
+            yield ended.request, None if ended.failure else read(ended.request), ended
+
+
+class Count(Bar):
+    """Shows on standard error how many results there are, of how many; None: of any number."""
+
+    def __init__(self, total: int | None, console: Console | None = None) -> None:
+        super().__init__(MofNCompleteColumn(), TimeElapsedColumn(), console=console)
+        self._task = self._bar.add_task("", total=total)
+
+    def count(self, words: str, line: str = "", always: bool = True) -> None:
+        """One more.  words: beside the bar;  line: printed, if not `always`, then only where there
+        is no bar."""
+        self._bar.update(self._task, advance=1, description=words)
+        if line and (always or not self.is_terminal):
+            self.line(line)
