@@ -6,6 +6,6 @@ states the law (what must hold), the range, the counts of cases and what passes;
 extreme) and a `measure(draw, x)` that returns an `Outcome` for each contestant: ours, Mitsuba,
 textbook methods. Ours must not fail at any x within the series' guaranteed range (`holds_to`).
 
-To add a family: a module and a line in `harness/family.py`.  Families do not
+To add a family: a module and a line in `harness/core.py`.  Families do not
 import each other: what two of them use lives in `harness`.
 """

@@ -20,6 +20,7 @@ import importlib
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -43,7 +44,7 @@ from comparisons.experiments.stability.harness.core import (
 from comparisons.mitsuba.backend import LLVM, SCALAR, backend, variant
 from comparisons.mitsuba.scene import picture
 from comparisons.mitsuba.translate import load
-from reference_rt.rendering.tiles import render_tile
+from reference_rt.rendering.executor import Prepared
 from reference_rt.util.child_processes import tied
 
 # ---- pictures in bands, in parts by several processes, and in plain Python -----------------------
@@ -51,34 +52,20 @@ from reference_rt.util.child_processes import tied
 
 Outcomes = dict[str, Outcome]
 
-_band: Any = render_tile
 
-
-def _job(scene: rt.Scene) -> tuple[Any, FloatArray]:
-    """The arguments of `render_tile` before its sums, and these, (n, 3)."""
-    film, sampler, integrator = scene.film, scene.resolved_sampler, scene.integrator
-    assert not isinstance(integrator, rt.RayCast)
-    shape = (film.width, film.height)
-    out = np.zeros((film.width * film.height, 3))
-    arguments = (
-        integrator.setup(),
-        rt.build_tables(scene),
-        scene.camera.setup(*shape),
-        film.filter.setup(),
-        sampler.setup(),
-        shape,
-    )
-    return arguments, out
-
-
-def _add(arguments: Any, out: FloatArray, begin: int, end: int, first: int, last: int) -> None:
-    """Add samples first to last - 1 of these pixels to their sums."""
-    _band(*arguments, out[begin:end], None, begin, end, first, last)
+def _summed(scene: rt.Scene) -> tuple[Callable[..., None], FloatArray]:
+    """What adds samples first to last - 1 of pixels begin to end - 1 to their sums, called with
+    these four, by the kernel that renders the scene;  the sums (n, 3)."""
+    kernel = Prepared(scene, threads=1, specialised=False).running.run(0)
+    sums = np.zeros((scene.film.width * scene.film.height, 3))
+    return lambda begin, end, *samples: kernel(
+        {"colour": sums[begin:end]}, begin, end, *samples
+    ), sums
 
 
 def in_bands(scene: rt.Scene, size: int, rng: np.random.Generator) -> FloatArray:
     """Bands of `size` pixels in any order; the samples of each in two parts, cut anywhere."""
-    arguments, out = _job(scene)
+    add, out = _summed(scene)
     spp = scene.resolved_sampler.spp
     begins = np.arange(0, len(out), size)
     for begin in rng.permutation(begins).tolist():
@@ -86,7 +73,7 @@ def in_bands(scene: rt.Scene, size: int, rng: np.random.Generator) -> FloatArray
         cut = int(rng.integers(0, spp + 1))
         for first, last in ((0, cut), (cut, spp)):
             if first < last:
-                _add(arguments, out, begin, end, first, last)
+                add(begin, end, first, last)
     return out.reshape(scene.film.height, scene.film.width, 3) / spp
 
 
@@ -107,12 +94,12 @@ def carry_on(folder: Path, first: float, last: float) -> None:
     for make in MAKES:
         file = folder / f"{make.__name__}.npy"
         scene = make(folder)
-        arguments, out = _job(scene)
+        add, out = _summed(scene)
         if file.exists():
             out[:] = np.load(file)
         begin, end = (round(share * len(out)) for share in (first, last))
         if begin < end:
-            _add(arguments, out, begin, end, 0, scene.resolved_sampler.spp)
+            add(begin, end, 0, scene.resolved_sampler.spp)
         np.save(file, out)
 
 

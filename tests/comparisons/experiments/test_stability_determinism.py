@@ -22,14 +22,18 @@ def test_the_same_bits(series, x, tmp_path):
 @pytest.mark.slow
 def test_sums_in_another_order_are_seen(tmp_path, monkeypatch):
     """A band that leaves the last bits to chance."""
-    honest = determinism._band
+    honest = determinism._summed
 
-    def careless(*arguments):
-        honest(*arguments)
-        sums = arguments[6]  # of the band's pixels
-        sums[0] = np.nextafter(sums[0], np.inf)
+    def careless(scene):
+        add, sums = honest(scene)
 
-    monkeypatch.setattr(determinism, "_band", careless)
+        def adding(begin, end, *samples):
+            add(begin, end, *samples)
+            sums[begin] = np.nextafter(sums[begin], np.inf)
+
+        return adding, sums
+
+    monkeypatch.setattr(determinism, "_summed", careless)
     assert measured("bands", 64.0, tmp_path).failures > 20
 
 

@@ -124,8 +124,10 @@ def run(
     requests = [choice.request(one.id, s.name, x, out) for one, s, x in choice.settings()]
     known: dict[Path, Found] = {}
     limit = SECONDS[choice.effort]
+    # From the last family on: what the first ones compile takes little, and they have many points,
+    # which all processes share at the end.
     for request, found, ended in engine.measured(
-        requests, _found, workers, limit, WORKER, fresh=fresh, kin=_family
+        requests[::-1], _found, workers, limit, WORKER, fresh=fresh, kin=_family
     ):
         if found is None:
             assert ended is not None
