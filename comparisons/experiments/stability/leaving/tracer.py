@@ -14,6 +14,10 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Hit, Ray, SurfacePoint
 from reference_rt.core.vec3 import Vec3, dot, frame_from_normal, row, to_world
 from reference_rt.jit.kernel import entry_kernel, kernel
+from reference_rt.jit.links import Linker
+from reference_rt.rendering.linking import linked_shapes
+from reference_rt.rendering.query.tracing import Linked, geometry_of, linked
+from reference_rt.shapes import Shapes
 from reference_rt.shapes.meshes.watertight import shear_of
 from reference_rt.shapes.tables import TABLES
 
@@ -65,17 +69,18 @@ def _write(
 
 
 @kernel
-def _meet(geometry: Geometry, kind: int, i: int, ray: Ray) -> Hit:
+def _meet(geometry: Geometry, shapes: Shapes, kind: int, i: int, ray: Ray) -> Hit:
     """One row of a table alone, of kind -1: the whole scene."""
     if kind < 0:
         return closest_hit(geometry, ray)
-    t, u, v = any_shape.intersect(geometry.shapes, kind, i, ray, shear_of(ray))
+    t, u, v = any_shape.intersect(shapes, kind, i, ray, shear_of(ray))
     return Hit(t, kind if t < math.inf else -1, i, u, v, -1)
 
 
 @entry_kernel
 def _depart(
     geometry: Geometry,
+    shapes: Shapes,
     kind: int,
     rows: IntArray,
     o: FloatArray,
@@ -86,7 +91,7 @@ def _depart(
 ) -> None:
     for i in range(len(o)):
         ray = Ray(row(o, i), row(d, i), math.inf)
-        hit = _meet(geometry, kind, rows[i], ray)
+        hit = _meet(geometry, shapes, kind, rows[i], ray)
         out[i, 0] = math.inf
         out[i, 13] = math.inf
         if hit.kind < 0:
@@ -94,7 +99,7 @@ def _depart(
         point = surface(geometry, ray, hit)
         w = to_world(frame_from_normal(point.n), row(ways, i))
         leaving = ray_leaving(ray, hit.t, point, w, epsilon)
-        met = _meet(geometry, kind, rows[i], leaving)
+        met = _meet(geometry, shapes, kind, rows[i], leaving)
         n = Vec3(0.0, 0.0, 0.0)
         again = math.inf
         if met.kind >= 0:
@@ -117,9 +122,13 @@ COMPANY = (
 
 
 class Subject(NamedTuple):
-    """A shape that rays leave: a row of a table of a geometry, or with kind -1 the whole scene."""
+    """A shape that rays leave: a row of a table of a geometry, or with kind -1 the whole scene.
+
+    linked: the geometry and its shapes, as kernels that serve all scenes take them.
+    """
 
     geometry: Geometry
+    linked: Linked
     field: str
     kind: int
     row: int
@@ -129,18 +138,28 @@ class Subject(NamedTuple):
         return getattr(self.geometry.shapes, self.field)
 
 
+def _geometry(scene: rt.Scene) -> tuple[Geometry, Linked]:
+    tables = rt.build_tables(scene)
+    geometry = tables.geometry
+
+    def link(linker: Linker) -> tuple[Any, Any]:
+        shapes = linked_shapes(linker, geometry.shapes, ("intersect",))
+        return geometry_of(linker, geometry, ("closest_hit", "surface")), shapes
+
+    return geometry, linked(tables, "leaving", link, (geometry, geometry.shapes))
+
+
 def subjects(kind: str, placed: list[Placed]) -> list[Subject]:
     """Shapes of one kind."""
     if kind in WHOLE:
-        return [Subject(rt.build_tables(scene_of(p)).geometry, "", -1, 0) for p in placed]
-    shapes = (*(p.shape for p in placed), *COMPANY)
-    geometry = rt.build_tables(rt.Scene(shapes=shapes)).geometry
+        return [Subject(*_geometry(scene_of(p)), "", -1, 0) for p in placed]
+    geometry, by_link = _geometry(rt.Scene(shapes=(*(p.shape for p in placed), *COMPANY)))
     found = []
     for code, field, _, _ in TABLES:
         table = getattr(geometry.shapes, field)
         for i, owner in enumerate(table.owner.tolist()):
             if owner < len(placed):
-                found.append((owner, Subject(geometry, field, code, i)))
+                found.append((owner, Subject(geometry, by_link, field, code, i)))
     return [subject for _, subject in sorted(found, key=lambda pair: pair[0])]
 
 
@@ -154,6 +173,7 @@ def depart(subject: Subject, rays: Rays, ways: Ways, epsilon: float = 0.0) -> De
     """Rays meet the shape and leave it; with an epsilon above 0, as textbooks do."""
     out = np.zeros((len(rays.o), COLUMNS))
     rows = np.full(len(rays.o), subject.row)
+    geometry, shapes = subject.linked.tables
     with np.errstate(all="ignore"):
-        _depart(subject.geometry, subject.kind, rows, rays.o, rays.d, ways.local, epsilon, out)
+        _depart(geometry, shapes, subject.kind, rows, rays.o, rays.d, ways.local, epsilon, out)
     return Departures.of(out)
