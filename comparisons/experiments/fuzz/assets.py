@@ -1,5 +1,8 @@
 """Small images, environment maps, and meshes whole and damaged, that random scenes hold or name."""
 
+import base64
+import io
+import json
 import shutil
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -10,11 +13,9 @@ import numpy as np
 
 from comparisons.experiments.fuzz.fields import DIGITS, Draw
 from comparisons.experiments.fuzz.finding import Data
-from comparisons.experiments.stability.hostile.bases import COPIES, MESHES
-from comparisons.experiments.stability.hostile.bases import files as sound_files
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.exr import write_exr
-from reference_rt.util.files import replacing
+from reference_rt.util.files import replacing, temporary_folder
 
 # ---- meshes -------------------------------------------------------------------------------------
 
@@ -171,6 +172,11 @@ DAMAGES: tuple[Callable[[Draw, FloatArray, IntArray], Surface], ...] = (
 # ---- files that scenes name ---------------------------------------------------------------------
 
 
+MESHES = ("ball.obj", "ball.ply", "ball_ascii.ply", "ball.stl", "ball.off", "ball.glb")
+COPIES = "copies.npy"
+SOUND_IMAGES = ("tiles.png", "sky.exr", "sky.hdr", "sky.pfm", "sky.npy", "grey.tif", "photo.jpg")
+
+
 IMAGES = ("square.png", "wide.png", "grey.png")
 NORMALS = "normals.png"
 """An image of normals that lean by up to 40 degrees: of others, some would point below the surface,
@@ -218,7 +224,7 @@ def write(folder: Path) -> Path:
     for name in (*MESHES, COPIES):
         if not (folder / name).exists():
             with replacing(folder / name) as temporary:
-                temporary.write_bytes(sound_files()[name])
+                temporary.write_bytes(files()[name])
     if not (folder / FINE).exists():
         with replacing(folder / FINE) as temporary:
             ball = trimesh.creation.icosphere(subdivisions=4)
@@ -247,3 +253,94 @@ def named(part: Any) -> Iterator[str]:
     elif isinstance(part, list):
         for value in part:
             yield from named(value)
+
+
+@cache
+def files() -> dict[str, bytes]:
+    """The sound files by name: a ball of twenty triangles, and images of a few pixels."""
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=0)
+    found = {}
+    for name in MESHES:
+        kind = Path(name).suffix[1:]
+        options = {"encoding": "ascii"} if "ascii" in name else {}
+        content = ball.export(file_type=kind, **options)
+        found[name] = content.encode() if isinstance(content, str) else bytes(content)
+    return found | _images() | {"ball.gltf": _gltf(ball), COPIES: _copies()}
+
+
+def _copies() -> bytes:
+    """Three maps, one of which mirrors, near the origin."""
+    maps = np.zeros((3, 3, 4))
+    maps[:, :, :3] = [
+        np.diag(scales) for scales in ((1.0, 1.0, 1.0), (0.5, 0.8, 0.6), (-0.7, 1, 1))
+    ]
+    maps[1:, :, 3] = [0.9, 0.3, 0.0], [-0.8, 0.0, 0.4]
+    stream = io.BytesIO()
+    np.save(stream, maps)
+    return stream.getvalue()
+
+
+def _images() -> dict[str, bytes]:
+    from PIL import Image
+
+    rng = np.random.default_rng(0)
+    pixels = rng.integers(0, 256, (4, 8, 3)).astype(np.uint8)
+    found = {}
+    for name, kind in (("tiles.png", "PNG"), ("grey.tif", "TIFF"), ("photo.jpg", "JPEG")):
+        stream = io.BytesIO()
+        Image.fromarray(pixels).save(stream, kind)
+        found[name] = stream.getvalue()
+    stream = io.BytesIO()
+    np.save(stream, pixels / 255.0)
+    # Each row of the .hdr as runs, so that the marks and lengths of runs are damaged, too.
+    rows = np.concatenate([pixels, np.full((4, 8, 1), 128, np.uint8)], axis=2).transpose(0, 2, 1)
+    runs = b"".join(b"\2\2\0\x08" + b"".join(b"\x08" + bytes(c) for c in row) for row in rows)
+    return found | {
+        "sky.exr": _exr(pixels / 255.0),
+        "sky.hdr": b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n" + runs,
+        "sky.pfm": b"PF\n8 4\n-1\n" + (pixels / 255.0).astype("<f4").tobytes(),
+        "sky.npy": stream.getvalue(),
+    }
+
+
+def _exr(pixels: Any) -> bytes:
+
+    from reference_rt.core.exr import write_exr
+
+    with temporary_folder() as folder:
+        path = folder / "sky.exr"
+        write_exr(path, {name: pixels[..., k] for k, name in enumerate("RGB")}, {})
+        return path.read_bytes()
+
+
+def _gltf(ball: Any) -> bytes:
+    """One primitive, its buffer in the text."""
+    points = np.asarray(ball.vertices, np.float32).tobytes()
+    faces = np.asarray(ball.faces, np.uint32).tobytes()
+    data = base64.b64encode(points + faces).decode()
+    views = [{"buffer": 0, "byteOffset": 0, "byteLength": len(points)},
+             {"buffer": 0, "byteOffset": len(points), "byteLength": len(faces)}]  # fmt: skip
+    accessors = [
+        {"bufferView": 0, "componentType": 5126, "count": len(ball.vertices), "type": "VEC3"},
+        {"bufferView": 1, "componentType": 5125, "count": ball.faces.size, "type": "SCALAR"},
+    ]
+    root = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "buffers": [{"byteLength": len(points) + len(faces),
+                     "uri": "data:application/octet-stream;base64," + data}],
+        "bufferViews": views,
+        "accessors": accessors,
+    }  # fmt: skip
+    return json.dumps(root).encode()
+
+
+def write_files(folder: Path) -> None:
+    """The sound files, for scenes there to name."""
+    for name, content in files().items():
+        (folder / name).write_bytes(content)

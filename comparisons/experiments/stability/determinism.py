@@ -30,7 +30,6 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.bits import MAKES, on_threads, over, same_bits
 from comparisons.experiments.stability.harness.core import (
     MITSUBA,
     OURS,
@@ -41,6 +40,7 @@ from comparisons.experiments.stability.harness.core import (
     Series,
     Sweep,
 )
+from comparisons.experiments.stability.harness.scenes import MAKES, on_threads, over, same_bits
 from comparisons.mitsuba.backend import LLVM, SCALAR, backend, variant
 from comparisons.mitsuba.scene import picture
 from comparisons.mitsuba.translate import load

@@ -33,6 +33,7 @@ from comparisons.experiments.stability.harness.bsdfs import (
     Bsdf,
     contestants,
     index_of,
+    integral,
     towards,
 )
 from comparisons.experiments.stability.harness.core import (
@@ -49,7 +50,6 @@ from comparisons.experiments.stability.harness.core import (
     together,
     unit_of,
 )
-from comparisons.experiments.stability.harness.densities import integral
 from comparisons.experiments.stability.harness.worlds import closed, measure, ours, shells, theirs
 from reference_rt.materials import Material
 

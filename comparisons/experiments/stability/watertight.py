@@ -51,8 +51,7 @@ from comparisons.experiments.stability.harness.meshes import (
     noisy,
     write,
 )
-from comparisons.experiments.stability.harness.mitsubas import traced
-from comparisons.experiments.stability.harness.steps import any_turn, at
+from comparisons.experiments.stability.harness.steps import any_turn, at, traced
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.vectors import unit_vectors
 from comparisons.mitsuba.backend import mitsuba

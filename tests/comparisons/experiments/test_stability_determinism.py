@@ -5,7 +5,7 @@ import pytest
 import stability_runs
 
 from comparisons.experiments.stability import determinism
-from comparisons.experiments.stability.harness import bits
+from comparisons.experiments.stability.harness import scenes
 from comparisons.experiments.stability.harness.core import OURS, Outcome
 
 
@@ -41,6 +41,6 @@ def test_same_bits():
     one = np.ones((2, 3, 3))
     other = one.copy()
     other[1, 2, 0] = np.nextafter(1.0, 2.0)
-    assert bits.same_bits(one, one) == Outcome(6, 0, 0.0)
-    found = bits.same_bits(one, other)
+    assert scenes.same_bits(one, one) == Outcome(6, 0, 0.0)
+    found = scenes.same_bits(one, other)
     assert (found.failures, found.examples[0]["pixel"]) == (1, [2, 1])

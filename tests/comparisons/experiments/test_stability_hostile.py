@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 import reference_rt as rt
+from comparisons.experiments.fuzz.assets import files, write, write_files
 from comparisons.experiments.stability.harness.solids import Stretch, Truth
 from comparisons.experiments.stability.harness.solids import problem as list_problem
 from comparisons.experiments.stability.hostile import bomb, example, problem, rays, worker
-from comparisons.experiments.stability.hostile.bases import BASES, files, write_files
 from comparisons.experiments.stability.hostile.damage import (
+    BASES,
     as_text,
     damaged,
     deep,
@@ -32,11 +33,12 @@ def rng(seed=1):
     return np.random.default_rng(seed)
 
 
-def test_the_same_seed_gives_the_same_cases():
+def test_the_same_seed_gives_the_same_cases(tmp_path):
+    write(tmp_path)
     for make in (
         lambda r: as_text(with_numbers(r, BASES["light"], 4)),
         lambda r: as_text(with_structure(r, BASES["shapes"], 4)),
-        lambda r: as_text(sentence(r, 0.1)),
+        lambda r: as_text(sentence(r, 0.1, tmp_path)),
         lambda r: damaged(r, files()["ball.ply"], 4),
     ):
         assert make(rng()) == make(rng())
@@ -53,10 +55,10 @@ def test_trees_deeper_than_python_recurses_are_made():
 
 def test_sentences_come_to_scenes(tmp_path):
     """Where one rule refused nearly all, what lies behind it would not be tested."""
-    write_files(tmp_path)
+    write(tmp_path)
     r, sound = rng(), 0
-    for _ in range(60):
-        (tmp_path / "case.json").write_text(as_text(sentence(r, 0.001)))
+    for _ in range(20):
+        (tmp_path / "case.json").write_text(as_text(sentence(r, 0.001, tmp_path)))
         with contextlib.suppress(SceneError, ImageError):
             rt.Scene.load(tmp_path / "case.json")
             sound += 1
@@ -91,7 +93,10 @@ def test_what_dies_is_told_and_the_others_go_on(tmp_path, monkeypatch):
     (tmp_path / "planted_worker.py").write_text(PLANTED)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     scenes = [Path(kind) for kind in ("well", "crash", "well", "hang", "well")]
-    found = list(answers(scenes, module="planted_worker"))
+    monkeypatch.setattr(worker, "MODULE", "planted_worker")
+    monkeypatch.setattr(worker, "_workers", {})
+    found = list(answers(scenes))
+    worker.close()
     assert [answer.exit for answer in found] == [0, None, 0, None, 0]
     assert "SIGSEGV" in found[1].said
     assert found[3].said.startswith("hangs")
@@ -141,7 +146,7 @@ def test_hostile_scenes_in_plain_python(tmp_path):
         path = tmp_path / f"case{k}.{'json' if text.startswith('{') else 'yaml'}"
         path.write_text(text)
         scenes.append(path)
-    found = list(answers(scenes, plain=True))
+    found = list(answers(scenes, by="plain"))
     assert [problem(a, s) for a, s in zip(found, scenes, strict=True)] == [None] * len(scenes)
     assert {answer.exit for answer in found} == {0, 3}
 

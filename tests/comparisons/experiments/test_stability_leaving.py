@@ -11,8 +11,14 @@ from comparisons.experiments.stability.contact import fresnel, plates, shadow_sc
 from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw
 from comparisons.experiments.stability.harness.leaving import bound, lit
 from comparisons.experiments.stability.leaving.judge import Judge, Tally, row_of
-from comparisons.experiments.stability.leaving.shapes import KINDS, Extent, aim, place
-from comparisons.experiments.stability.leaving.tracer import depart, subjects
+from comparisons.experiments.stability.leaving.shapes import (
+    KINDS,
+    Extent,
+    aim,
+    depart,
+    place,
+    subjects,
+)
 from comparisons.geometry.exact import first_hit
 
 PLAIN = Extent.of(1.0, 2.0, 1.0, False)

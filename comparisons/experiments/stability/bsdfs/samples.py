@@ -14,6 +14,7 @@ from comparisons.experiments.stability.harness.bsdfs import (
     Bsdf,
     Ours,
     contestants,
+    fit,
     index_of,
     towards,
 )
@@ -33,7 +34,6 @@ from comparisons.experiments.stability.harness.core import (
     together,
     unit_of,
 )
-from comparisons.experiments.stability.harness.densities import fit
 from reference_rt.materials import (
     Conductor,
     Dielectric,

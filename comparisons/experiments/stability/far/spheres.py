@@ -15,8 +15,7 @@ from comparisons.experiments.stability.harness.core import (
     outcome,
     plain,
 )
-from comparisons.experiments.stability.harness.mitsubas import traced
-from comparisons.experiments.stability.harness.steps import Rays
+from comparisons.experiments.stability.harness.steps import Rays, traced
 from comparisons.geometry.exact import KINDS, first_of
 from comparisons.geometry.exact.dyadic import (
     FRACTION,

@@ -7,7 +7,7 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness.core import MITSUBA, OURS, FloatArray, U
-from comparisons.experiments.stability.harness.mitsubas import loaded
+from comparisons.experiments.stability.harness.steps import loaded
 from comparisons.mitsuba.backend import scalar
 from reference_rt.accel.geometry import Geometry, closest_hit, occluded, surface
 from reference_rt.core.ray import Ray, SurfacePoint, at, ray_from

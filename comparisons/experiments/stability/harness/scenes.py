@@ -1,4 +1,4 @@
-"""The scenes that F9 transforms.
+"""The scenes that F9 and F14 render, and pictures that must have the same bits.
 
 All coordinates are multiples of 1/64 below 8 (where shapes are turned: of their centres), so that
 whole-number offsets up to 2^46 and factors 2^k move a scene exactly, in float64; in float32 up to
@@ -17,6 +17,10 @@ from reference_rt.textures.texture import UvMap
 
 if TYPE_CHECKING:
     import trimesh
+from collections.abc import Callable, Mapping
+
+from comparisons.experiments.stability.harness.core import Draw, FloatArray, Outcome, outcome
+from comparisons.geometry.exact.dyadic import BoolArray
 
 SIZE = 4.0
 """About the radius of each scene about the origin, its eye included."""
@@ -215,3 +219,37 @@ def _lit_shapes(lamp: bool) -> tuple[Any, ...]:
         return shapes
     glow = rt.Sphere(material="lamp", center=(-2.5, 1.5, 1), radius=0.25)
     return (*shapes, rt.Rectangle(material="lamp", transform=_LAMP), glow)
+
+
+# ---- pictures pixel by pixel, and those that must have the same bits -----------------------------
+
+
+def same_bits(expected: FloatArray, found: FloatArray) -> Outcome:
+    """A case a pixel; worst: the largest relative difference, inf for NaN, which always fails."""
+    other = (expected != found).any(axis=-1)
+    size = np.maximum(np.abs(expected), np.abs(found))
+    off = np.abs(expected - found) / np.where(size > 0.0, size, 1.0)
+    off = np.where(np.isnan(off), np.inf, off)
+    return of_pixels(other, {"expected": expected, "found": found}, float(off.max()))
+
+
+def of_pixels(wrong: BoolArray, pictures: Mapping[str, FloatArray], worst: float) -> Outcome:
+    """wrong (height, width): a case a pixel;  pictures: (height, width, c), of which the examples
+    show the pixels."""
+    y, x = (index.ravel() for index in np.indices(wrong.shape))
+    columns = {name: pixels.reshape(wrong.size, -1) for name, pixels in pictures.items()}
+    return outcome(wrong.ravel(), {"pixel": np.column_stack([x, y]), **columns}, worst=worst)
+
+
+MAKES = (path, whitted)
+
+
+def over(draw: Draw, pair: Callable[[rt.Scene, str], tuple[FloatArray, FloatArray]]) -> Outcome:
+    """Of both scenes;  pair(scene, its name): two pictures that must be the same."""
+    pairs = (pair(make(draw.folder), make.__name__) for make in MAKES)
+    return sum((same_bits(*pictures) for pictures in pairs), Outcome(0, 0))
+
+
+def on_threads(scene: rt.Scene, threads: int = 1) -> FloatArray:
+    """The picture."""
+    return rt.render(scene, threads=threads).colour

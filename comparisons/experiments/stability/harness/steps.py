@@ -1,12 +1,17 @@
-"""Steps of transforms, in short."""
+"""In short: steps of transforms, rays at rows of tables, and scenes in Mitsuba as they are."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
+import reference_rt as rt
 from comparisons.experiments.stability.harness.core import FloatArray
+from comparisons.geometry import frame
 from comparisons.geometry.exact.crossings import Row
 from comparisons.geometry.vectors import unit_vectors
+from comparisons.mitsuba import counterpart, translate
+from comparisons.mitsuba.hits import MitsubaHits
+from comparisons.mitsuba.scene import picture
 from reference_rt.core.transform import Matrix, Rotate, Scale, Translate, Turn
 
 # ---- rays, each at a row of a table of its own ---------------------------------------------------
@@ -76,3 +81,21 @@ def matrix(linear: FloatArray, center: FloatArray) -> tuple[Matrix]:
     """The one step p -> linear p + center."""
     x, y, z = (tuple(row) for row in np.column_stack([linear, center]).tolist())
     return (Matrix(matrix=(x, y, z)),)
+
+
+# ---- scenes and rays in Mitsuba as they are: not moved to where float32 is most precise ----------
+
+
+def loaded(scene: rt.Scene) -> Any:
+    """Mitsuba's scene, in the variant that is set."""
+    return translate.load(scene, frame.OURS).mi_scene
+
+
+def traced(scene: rt.Scene, o: FloatArray, d: FloatArray) -> MitsubaHits:
+    """The closest hits of rays (n, 3) in it."""
+    return counterpart.trace(translate.load(scene, frame.OURS), o, d)
+
+
+def rendered(scene: rt.Scene, spp: int, seed: int) -> FloatArray:
+    """(height, width, 3)."""
+    return picture(loaded(scene), spp, seed)

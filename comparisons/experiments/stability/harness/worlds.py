@@ -19,8 +19,7 @@ from comparisons.experiments.stability.harness.core import (
     Outcome,
     one_case,
 )
-from comparisons.experiments.stability.harness.mitsubas import rendered
-from comparisons.experiments.stability.harness.steps import at, scaled, turned
+from comparisons.experiments.stability.harness.steps import at, rendered, scaled, turned
 from comparisons.mitsuba.backend import scalar
 
 _TINY = scaled(1e-30)

@@ -15,9 +15,9 @@ Counts.  11,000 scenes and files in the full run (values 4500, structure 1600, g
 
 Passes.  No failure.
 
-How.  Scenes go to child processes (`worker`; Mitsuba's: `mitsuba`), which do as
+How.  Scenes go to child processes (`worker`), which do as
 `reference-rt render` does (8 x 8 pixels, one sample), so that one that dies takes no other with it.
-Values change in a few fixed scenes (`bases`), whose compiled kernels stay the same; where they do
+Values change in a few fixed scenes (`damage`), whose compiled kernels stay the same; where they do
 not, and where the structure changes (`damage`), plain Python runs the same code
 (NUMBA_DISABLE_JIT=1), bit-identical and without seconds of compiling.
 
@@ -32,6 +32,7 @@ from typing import Any
 
 import numpy as np
 
+from comparisons.experiments.fuzz.assets import MESHES, SOUND_IMAGES, files, write, write_files
 from comparisons.experiments.stability.harness.core import (
     EXAMPLES,
     MITSUBA,
@@ -43,15 +44,9 @@ from comparisons.experiments.stability.harness.core import (
     Sweep,
 )
 from comparisons.experiments.stability.hostile import rays
-from comparisons.experiments.stability.hostile.bases import (
-    BASES,
-    IMAGES,
-    MESHES,
-    PLAIN,
-    files,
-    write_files,
-)
 from comparisons.experiments.stability.hostile.damage import (
+    BASES,
+    PLAIN,
     YAML_PIECES,
     as_text,
     as_yaml,
@@ -62,8 +57,7 @@ from comparisons.experiments.stability.hostile.damage import (
     with_numbers,
     with_structure,
 )
-from comparisons.experiments.stability.hostile.mitsuba import judged as judged_of_mitsuba
-from comparisons.experiments.stability.hostile.worker import Answer, answers
+from comparisons.experiments.stability.hostile.worker import Answer, answers, judged_of_mitsuba
 from reference_rt.core.diagnosis import MOST
 
 # ---- the series ----------------------------------------------------------------------------------
@@ -115,7 +109,7 @@ def judged(
     """The outcome of scenes; those whose kernels differ from `signatures` run in plain Python."""
     failures, examples, left = 0, [], []
     for scene, answer in zip(
-        scenes, answers(scenes, plain=plain, signatures=signatures), strict=True
+        scenes, answers(scenes, "plain" if plain else "ours", signatures), strict=True
     ):
         if signatures is not None and answer.exit == 0 and not answer.rendered:
             left.append(scene)
@@ -184,7 +178,7 @@ def _structure_of(draw: Draw, x: float, name: str, k: int) -> tuple[str, str]:
 
 
 def _sentence_of(draw: Draw, x: float, _: str, __: int) -> tuple[str, str]:
-    return ".json", as_text(sentence(draw.rng, x))
+    return ".json", as_text(sentence(draw.rng, x, write(draw.folder)))
 
 
 def _text_of(draw: Draw, x: float, name: str, k: int) -> tuple[str, bytes]:
@@ -253,7 +247,7 @@ def _of_files(names: Sequence[str], scene: Callable[[str], Any]) -> Measure:
 
 
 meshes = _of_files([*MESHES, "ball.gltf"], _mesh_scene)
-images = _of_files(IMAGES, _image_scene)
+images = _of_files(SOUND_IMAGES, _image_scene)
 
 _COUNTS = (1.0, 2.0, 4.0, 8.0)
 
@@ -282,7 +276,7 @@ FAMILY = Family(
         Series(
             "grammar",
             Sweep("share of hostile values", (0.001, 0.01, 0.03, 0.1), (0.01,), 30, 400),
-            "Sentences of the scenes' JSON Schema, of which some values are hostile.",
+            "Scenes of the fuzzer, of which some numbers, names and values are hostile.",
             grammar,
         ),
         Series(

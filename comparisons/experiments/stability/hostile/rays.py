@@ -11,6 +11,7 @@ from functools import cache
 
 import numpy as np
 
+from comparisons.experiments.fuzz.assets import write_files
 from comparisons.experiments.stability.harness.core import (
     OURS,
     Draw,
@@ -21,8 +22,7 @@ from comparisons.experiments.stability.harness.core import (
     alone,
     outcome,
 )
-from comparisons.experiments.stability.hostile.bases import BASES, write_files
-from comparisons.experiments.stability.hostile.damage import NUMBERS, as_text
+from comparisons.experiments.stability.hostile.damage import BASES, NUMBERS, as_text
 from comparisons.geometry.exact.dyadic import BoolArray
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections

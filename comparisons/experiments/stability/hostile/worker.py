@@ -17,12 +17,13 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, TextIO
+from typing import Any, Literal, NamedTuple, TextIO
 
 import numba
 import numpy as np
 import typer
 
+from comparisons.experiments.stability.harness.core import Outcome, outcome
 from reference_rt.cli.adjusted import adjusted
 from reference_rt.cli.guarded import guarded
 from reference_rt.integrators import RayCast
@@ -47,6 +48,11 @@ PLAIN_SECONDS = 120.0
 """In plain Python: 8 x 8 pixels take it some 30 times as long as compiled code, deep paths more."""
 
 
+MODULE = "comparisons.experiments.stability.hostile.worker"
+
+By = Literal["ours", "plain", "mitsuba"]
+
+
 class Answer(NamedTuple):
     """What came of a case.
 
@@ -64,29 +70,27 @@ class Answer(NamedTuple):
 
 def answers(
     scenes: Sequence[Path],
-    *,
-    plain: bool = False,
+    by: By = "ours",
     signatures: Sequence[str | None] | None = None,
-    module: str = "comparisons.experiments.stability.hostile.worker",
 ) -> Iterator[Answer]:
     """Of each scene in turn.
 
-    plain: by plain Python, which compiles nothing;  signatures: with others, scenes are built but
-    not rendered.
+    by: "plain": plain Python, which compiles nothing;  signatures: with others, scenes are built
+    but not rendered.
     """
     wanted = signatures or [None] * len(scenes)
     for scene, signature in zip(scenes, wanted, strict=True):
-        worker = _workers.get((module, plain))
+        worker = _workers.get(by)
         if worker is None:
-            worker = _workers[module, plain] = _Worker(module, plain)
+            worker = _workers[by] = _Worker(by)
         answer = worker.run({"scene": str(scene), "signature": signature})
         if answer.exit is None:
-            _workers.pop((module, plain)).close()
+            _workers.pop(by).close()
         yield answer
 
 
-_workers: dict[tuple[str, bool], "_Worker"] = {}
-"""Those that run, by module and whether they compile nothing."""
+_workers: dict[By, "_Worker"] = {}
+"""Those that run."""
 
 
 @atexit.register
@@ -97,10 +101,10 @@ def close() -> None:
 
 
 class _Worker:
-    def __init__(self, module: str, plain: bool) -> None:
-        environment = os.environ | ({"NUMBA_DISABLE_JIT": "1"} if plain else {})
+    def __init__(self, by: By) -> None:
+        environment = os.environ | ({"NUMBA_DISABLE_JIT": "1"} if by == "plain" else {})
         self.process = subprocess.Popen(
-            [sys.executable, "-m", module],
+            [sys.executable, "-m", MODULE, by],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -108,7 +112,7 @@ class _Worker:
             env=environment,
             **tied(),
         )
-        self.seconds = PLAIN_SECONDS if plain else SECONDS
+        self.seconds = PLAIN_SECONDS if by == "plain" else SECONDS
         self._send({"seconds": self.seconds})
 
     def _send(self, message: dict[str, Any]) -> None:
@@ -252,5 +256,63 @@ def signature_of(scene: Scene, tables: SceneTables) -> str:
     return hashlib.sha256(names.encode()).hexdigest()
 
 
+# ---- Mitsuba with hostile scenes -----------------------------------------------------------------
+
+
+def judged_of_mitsuba(scenes: Sequence[Path]) -> Outcome:
+    """Of the scenes that ours accepts and that have a twin: a process that ends, a hang and pixels
+    that are not finite are failures; an exception is a defined error."""
+    rendered = [
+        (scene, answer)
+        for scene, answer in zip(scenes, answers(scenes, "mitsuba"), strict=True)
+        if answer.exit != 0 or answer.rendered
+    ]
+    wrong = np.array([answer.exit is None or answer.nonfinite > 0 for _, answer in rendered], bool)
+
+    def came(k: int) -> str:
+        answer = rendered[k][1]
+        return answer.said or f"{answer.nonfinite} pixels not finite"
+
+    return outcome(wrong, {"scene": lambda k: rendered[k][0].read_text()[:2000], "came": came})
+
+
+def _mitsubas(path: Path, _: str | None, clock: Any) -> dict[str, Any]:
+    from comparisons.mitsuba import translate
+    from comparisons.mitsuba.scene import picture
+    from comparisons.mitsuba.translate.textures import UntranslatableError
+    from reference_rt.cli.adjusted import adjusted
+    from reference_rt.rendering.scene import Scene
+    from reference_rt.util.errors import ReferenceRtError
+
+    found: dict[str, Any] = {"exit": 0, "said": "", "nonfinite": 0, "rendered": False}
+    try:
+        scene = adjusted(Scene.load(path), SAMPLES, SIZE)
+        assert scene.tables is not None  # built now, so that its errors are raised here
+    except ReferenceRtError:
+        return found
+    with contextlib.redirect_stderr(io.StringIO()):
+        try:
+            counterpart = translate.load(
+                scene
+            )  # which takes seconds for curved shapes, for our own part
+            if counterpart.no_pictures_reason:
+                return found
+            clock.start()
+            pixels = picture(counterpart.mi_scene, SAMPLES, 0)
+        except UntranslatableError:
+            return found
+        except Exception as error:  # what Mitsuba refuses, it refuses by various classes
+            return found | {"exit": 3, "said": str(error)[:300], "rendered": True}
+        finally:
+            clock.stop()
+    return found | {"nonfinite": int((~np.isfinite(pixels).all(axis=-1)).sum()), "rendered": True}
+
+
 if __name__ == "__main__":
-    serve(_outcome)
+    if "mitsuba" in sys.argv:
+        from comparisons.mitsuba.backend import scalar
+
+        with scalar():  # once: to change the variant takes as long as a case
+            serve(_mitsubas)
+    else:
+        serve(_outcome)

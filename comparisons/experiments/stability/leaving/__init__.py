@@ -31,7 +31,7 @@ shapes smaller than 8.9e-3.  While it takes part, all numbers of shapes and rays
 float32 first, for everyone.  The textbook's ray, which begins at o + t d + 1e-4 w, is judged in
 the same way.
 
-`shapes` places shapes and aims rays; `tracer` and `mitsuba` trace; `judge` decides."""
+`shapes` places shapes, aims rays and traces them; `judge` decides."""
 
 import contextlib
 import math
@@ -53,18 +53,23 @@ from comparisons.experiments.stability.harness.core import (
     pixel_grid,
 )
 from comparisons.experiments.stability.harness.leaving import EPSILON, PIXELS, lit, picture
-from comparisons.experiments.stability.leaving import mitsuba
 from comparisons.experiments.stability.leaving.judge import Judge, Tally
 from comparisons.experiments.stability.leaving.shapes import (
     KINDS,
+    MITSUBA_KINDS,
     WHOLE,
     Extent,
     Placed,
     Rays,
+    Ways,
     aim,
+    depart,
+    depart_in_mitsuba,
+    outer,
     place,
+    scene_of,
+    subjects,
 )
-from comparisons.experiments.stability.leaving.tracer import Ways, depart, scene_of, subjects
 from comparisons.mitsuba.backend import scalar
 from reference_rt.core.arrays import FloatArray
 from reference_rt.util.files import temporary_folder
@@ -144,7 +149,7 @@ def measure(
     rays = RAYS if draw.effort == "full" else 100
     shapes = max(1, draw.cases // (rays * len(kinds)))
     tallies = {OURS: Tally(), FIXED: Tally()}
-    if extent.single and not set(kinds).isdisjoint(mitsuba.KINDS):
+    if extent.single and not set(kinds).isdisjoint(MITSUBA_KINDS):
         tallies[MITSUBA] = Tally()
     with scalar() if MITSUBA in tallies else contextlib.nullcontext():
         for kind in kinds:
@@ -158,9 +163,9 @@ def measure(
                 first, away = Rays(*(x[:FEW] for x in first)), Ways(away.local[:FEW])
                 found = depart(subject, first, away, EPSILON)
                 judge(tallies[FIXED], first, away.outer, found, False)
-                if MITSUBA in tallies and kind in mitsuba.KINDS:
-                    found = mitsuba.depart(one, first, away)
-                    judge(tallies[MITSUBA], first, mitsuba.outer(away, found), found, False)
+                if MITSUBA in tallies and kind in MITSUBA_KINDS:
+                    found = depart_in_mitsuba(one, first, away)
+                    judge(tallies[MITSUBA], first, outer(away, found), found, False)
     return {name: tally.outcome() for name, tally in tallies.items()}
 
 

@@ -8,8 +8,14 @@ import numpy as np
 
 from comparisons.experiments.stability.harness.core import EXAMPLES, Outcome, hexed
 from comparisons.experiments.stability.harness.leaving import CONTACT
-from comparisons.experiments.stability.leaving.shapes import KINDS, Placed, Rays
-from comparisons.experiments.stability.leaving.tracer import Departures, Subject, scene_of
+from comparisons.experiments.stability.leaving.shapes import (
+    KINDS,
+    Departures,
+    Placed,
+    Rays,
+    Subject,
+    scene_of,
+)
 from comparisons.geometry.exact import all_hits, first_of
 from comparisons.geometry.exact.dyadic import NEVER, BoolArray, nearest
 from comparisons.geometry.exact.referee import Referee

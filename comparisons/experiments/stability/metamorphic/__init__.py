@@ -35,7 +35,6 @@ import numpy.typing as npt
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.bits import same_bits
 from comparisons.experiments.stability.harness.core import (
     OURS,
     Draw,
@@ -47,6 +46,7 @@ from comparisons.experiments.stability.harness.core import (
     decades,
     together,
 )
+from comparisons.experiments.stability.harness.scenes import same_bits
 from comparisons.experiments.stability.metamorphic import light, rays
 from comparisons.experiments.stability.metamorphic.motion import (
     MIRRORS,

@@ -9,10 +9,9 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.bits import of_pixels
 from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
-from comparisons.experiments.stability.harness.mitsubas import rendered
-from comparisons.experiments.stability.harness.scenes import SIZE
+from comparisons.experiments.stability.harness.scenes import SIZE, of_pixels
+from comparisons.experiments.stability.harness.steps import rendered
 from comparisons.experiments.stability.metamorphic.motion import Motion, moved
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.frame import UNIT_ROUNDOFF as U32

@@ -16,9 +16,9 @@ from comparisons.experiments.stability.harness.core import (
     hexed,
     outcome,
 )
-from comparisons.experiments.stability.harness.mitsubas import traced
 from comparisons.experiments.stability.harness.scenes import GRID
 from comparisons.experiments.stability.harness.solids import Truth, truths
+from comparisons.experiments.stability.harness.steps import traced
 from comparisons.experiments.stability.metamorphic.motion import Motion
 from comparisons.geometry.exact.dyadic import BoolArray, nearest
 from comparisons.geometry.exact.referee import Referee

@@ -39,7 +39,7 @@ from comparisons.experiments.stability.harness.core import (
     pixel_grid,
     together,
 )
-from comparisons.experiments.stability.harness.mitsubas import traced
+from comparisons.experiments.stability.harness.steps import traced
 from comparisons.experiments.stability.slivers.judge import (
     SHAPES,
     Judge,
