@@ -12,12 +12,11 @@ that it is in, what becomes of a request that failed, and what is shown.
 
 import hashlib
 import json
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Generator, Hashable, Sequence
 from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rich.console import Console
 from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 
 from comparisons.results.files import plain, sealed, unsealed
@@ -65,7 +64,7 @@ def measured(
     fresh: bool = False,
     kin: Callable[[R], Hashable] = lambda request: None,
     doing: Callable[[R, str], None] = lambda request, step: None,
-) -> Iterator[tuple[R, T | None, Ended | None]]:
+) -> Generator[tuple[R, T | None, Ended | None], None, None]:
     """(request, result, how its process ended): of those that are stored first, with None for the
     last; then of the others as they are measured, with None for the result of one that failed.
 
@@ -87,13 +86,10 @@ def measured(
 class Count(Bar):
     """Shows on standard error how many results there are, of how many; None: of any number."""
 
-    def __init__(self, total: int | None, console: Console | None = None) -> None:
-        super().__init__(MofNCompleteColumn(), TimeElapsedColumn(), console=console)
+    def __init__(self, total: int | None) -> None:
+        super().__init__(MofNCompleteColumn(), TimeElapsedColumn())
         self._task = self._bar.add_task("", total=total)
 
-    def count(self, words: str, line: str = "", always: bool = True) -> None:
-        """One more.  words: beside the bar;  line: printed, if not `always`, then only where there
-        is no bar."""
-        self._bar.update(self._task, advance=1, description=words)
-        if line and (always or not self.is_terminal):
-            self.line(line)
+    def count(self, words: str, ended: int = 1) -> None:
+        """So many more;  words: beside the bar."""
+        self._bar.update(self._task, advance=ended, description=words)

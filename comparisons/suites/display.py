@@ -4,7 +4,6 @@ line per case."""
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 from rich.text import Text
 
 from comparisons.report import terminal
@@ -13,8 +12,8 @@ from comparisons.results.case import WARNING, Case, how_many
 from comparisons.results.files import named
 from comparisons.results.headline import first_difference, headline
 from comparisons.results.verdict import PASSING
+from comparisons.runs.engine import Count
 from comparisons.suites.worker import Request
-from reference_rt.util.console import Bar
 
 _STYLES = {
     "agree": "green",
@@ -31,14 +30,13 @@ _COLUMNS = ("case", "verdict", "likeliest cause", "first difference", "seconds")
 _SLOWEST = 3
 
 
-class Display(Bar):
+class Display(Count):
     """Shows the progress of cases.  steps: print every step and every reason, for runs of few
     cases."""
 
     def __init__(self, cases: int, steps: bool = False) -> None:
-        super().__init__(MofNCompleteColumn(), TimeElapsedColumn())
+        super().__init__(cases)
         self._steps = steps
-        self._task = self._bar.add_task("", total=cases)
         self._running: dict[str, str] = {}
 
     def doing(self, request: Request, step: str) -> None:
@@ -59,12 +57,11 @@ class Display(Bar):
         if self._steps or case.verdict not in PASSING:
             line.append(named(f": {headline(case)}\n  {case.reason}", case.sides))
         self._console.print(line, soft_wrap=True)
-        self._bar.advance(self._task)
-        self._show()
+        self._show(1)
 
-    def _show(self) -> None:
+    def _show(self, ended: int = 0) -> None:
         running = [f"{name} {step}".rstrip() for name, step in self._running.items()]
-        self._bar.update(self._task, description=", ".join(running)[: self._console.width // 2])
+        self.count(", ".join(running)[: self._console.width // 2], ended)
 
 
 def summarise(

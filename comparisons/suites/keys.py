@@ -12,6 +12,7 @@ from comparisons.compare.budget import Budget
 from comparisons.mitsuba.backend import Backend
 from comparisons.mitsuba.reading.reference import file_of
 from comparisons.runs import provenance
+from comparisons.runs.engine import key_of
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.files import read_input, read_text
 
@@ -22,17 +23,16 @@ _APART = ("report", "commands", "gate", "experiments")
 def case_key(scene: Scene, budget: Budget, rungs: tuple[str, ...], backend: Backend) -> str:
     """SHA-256 of the scene and the files it names, the budget, the requested rungs, our sources,
     and the versions of the packages that compute.  Raises SceneError for a missing file."""
-    parts = {
-        "scene": scene.digest(),
-        "files": files_digest(scene),
-        "budget": budget.model_dump(),
-        "rungs": rungs,
-        "sources": code_fingerprint(),
-        "versions": provenance.package_versions(),
-        "variant": backend.variant,
-        "llvm": backend.llvm_path,
-    }
-    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+    return key_of(
+        scene=scene.digest(),
+        files=files_digest(scene),
+        budget=budget.model_dump(),
+        rungs=rungs,
+        sources=code_fingerprint(),
+        versions=provenance.package_versions(),
+        variant=backend.variant,
+        llvm=backend.llvm_path,
+    )
 
 
 def files_digest(scene: Scene) -> str:

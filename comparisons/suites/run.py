@@ -7,7 +7,7 @@ import json
 import shlex
 import signal
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import FrameType
@@ -23,7 +23,8 @@ from comparisons.results.stored_case import (
     read_stored_case,
     write_case,
 )
-from comparisons.runs.processes import pool
+from comparisons.runs import engine
+from comparisons.runs.processes.child import Ended
 from comparisons.runs.provenance import provenance
 from comparisons.suites.display import Display
 from comparisons.suites.keys import case_key
@@ -132,6 +133,13 @@ class Options:
         """The page."""
         return self.out / "report.html"
 
+    @property
+    def worker(self) -> list[str]:
+        """The module that runs cases, and its options."""
+        threads = [] if self.threads is None else ["--threads", str(self.threads)]
+        runner = [] if self.runner is None else ["--runner", self.runner]
+        return ["comparisons.suites.worker", *threads, *runner]
+
 
 def run_suite(source: Source, plan: Plan, options: Options) -> Run:
     """`run_cases` for a suite."""
@@ -204,10 +212,14 @@ def run_cases(
                     add(done.case, done.wall)
                     display.done(done.case, done.remark)
             write()
-            for outcome in _outcomes(requests, seconds, options, display):
-                case = _case(outcome)
-                add(case, outcome.wall)
-                display.done(case, f"{outcome.wall:.1f} s")
+            for request, case, ended in engine.measured(
+                requests, _stored, options.workers, seconds, options.worker,
+                fresh=True, doing=display.doing,
+            ):  # fmt: skip
+                assert ended is not None
+                case = _case(request, case, ended)
+                add(case, ended.wall)
+                display.done(case, f"{ended.wall:.1f} s")
                 write()
         except (KeyboardInterrupt, SystemExit):
             write()
@@ -275,35 +287,24 @@ def _done(request: Request) -> _Done | None:
         return None
 
 
-def _outcomes(
-    requests: Sequence[Request], seconds: float, options: Options, display: Display
-) -> Iterator[pool.Outcome[Request]]:
-    worker = ["comparisons.suites.worker"]
-    if options.threads is not None:
-        worker += ["--threads", str(options.threads)]
-    if options.runner is not None:
-        worker += ["--runner", options.runner]
-    running = pool.run(requests, options.workers, seconds, display.doing, worker)
-    # If the caller is interrupted, the pool is closed at once: no worker outlives this process.
-    with contextlib.closing(running):
-        yield from running
+def _stored(request: Request) -> Case:
+    return read_case(request.folder)
 
 
-def _case(outcome: pool.Outcome[Request]) -> Case:
+def _case(request: Request, case: Case | None, ended: Ended) -> Case:
     """The case as its worker stored it, or an invalid one that says why there is none."""
-    request = outcome.request
     log = request.folder / LOG
     log.unlink(missing_ok=True)
-    if outcome.failure is None:
-        return read_case(request.folder)
-    if outcome.invalid:
-        return _without_result(request, "scene", outcome.failure, outcome.wall)
-    reason = outcome.failure
-    if outcome.log:
+    if case is not None:
+        return case
+    reason = ended.failure or ""
+    if ended.invalid:
+        return _without_result(request, "scene", reason, ended.wall)
+    if ended.log:
         log.parent.mkdir(parents=True, exist_ok=True)
-        log.write_text(outcome.log, encoding="utf-8")
+        log.write_text(ended.log, encoding="utf-8")
         reason += f"; see {log}"
-    return _without_result(request, "run", reason, outcome.wall)
+    return _without_result(request, "run", reason, ended.wall)
 
 
 def _without_result(request: Request, rung: str, reason: str, wall: float = 0.0) -> Case:

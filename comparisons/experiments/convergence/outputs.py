@@ -1,7 +1,6 @@
 """`results.json` and `results.csv` of `reference-rt converge`, and its lines on a terminal."""
 
 import csv
-import json
 import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,8 +13,7 @@ from comparisons.experiments.convergence.estimates import Line
 from comparisons.experiments.convergence.findings import Findings, Ratio, Target
 from comparisons.experiments.convergence.store import Settings
 from comparisons.report.values import percent
-from comparisons.results.files import csv_file, plain
-from reference_rt.util.files import replacing
+from comparisons.results.files import csv_file, plain, write_json
 
 # ---- for a terminal -----------------------------------------------------------------------------
 
@@ -142,9 +140,7 @@ def write_results(
         "settings": asdict(settings),
         "scenes": [_scene(one) for one in curves],
     }
-    text = json.dumps(plain(document), indent=2, ensure_ascii=False, allow_nan=False)
-    with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+    write_json(path, plain(document))
 
 
 def write_table(path: Path, curves: Sequence[Curves]) -> None:

@@ -2,7 +2,6 @@
 rendered again."""
 
 import hashlib
-import json
 import os
 import platform
 import shutil
@@ -18,7 +17,8 @@ import numpy as np
 from comparisons.gate.digest import scene_digest, source_digest
 from comparisons.gate.reference import cache_folder
 from comparisons.mitsuba.backend import backend
-from comparisons.results.files import read_arrays, sealed, unsealed, write_arrays
+from comparisons.results.files import read_arrays, write_arrays
+from comparisons.runs import engine
 from comparisons.runs.provenance import package_versions
 from comparisons.statistics.metrics import RELMSE_EPSILON
 from comparisons.suites.keys import code_fingerprint, files_digest
@@ -28,7 +28,7 @@ from reference_rt.rendering.render import Progress, render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Sobol
 from reference_rt.util.errors import ImageError
-from reference_rt.util.files import delete_unfinished, read_text, replacing
+from reference_rt.util.files import delete_unfinished
 
 # ---- settings of a run, its reference, and its rungs ---------------------------------------------
 
@@ -210,18 +210,17 @@ def run_key(scene: Scene, replicates: int) -> str:
     """SHA-256 of all that rungs depend on: the scene as rendered and its files, our sources, the
     versions of packages that compute, the machine, and the number of replicates."""
     chosen = backend()
-    parts = {
-        "schema": SCHEMA,
-        "scene": scene.digest(),
-        "files": files_digest(scene),
-        "sources": code_fingerprint(),
-        "reference": key_of(scene),
-        "versions": package_versions(),
-        "mitsuba": (chosen.variant, chosen.llvm_path),
-        "machine": (platform.node(), platform.machine(), os.cpu_count()),
-        "replicates": replicates,
-    }
-    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+    return engine.key_of(
+        schema=SCHEMA,
+        scene=scene.digest(),
+        files=files_digest(scene),
+        sources=code_fingerprint(),
+        reference=key_of(scene),
+        versions=package_versions(),
+        mitsuba=(chosen.variant, chosen.llvm_path),
+        machine=(platform.node(), platform.machine(), os.cpu_count()),
+        replicates=replicates,
+    )
 
 
 class Store:
@@ -232,9 +231,9 @@ class Store:
 
     def __init__(self, folder: Path | None, key: str, *, fresh: bool = False) -> None:
         self._folder, self._key = folder, key
-        if folder is not None and (fresh or self._read("key") != key):
+        if folder is not None and (fresh or engine.stored(folder / "key.json", key) is None):
             shutil.rmtree(folder, ignore_errors=True)
-            self._write("key", key)
+            engine.store(folder / "key.json", key, "this run's")
         if folder is not None:
             delete_unfinished(folder)
 
@@ -281,23 +280,13 @@ class Store:
 
     def fact(self, name: str, settings: Any = None) -> Any:
         """What `keep_fact` stored, if it was for the same settings; else None."""
-        found = self._read(name)
-        if isinstance(found, dict) and found.get("settings") == json.loads(json.dumps(settings)):
-            return found.get("fact")
-        return None
+        return self._folder and engine.stored(*self._fact(self._folder, name, settings))
 
     def keep_fact(self, name: str, fact: Any, settings: Any = None) -> None:
         """Store what JSON can hold."""
-        self._write(name, {"settings": settings, "fact": fact})
-
-    def _read(self, name: str) -> Any:
-        if self._folder is None:
-            return None
-        with suppress(OSError, ValueError, RecursionError):
-            return unsealed(json.loads(read_text(self._folder / f"{name}.json"))).get("value")
-        return None
-
-    def _write(self, name: str, value: Any) -> None:
         if self._folder is not None:
-            with replacing(self._folder / f"{name}.json") as temporary:
-                temporary.write_text(json.dumps(sealed({"value": value})), encoding="utf-8")
+            engine.store(*self._fact(self._folder, name, settings), fact)
+
+    def _fact(self, folder: Path, name: str, settings: Any) -> tuple[Path, str]:
+        """Its file and key."""
+        return folder / f"{name}.json", engine.key_of(run=self._key, settings=settings)

@@ -10,16 +10,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
-from typing import Any
 
 import reference_rt
 from comparisons.experiments.fuzz.fields import all_types
 from comparisons.experiments.selftest import FAULTS
 from comparisons.experiments.selftest.fault import SourceFault
 from comparisons.experiments.selftest.sensitivity import patched_text
+from comparisons.results.files import write_json
 from reference_rt.util.child_processes import tied
 from reference_rt.util.errors import ReferenceRtError
-from reference_rt.util.files import replacing, temporary_folder
+from reference_rt.util.files import temporary_folder
 
 MOST_SCENES = 500
 
@@ -42,9 +42,6 @@ class Planted:
     lines: int = 0
     scene: str = ""
 
-    def as_json(self) -> dict[str, Any]:
-        return asdict(self)
-
 
 def source_faults() -> list[SourceFault]:
     """The faults of the self-test that are planted in the source."""
@@ -65,9 +62,7 @@ def search(
     found: list[Planted] = []
     for fault in faults:
         found.append(_search(fault, out / "planted", seed, workers, count))
-        with replacing(out / FILE) as temporary:
-            document = {"seed": seed, "planted": [one.as_json() for one in found]}
-            temporary.write_text(json.dumps(document, indent=1), encoding="utf-8")
+        write_json(out / FILE, {"seed": seed, "planted": [asdict(one) for one in found]})
         yield found[-1]
 
 

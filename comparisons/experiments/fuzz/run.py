@@ -1,11 +1,12 @@
 """A run: scenes through worker processes, findings reduced, results that a later run resumes."""
 
-import contextlib
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 from comparisons.experiments.fuzz import assets
 from comparisons.experiments.fuzz import finding as stored
@@ -22,9 +23,12 @@ from comparisons.experiments.fuzz.finding import (
 )
 from comparisons.experiments.fuzz.generate import generate
 from comparisons.experiments.fuzz.reduce import reduce
-from comparisons.runs.processes import pool
+from comparisons.runs import engine
+from comparisons.runs.processes.child import Ended
 from reference_rt.util.errors import UsageError
 from reference_rt.util.workers import Threads, Workers
+
+T = TypeVar("T")
 
 SECONDS = 600.0
 """Time limit of a scene, wall clock.  One takes 1 to 10 s of CPU time, and a process on a shared
@@ -158,19 +162,24 @@ def _checked(
             return
         requests = [_request(plan, number) for number in batch]
         fresh: dict[int, Checked] = {}
+
+        def read(request: Request, fresh: dict[int, Checked] = fresh) -> Checked | None:
+            fresh.update(reader.new())
+            return fresh.pop(request.number, None)
+
         for tries_left in (1, 0):
             late: list[Request] = []
-            for outcome in _outcomes(plan, requests):
-                if tries_left and LATE in (outcome.failure or ""):
-                    late.append(outcome.request)
-                    continue
-                if outcome.failure is not None:
-                    stored.add(plan.out, _dead(outcome))
-                fresh |= reader.new()
-                number = outcome.request.number
-                yield fresh.pop(number) if number in fresh else _dead(outcome)
-                if is_late():
-                    return
+            with closing(_measured(plan, requests, read, plan.limit)) as running:
+                for request, found, ended in running:
+                    if tries_left and LATE in (ended.failure or ""):
+                        late.append(request)
+                        continue
+                    if ended.failure is not None:
+                        stored.add(plan.out, _dead(request, ended))
+                        found = read(request)
+                    yield found or _dead(request, ended)
+                    if is_late():
+                        return
             # Once more: the first time it may have compiled kernels, or the machine was busy.
             requests = late
 
@@ -179,20 +188,21 @@ LATE = "took longer than"
 """In the failure of a request whose time was up."""
 
 
-def _outcomes(plan: Plan, requests: list[Request]) -> Iterator[pool.Outcome[Request]]:
-    running = pool.run(requests, plan.workers, plan.limit, lambda r, step: None, WORKER)
-    with contextlib.closing(running):  # its processes end with it
-        yield from running
+def _measured(
+    plan: Plan, requests: list[Request], read: Callable[[Request], T | None], limit: float
+) -> Generator[tuple[Request, T | None, Ended], None, None]:
+    measured = engine.measured(requests, read, plan.workers, limit, WORKER, fresh=True)
+    with closing(measured) as running:  # its processes end with it
+        for request, found, ended in running:
+            assert ended is not None
+            yield request, found, ended
 
 
-def _dead(outcome: pool.Outcome[Request]) -> Checked:
+def _dead(request: Request, ended: Ended) -> Checked:
     """The result of a scene at which its process died, hung or stopped with an error."""
-    why = outcome.failure or "no result was stored"
-    finding = Finding(
-        rung="run", cause=without_numbers(why), detail=f"{why}\n{outcome.log[-1500:]}"
-    )
-    request = outcome.request
-    return Checked(number=request.number, findings=[finding], seconds=outcome.wall)
+    why = ended.failure or "no result was stored"
+    finding = Finding(rung="run", cause=without_numbers(why), detail=f"{why}\n{ended.log[-1500:]}")
+    return Checked(number=request.number, findings=[finding], seconds=ended.wall)
 
 
 def _request(plan: Plan, number: int) -> Request:
@@ -232,17 +242,18 @@ def _reduce_all(plan: Plan, found: Run, say: Callable[[str], None]) -> None:
         for number, finding in chosen
     ]
     inside = [r for r in requests if not _died(r)]
-    limit = 3.0 * plan.shrink + plan.limit
-    running = pool.run(inside, plan.workers, limit, lambda r, step: None, WORKER)
-    with contextlib.closing(running):
-        for outcome in running:
-            if outcome.failure is not None:
-                stored.add_reduced(plan.out, _unreduced(plan, outcome.request))
-            say(f"scene {outcome.request.number}: reduced ({outcome.wall:.0f} s)")
+    for request, _, ended in _measured(plan, inside, _nothing, 3.0 * plan.shrink + plan.limit):
+        if ended.failure is not None:
+            stored.add_reduced(plan.out, _unreduced(plan, request))
+        say(f"scene {request.number}: reduced ({ended.wall:.0f} s)")
     for request in requests:
         if _died(request):
             stored.add_reduced(plan.out, _outside(plan, request))
     found.reduced = [*stored.reduced(plan.out)]
+
+
+def _nothing(request: Request) -> None:
+    """What is read of a request whose result is read later, with all others."""
 
 
 def _died(request: Request) -> bool:
@@ -276,8 +287,8 @@ def _outside(plan: Plan, request: Request) -> Reduced:
         one = one.model_copy(update={"out": plan.out / "tried"})
         one.out.mkdir(exist_ok=True)
         limit = min(plan.limit, 30.0) if LATE not in wanted.cause else plan.limit / 2.0
-        (outcome,) = pool.run([one], plan.workers, limit, lambda r, step: None, WORKER)
-        return outcome.failure is not None and without_numbers(outcome.failure) == wanted.cause
+        ((_, _, ended),) = _measured(plan, [one], _nothing, limit)
+        return ended.failure is not None and without_numbers(ended.failure) == wanted.cause
 
     try:
         scene = _scene(plan, request.number)

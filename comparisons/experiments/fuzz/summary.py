@@ -1,6 +1,5 @@
 """A run for people and programs: progress, coverage, distinct findings, JSON, JUnit, the page."""
 
-import json
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -10,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from junitparser import Failure, JUnitXml, TestCase, TestSuite
-from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 
 from comparisons.experiments.fuzz.fields import all_types, possible_pairs
 from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced, text_of
 from comparisons.experiments.fuzz.run import Plan, Run
 from comparisons.report.templates import template, write
-from reference_rt.util.console import Bar
+from comparisons.results.files import write_json
+from comparisons.runs.engine import Count
 from reference_rt.util.errors import printable
 from reference_rt.util.files import replacing
 
@@ -88,22 +87,18 @@ def table(found: Coverage) -> str:
 # ---- progress -----------------------------------------------------------------------------------
 
 
-class Display(Bar):
-    """Counts scenes and findings.  scenes: how many are to come; None: until the time is up."""
+class Display(Count):
+    """Counts scenes and findings."""
 
-    def __init__(self, scenes: int | None) -> None:
-        super().__init__(MofNCompleteColumn(), TimeElapsedColumn())
-        self._task = self._bar.add_task("scenes", total=scenes)
-        self._done = 0
-        self._findings = 0
+    _done, _findings = 0, 0
 
     def done(self, checked: Checked) -> None:
         """A scene has been checked."""
         self._done += 1
+        self._findings += len(checked.findings)
         for finding in checked.findings:
-            self._findings += 1
             self.line(f"scene {checked.number}: {finding.rung}: {finding.cause}")
-        self._bar.update(self._task, advance=1, description=f"{self._findings} findings")
+        self.count(f"{self._findings} findings")
         if not self.is_terminal and self._done % 100 == 0:
             self.line(f"{self._done} scenes, {self._findings} findings")
 
@@ -195,9 +190,7 @@ def write_results(plan: Plan, run: Run, provenance: Mapping[str, Any], junit: Pa
             for one, count in found
         ],
     }
-    with replacing(plan.out / "fuzz.json") as temporary:
-        text = json.dumps(document, indent=1, ensure_ascii=False)
-        temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
+    write_json(plan.out / "fuzz.json", document)
     if junit is not None:
         _write_junit(junit, plan, run)
 

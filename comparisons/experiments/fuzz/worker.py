@@ -4,9 +4,7 @@ It follows `comparisons.runs.processes.protocol`: it reads `Request`s and stores
 folders.  Mitsuba runs in its scalar variant: for a few hundred rays of a scene that is seen once, a
 variant that compiles takes several times as long (measured: 2 s against 9 s a scene)."""
 
-import faulthandler
 import os
-import sys
 import time
 import warnings
 from pathlib import Path
@@ -40,7 +38,7 @@ from comparisons.mitsuba.backend import FORCE, SCALAR
 from comparisons.mitsuba.translate import load
 from comparisons.report.thumbnails import png_url
 from comparisons.results.case import Case, RungResult
-from comparisons.runs.processes.protocol import carry_out, private_stdout
+from comparisons.runs.processes.protocol import serve
 from comparisons.statistics.metrics import encode, white_level
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import RayCast, Whitted
@@ -177,13 +175,8 @@ hang on which rays are drawn."""
 
 def main() -> None:
     """Handle requests until standard input ends."""
-    faulthandler.enable()
     os.environ.setdefault(FORCE, SCALAR)
-    answers = private_stdout()
-    for line in sys.stdin:
-        request = Request.model_validate_json(line)
-        task = do_scene if request.task == "scene" else do_reduce
-        carry_out(lambda task=task, request=request: task(request), answers)  # type: ignore[misc]
+    serve(Request, lambda asked: do_scene(asked) if asked.task == "scene" else do_reduce(asked))
 
 
 def checked(request: Request, scene: Data, effort: Effort) -> Checked:

@@ -386,9 +386,10 @@ class Display(Count):
 
     def done(self, found: Found, remark: str) -> None:
         """Count a point; failures of ours are printed, and without a terminal everything."""
+        self.count(f"{found.family} {found.series}")
         bad = found.broken or (found.ours is not None and found.ours.failures)
-        line = f"{found.family} {found.series} {found.x:g}: {said(found)} ({remark})"
-        self.count(f"{found.family} {found.series}", line, always=bool(bad))
+        if bad or not self.is_terminal:
+            self.line(f"{found.family} {found.series} {found.x:g}: {said(found)} ({remark})")
 
 
 def said(found: Found) -> str:
