@@ -3,7 +3,7 @@
 - `fields.py`, `assets.py`: the types of the scene schema; random values of fields, meshes, and
   files;
 - `parts.py`, `generate.py`: random parts, and the scene that is made of them;
-- `check.py`: one scene through the rungs, `identities/` through changes that must not matter;
+- `check.py`: one scene through the rungs, `identities.py` through changes that must not matter;
 - `finding.py`: what is asked for, with how much effort, what is found, and results that a run
   resumes;
 - `reduce.py`: a failing scene made small while it fails in the same way;

@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 
 import reference_rt as rt
+from comparisons.experiments.relations import HIERARCHIES
 from comparisons.experiments.stability.harness.core import (
     OURS,
     Draw,
@@ -44,7 +45,6 @@ from comparisons.experiments.stability.harness.steps import any_turn, at, scaled
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.vectors import unit_vectors
 from reference_rt import shapes as any_shape
-from reference_rt.accel import bvh
 from reference_rt.core import transform
 from reference_rt.core.arrays import IntArray
 from reference_rt.core.ray import Hit, is_representable
@@ -218,9 +218,6 @@ def lattice_rays(rng: np.random.Generator, n: int) -> tuple[FloatArray, FloatArr
 # ---- tests every primitive for every ray; hierarchies must agree with that bit for bit -----------
 
 
-METHODS: tuple[bvh.Method, ...] = ("sah", "median", "spatial", "none")
-
-
 @kernel
 def _comes_first(shapes: Shapes, a: Hit, b: Hit) -> bool:
     """Which of two hits at one t counts: by kind, then by shape, then by face."""
@@ -344,7 +341,7 @@ def _compared(
     """Each ray is a case for each hierarchy.  truth: by default what "none" finds."""
     total = Outcome(0, 0)
     expected = None
-    for method in reversed(METHODS):
+    for method in HIERARCHIES:
         tables = rt.build_tables(scene.changed(hierarchy=method))
         got = find(tables)
         if expected is None:

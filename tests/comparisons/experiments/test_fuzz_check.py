@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from comparisons.experiments.fuzz import assets, check
+from comparisons.experiments.fuzz import assets, check, identities
 from comparisons.experiments.fuzz.finding import DETERMINISTIC, Effort, Finding, without_numbers
 from comparisons.experiments.fuzz.generate import parse
-from comparisons.experiments.fuzz.identities import rays
 from comparisons.experiments.fuzz.worker import alike, effort_for
 from reference_rt.rendering.render import render
 from reference_rt.util.errors import ReferenceUnavailableError
@@ -102,7 +101,7 @@ def test_errors_and_nan_are_found(files, monkeypatch):
         picture.layers["colour"][2, 3] = np.nan
         return picture
 
-    monkeypatch.setattr(rays, "render", nan)
+    monkeypatch.setattr(identities, "render", nan)
     (found,) = check.check(BALL, 1, FEW, files).findings
     assert (found.rung, found.cause) == ("render", "the layer colour is not finite")
     assert "row 2, column 3" in found.detail
@@ -110,14 +109,14 @@ def test_errors_and_nan_are_found(files, monkeypatch):
     def error(scene, **options):
         raise ZeroDivisionError("in tile 17")
 
-    monkeypatch.setattr(rays, "render", error)
+    monkeypatch.setattr(identities, "render", error)
     (found,) = check.check(BALL, 1, FEW, files).findings
     assert found.cause.startswith("ZeroDivisionError in test_fuzz_check.py, error: in tile #")
 
     def missing(scene, **options):
         raise ReferenceUnavailableError("no Mitsuba")
 
-    monkeypatch.setattr(rays, "render", missing)
+    monkeypatch.setattr(identities, "render", missing)
     with pytest.raises(ReferenceUnavailableError):
         check.check(BALL, 1, FEW, files)
 

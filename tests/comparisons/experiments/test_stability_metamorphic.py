@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import reference_rt as rt
+from comparisons.experiments import relations
 from comparisons.experiments.stability import metamorphic as f09_metamorphic
 from comparisons.experiments.stability.harness import scenes
 from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, family
 from comparisons.experiments.stability.harness.meshes import write_obj
 from comparisons.experiments.stability.metamorphic import light, rays
-from comparisons.experiments.stability.metamorphic import motion as f09_motion
 from comparisons.experiments.stability.metamorphic import rays as f09_rays
 from comparisons.geometry.frame import round32
 
@@ -184,7 +184,7 @@ def _transformed_alone(monkeypatch, change):
     """`change` the scene that is transformed, not those that it is compared with."""
 
     def moved(scene, motion):
-        found = f09_motion.moved(scene, motion)
+        found = relations.moved(scene, motion)
         return change(found) if len(scene.shapes) > 1 else found
 
     monkeypatch.setattr(light, "moved", moved)
@@ -244,10 +244,11 @@ import reference_rt as rt
 from reference_rt.core import ray
 from reference_rt.core.vec3 import dot
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.metamorphic import light, motion
+from comparisons.experiments.stability.metamorphic import light
+from comparisons.experiments.relations import Motion
 def leave(point, w):
     return point.p + point.n * (1e-6 if dot(w, point.n) >= 0.0 else -1e-6)
-move = motion.Motion(float(sys.argv[2]))
+move = Motion(float(sys.argv[2]))
 scene = scenes.whitted(Path(sys.argv[1])).changed(film=rt.Film(width=8, height=6))
 honest = light.judged("ours", scene, move).failures
 ray.leave = leave
@@ -292,7 +293,7 @@ def test_mitsubas_epsilon_shows(tmp_path):
 
 def test_offsets_are_exact():
     """As far as the family says that they are."""
-    moved = f09_motion.offset(f09_metamorphic.EXACT_TO)
+    moved = f09_metamorphic.offset(f09_metamorphic.EXACT_TO)
     p = (7.984375, -7.984375, 0.015625)
-    far = moved.point(p)
+    far = moved.points([p])[0].tolist()
     assert tuple(a - b for a, b in zip(far, moved.offset, strict=True)) == p

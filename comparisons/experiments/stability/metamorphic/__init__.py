@@ -22,18 +22,20 @@ Counts.  Rays of a point as in `_CASES`; a picture has 48 x 36 pixels.
 
 Passes.  No failure within each series' guaranteed range.
 
-`motion` transforms scenes, `rearranged` reorders and groups them; `rays` and `light`
-judge."""
+Scenes are changed by `comparisons.experiments.relations`; `rays` and `light` judge."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
-from itertools import product
+from itertools import permutations, product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 import reference_rt as rt
+from comparisons.experiments import relations
+from comparisons.experiments.relations import Motion, moved
 from comparisons.experiments.stability.harness import scenes
 from comparisons.experiments.stability.harness.core import (
     OURS,
@@ -46,25 +48,45 @@ from comparisons.experiments.stability.harness.core import (
     decades,
     together,
 )
-from comparisons.experiments.stability.harness.scenes import same_bits
+from comparisons.experiments.stability.harness.scenes import SIZE, same_bits
+from comparisons.experiments.stability.harness.steps import matrix
 from comparisons.experiments.stability.metamorphic import light, rays
-from comparisons.experiments.stability.metamorphic.motion import (
-    MIRRORS,
-    TURNINGS,
-    Motion,
-    grown,
-    moved,
-    offset,
-    shrunk,
-    turns_of,
-)
 from comparisons.experiments.stability.metamorphic.rays import Outcomes
-from comparisons.experiments.stability.metamorphic.rearranged import nested, rearranged
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.frame import round32
 from comparisons.geometry.vectors import unit_rows
 from reference_rt.shapes.csg.anchor import FAR
 from reference_rt.util.files import temporary_folder
+
+# ---- the motions of the series -------------------------------------------------------------------
+
+
+def offset(x: float) -> Motion:
+    far = x * SIZE
+    return Motion(offset=(far, -0.5 * far, 0.25 * far))
+
+
+def grown(x: float) -> Motion:
+    return Motion(x)
+
+
+def shrunk(x: float) -> Motion:
+    return Motion(1.0 / x)
+
+
+TURNINGS = MIRRORS, EXCHANGES, TURNS, BOTH_OF_THESE = 0.0, 1.0, 2.0, 3.0
+
+
+def turns_of(rng: np.random.Generator, x: float) -> list[FloatArray]:
+    if x == MIRRORS:
+        return [np.diag(signs) for signs in product((1.0, -1.0), repeat=3) if min(signs) < 0.0]
+    if x == EXCHANGES:
+        return [np.eye(3)[list(order)] for order in permutations(range(3)) if order != (0, 1, 2)]
+    mirror = np.diag([1.0, 1.0, -1.0 if x == BOTH_OF_THESE else 1.0])
+    # QR of normal numbers: turns that are spread evenly, up to the signs of columns.
+    found = [np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(6)]
+    return [turn * np.sign(np.linalg.det(turn)) @ mirror for turn in found]
+
 
 # ---- images of F9's failures, 192 pixels wide ----------------------------------------------------
 
@@ -199,6 +221,65 @@ def _turned(draw: Draw, x: float) -> Outcomes:
         mirrored = bool(np.linalg.det(turn) < 0.0)
         found.append({OURS: light.judged(OURS, scene, Motion(turn=turn), mirrored)})
     return together(found)
+
+
+# ---- the same shapes in another order, in other meshes, in groups --------------------------------
+
+REVERSED, SHUFFLED, TRIANGLES, SPLIT = 0.0, 1.0, 2.0, 3.0
+
+
+def rearranged(draw: Draw, x: float) -> Outcomes:
+    """Rays and pictures, bit for bit."""
+    return together(_rearranged(draw, x))
+
+
+def _rearranged(draw: Draw, x: float) -> Iterator[Outcomes]:
+    change = _reordered if x in (REVERSED, SHUFFLED) else _remeshed
+    for make in ALL:
+        scene = make(draw.folder)
+        bench = rays.Bench(scene, draw.cases, draw.rng, draw.mitsuba and make is scenes.things)
+        other, names = change(scene, draw, x)
+        yield bench.compared(other, bench.rays.o, bench.rays.d, names, exact=True)
+    for make in (scenes.path, scenes.whitted):
+        scene = make(draw.folder)
+        other, _ = change(scene, draw, x)
+        yield {OURS: same_bits(*(light.colours(OURS, one) for one in (scene, other)))}
+
+
+def _reordered(scene: rt.Scene, draw: Draw, x: float) -> tuple[rt.Scene, Any]:
+    """Lamps keep their order: a sample picks a light by its number."""
+    n = len(scene.shapes)
+    order = np.arange(n)[::-1] if x == REVERSED else draw.rng.permutation(n)
+    lamps = [k for k in order.tolist() if scene.shapes[k].material == "lamp"]
+    order[np.isin(order, lamps)] = sorted(lamps)
+    return relations.reordered(scene, order)
+
+
+def _remeshed(scene: rt.Scene, draw: Draw, x: float) -> tuple[rt.Scene, Any]:
+    """Every mesh outside groups and solids with its triangles shuffled, or as two."""
+
+    def parts(count: int) -> list[Any]:
+        order = draw.rng.permutation(count)
+        return [order] if x == TRIANGLES else [order[: count // 3], order[count // 3 :]]
+
+    return relations.remeshed(scene, parts) or (scene, None)
+
+
+def nested(draw: Draw, x: float) -> Outcomes:
+    """Shapes under one map, against instances of groups whose maps compose to it."""
+    return together(_nested(draw, x, make) for make in BOTH)
+
+
+def _nested(draw: Draw, x: float, make: Make) -> Outcomes:
+    scene = make(draw.folder)
+    shapes = [s for s in scene.shapes if not isinstance(s, rt.Instance | rt.Plane)]
+    steps: list[Any] = []
+    for _ in range(int(x)):  # maps near the identity, no two alike
+        linear = np.eye(3) + 0.3 / x * draw.rng.normal(size=(3, 3))
+        steps += matrix(linear, 0.3 / x * draw.rng.normal(size=3))
+    bare, grouped, names = relations.nested(scene.changed(groups={}, shapes=()), shapes, steps)
+    bench = rays.Bench(bare, draw.cases, draw.rng, draw.mitsuba and make is scenes.things)
+    return bench.compared(grouped, bench.rays.o, bench.rays.d, names)
 
 
 # ---- the family ---------------------------------------------------------------------------------

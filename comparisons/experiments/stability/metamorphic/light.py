@@ -8,23 +8,17 @@ from typing import NamedTuple
 import numpy as np
 
 import reference_rt as rt
+from comparisons.experiments.relations import REACH, Motion, moved
 from comparisons.experiments.stability.harness import scenes
 from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
 from comparisons.experiments.stability.harness.scenes import SIZE, of_pixels
 from comparisons.experiments.stability.harness.steps import rendered
-from comparisons.experiments.stability.metamorphic.motion import Motion, moved
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.frame import UNIT_ROUNDOFF as U32
 from comparisons.mitsuba.backend import scalar
 from reference_rt.core.ray import UNIT_ROUNDOFF
 
 ROUNDOFF = {OURS: UNIT_ROUNDOFF, MITSUBA: U32}
-
-REACH = 64.0
-"""How far, in u times the largest coordinates, a point may be from where it should: a ray leaves a
-surface by 16 sqrt(3) u (anchor + point + size) at most (`reference_rt.core.ray.surface_error`), 56
-u of the largest coordinate for what is small beside its distance; the eye, target and lights are
-rounded by u each, the point that is shaded by two or three."""
 
 STEPS = 4.0
 """Surfaces that a path meets: each adds an error of that size."""

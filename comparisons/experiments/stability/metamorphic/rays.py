@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 import reference_rt as rt
+from comparisons.experiments.relations import Identities, Motion, Names, identities_of
 from comparisons.experiments.stability.harness.core import (
     MITSUBA,
     OURS,
@@ -19,7 +20,6 @@ from comparisons.experiments.stability.harness.core import (
 from comparisons.experiments.stability.harness.scenes import GRID
 from comparisons.experiments.stability.harness.solids import Truth, truths
 from comparisons.experiments.stability.harness.steps import traced
-from comparisons.experiments.stability.metamorphic.motion import Motion
 from comparisons.geometry.exact.dyadic import BoolArray, nearest
 from comparisons.geometry.exact.referee import Referee
 from comparisons.geometry.exact.referee import Truth as First
@@ -106,8 +106,6 @@ class Judge:
         return found
 
 
-Identities = npt.NDArray[np.int64]
-
 Outcomes = dict[str, Outcome]
 
 HALVINGS = 50
@@ -132,8 +130,7 @@ class Found(NamedTuple):
 
 
 def found_of(hits: Intersections) -> Found:
-    columns = (hits.shape, hits.instance, hits.part, hits.primitive)
-    return Found(hits.t, np.where(hits.shape[:, None] < 0, -1, np.column_stack(columns)))
+    return Found(hits.t, identities_of(hits))
 
 
 def ours(tables: SceneTables, o: FloatArray, d: FloatArray) -> Found:
@@ -186,9 +183,7 @@ def differ(a: Found, b: Found) -> BoolArray:
 
 def through(motion: Motion, rays: Rays) -> tuple[FloatArray, FloatArray]:
     """Origins and directions, transformed as the scene is; t grows by the factor."""
-    o = np.array([motion.point(p) for p in rays.o.tolist()]).reshape(-1, 3)
-    d = np.array([motion.vector(v) for v in rays.d.tolist()]).reshape(-1, 3)
-    return o, d
+    return motion.points(rays.o), motion.vectors(rays.d)
 
 
 class Traced(NamedTuple):
@@ -315,7 +310,7 @@ class Bench:
         scene: rt.Scene,
         o: FloatArray,
         d: FloatArray,
-        names: Callable[[Identities], Identities] | None = None,
+        names: Names | None = None,
         factor: float = 1.0,
         exact: bool = False,
         unmoved: bool = False,
