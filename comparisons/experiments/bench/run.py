@@ -1,12 +1,11 @@
 """Measures the groups of rows one after another on this machine, or reads them if stored."""
 
-import datetime
 import hashlib
 import importlib.metadata
-import json
 import os
 import platform
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,9 +16,11 @@ from comparisons.experiments.bench.groups import GROUPS, Group
 from comparisons.experiments.bench.row import Row, row_from
 from comparisons.experiments.bench.setting import Setting
 from comparisons.experiments.bench.table import Display, markdown
+from comparisons.results.files import write_json
+from comparisons.runs import engine
 from comparisons.runs.provenance import code_fingerprint, ours
 from reference_rt.util.errors import ReferenceUnavailableError
-from reference_rt.util.files import check_writable, read_text, replacing
+from reference_rt.util.files import check_writable, replacing
 
 # ---- the machine --------------------------------------------------------------------------------
 
@@ -120,7 +121,7 @@ def run(
             outcome.not_measured[group.name] = str(error)
             display.line(f"{group.name}: not measured: {error}")
             continue
-        _write_rows(path, key, rows)
+        engine.store(path, key, [row.as_json() for row in rows])
         display.done(rows)
         _write(out, outcome, key, setting)
     _write(out, outcome, key, setting)
@@ -129,29 +130,23 @@ def run(
 
 def key_of(setting: Setting, facts: dict[str, Any]) -> str:
     """A hash of all that rows depend on; stored rows with another key are not used."""
-    digest = hashlib.sha256(code_fingerprint().encode())
-    for path in sorted(p for p in setting.scenes.rglob("*") if p.is_file()):
-        digest.update(hashlib.sha256(path.read_bytes()).digest())
-    if setting.mesh is not None:
-        digest.update(hashlib.sha256(setting.mesh.read_bytes()).digest())
-    versions = [importlib.metadata.version(name) for name in _PACKAGES if facts.get(name)]
-    parts = [versions, facts["machine"], facts["cores"], setting.quick, setting.threads]
-    digest.update(json.dumps(parts).encode())
-    return digest.hexdigest()
+    files = sorted(p for p in setting.scenes.rglob("*") if p.is_file())
+    files += [] if setting.mesh is None else [setting.mesh]
+    return engine.key_of(
+        sources=code_fingerprint(),
+        files=[hashlib.sha256(path.read_bytes()).hexdigest() for path in files],
+        versions=[importlib.metadata.version(name) for name in _PACKAGES if facts.get(name)],
+        machine=[facts["machine"], facts["cores"]],
+        setting=[setting.quick, setting.threads],
+    )
 
 
 def read_rows(path: Path, key: str) -> list[Row] | None:
     """The rows that are stored with this key, if any."""
-    try:
-        kept = json.loads(read_text(path))
-        return [row_from(row) for row in kept["rows"]] if kept["key"] == key else None
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
-
-
-def _write_rows(path: Path, key: str, rows: Sequence[Row]) -> None:
-    kept = {"key": key, "date": _now(), "rows": [row.as_json() for row in rows]}
-    _write_json(path, kept)
+    with suppress(KeyError, TypeError):
+        kept = engine.stored(path, key)
+        return None if kept is None else [row_from(row) for row in kept]
+    return None
 
 
 def _write(out: Path, outcome: Outcome, key: str, setting: Setting) -> None:
@@ -171,17 +166,7 @@ def _write(out: Path, outcome: Outcome, key: str, setting: Setting) -> None:
         "rows": [row.as_json() for row in outcome.rows],
         "not_measured": outcome.not_measured,
     }
-    _write_json(out / "results.json", document)
+    write_json(out / "results.json", document)
     with replacing(out / "bench.md") as temporary:
         text = markdown(outcome.rows, outcome.machine, outcome.not_measured)
         temporary.write_text(text, encoding="utf-8")
-
-
-def _write_json(path: Path, document: dict[str, Any]) -> None:
-    with replacing(path) as temporary:
-        text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
-        temporary.write_text(text, encoding="utf-8")
-
-
-def _now() -> str:
-    return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")

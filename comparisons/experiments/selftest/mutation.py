@@ -7,7 +7,6 @@ then with those of the standard suite."""
 
 import ast
 import copy
-import json
 import os
 import subprocess
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,6 +21,7 @@ from comparisons.compare.compare import Say
 from comparisons.experiments.selftest.fault import SourceFault
 from comparisons.experiments.selftest.patched import PACKAGE, run_patched, run_worker
 from comparisons.experiments.selftest.sensitivity import Budgets, compare_patched
+from comparisons.results.files import write_json
 from comparisons.runs.elsewhere import run_elsewhere
 from reference_rt.util.errors import ReferenceRtError
 from reference_rt.util.files import replacing
@@ -308,10 +308,9 @@ def _share(caught: int, n: int) -> str:
 def write(fates: Sequence[Fate], seed: int, out: Path) -> None:
     """Write mutants.json and mutants.md into the folder `out`."""
     document = {"schema": 2, "seed": seed, "mutants": [fate.as_json() for fate in fates]}
-    texts = json.dumps(document, indent=1, ensure_ascii=False), summary(fates)
-    for name, text in zip(FILES, texts, strict=True):
-        with replacing(out / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+    write_json(out / FILES[0], document)
+    with replacing(out / FILES[1]) as temporary:
+        temporary.write_text(summary(fates), encoding="utf-8")
 
 
 def by_few_rays(mutant: Mutant, before: Mapping[str, Any]) -> Fate:

@@ -1,6 +1,5 @@
 """The whole self-test: sensitivity, power, calibration, specificity, and their tables."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +17,7 @@ from comparisons.experiments.selftest.sensitivity import (
     sensitivity,
 )
 from comparisons.experiments.selftest.specificity import Alarms, specificity
+from comparisons.results.files import write_json
 from comparisons.runs.provenance import provenance
 from comparisons.suites.suite import load_suite, plan
 from reference_rt.util.files import replacing
@@ -113,8 +113,7 @@ def _write(out: Path, outcome: Outcome) -> None:
         "calibration": [one.as_json() for one in outcome.calibrations],
         "specificity": [alarms.as_json() for alarms in outcome.alarms],
     }
-    with replacing(out / "selftest.json") as temporary:
-        temporary.write_text(json.dumps(document, indent=1, ensure_ascii=False), encoding="utf-8")
+    write_json(out / "selftest.json", document)
     with replacing(out / "selftest.md") as temporary:
         temporary.write_text(markdown(outcome), encoding="utf-8")
 
