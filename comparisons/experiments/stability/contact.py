@@ -53,6 +53,7 @@ from reference_rt.core.vec3 import row
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.rendering.query import radiance_without_noise
+from reference_rt.rendering.query.tracing import link_to_geometry
 
 # ---- stacks of surfaces that are close to each other, and the order in which rays meet them ------
 
@@ -95,7 +96,8 @@ class Stack(NamedTuple):
 def follow(scene: rt.Scene, o: FloatArray, d: FloatArray, steps: int) -> IntArray:
     """The shapes that rays meet on their way straight through, -1 after the last."""
     out = np.full((len(o), steps), -1)
-    _follow(rt.build_tables(scene).geometry, o, d, out)
+    found = link_to_geometry(rt.build_tables(scene), "closest_hit", "surface", "owner")
+    _follow(found.tables, o, d, out)
     return out
 
 

@@ -13,6 +13,7 @@ from reference_rt.accel.geometry import Geometry, closest_hit, occluded, surface
 from reference_rt.core.ray import Ray, SurfacePoint, at, ray_from
 from reference_rt.core.vec3 import Vec3, dot, row
 from reference_rt.jit.kernel import entry_kernel, kernel
+from reference_rt.rendering.query.tracing import link_to_geometry
 
 PIXELS = 160
 """Across a picture."""
@@ -75,7 +76,8 @@ def lit(
                     out[k, 1] = abs(float(np.dot(si.n, to)))
         return out
     epsilon = 0.0 if contestant == OURS else EPSILON
-    _lit(rt.build_tables(scene).geometry, o, d, w, epsilon, out)
+    found = link_to_geometry(rt.build_tables(scene), "closest_hit", "surface", "occluded")
+    _lit(found.tables, o, d, w, epsilon, out)
     return out
 
 
