@@ -149,27 +149,27 @@ def _family(request: Request) -> str:
 
 def shoot(choice: Choice, found: Sequence[Found], out: Path, workers: Workers) -> list[Picture]:
     """Images of each series at the first x at which the first contestant other than ours fails and
-    its image differs from ours: both."""
-    left = _failing(choice, found)
-    seen: list[Picture] = []
-    while left:
-        pairs = {}
-        for (one, series), (who, places) in left.items():
-            x = places.pop(0)
-            pairs[one, series] = [choice.request(one, series, x, out, w) for w in (who, OURS)]
+    its image differs from ours: both.  The first x of all series first, as most differ there."""
+    seen: dict[tuple[str, str], list[Picture]] = {}
+    for some in (slice(1), slice(1, None)):
+        pairs = {
+            (place, x): [choice.request(*place, x, out, name) for name in (who, OURS)]
+            for place, (who, places) in _failing(choice, found).items()
+            if place not in seen
+            for x in places[some]
+        }
         wanted = [request for pair in pairs.values() for request in pair]
         made = engine.measured(wanted, _caption, workers, SECONDS["full"], WORKER, kin=_family)
         captions = {request.out: caption for request, caption, _ in made}
-        for place, pair in pairs.items():
+        for (place, x), pair in pairs.items():
             told = [captions[request.out] for request in pair]
-            if None not in told and _differ(*(request.out for request in pair)):
-                seen += [
-                    Picture(*place, request.shoot, request.x, request.out, str(caption))
-                    for request, caption in zip(pair, told, strict=True)
-                ]
-                del left[place]
-        left = {place: some for place, some in left.items() if some[1]}
-    return seen
+            if place in seen or None in told or not _differ(*(request.out for request in pair)):
+                continue
+            seen[place] = [
+                Picture(*place, request.shoot, x, request.out, str(caption))
+                for request, caption in zip(pair, told, strict=True)
+            ]
+    return [picture for pictures in seen.values() for picture in pictures]
 
 
 def _failing(
