@@ -3,12 +3,11 @@ hangs, or ends the process."""
 
 import os
 import signal
-import sys
 import time
 
 from comparisons.experiments.fuzz import finding
 from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced, Request
-from comparisons.runs.processes.protocol import carry_out, private_stdout
+from comparisons.runs.processes.protocol import serve
 
 FOUND = Finding(rung="geometry", cause="ours wrong: t", detail="1 of 9 rays")
 
@@ -31,7 +30,7 @@ def scene(request: Request) -> None:
 
 def reduced(request: Request) -> None:
     assert request.finding is not None
-    finding.add_reduced(
+    finding.add(
         request.out,
         Reduced(
             number=request.number,
@@ -44,13 +43,9 @@ def reduced(request: Request) -> None:
     )
 
 
-def main() -> None:
-    answers = private_stdout()
-    for line in sys.stdin:
-        request = Request.model_validate_json(line)
-        task = scene if request.task == "scene" else reduced
-        carry_out(lambda task=task, request=request: task(request), answers)  # type: ignore[misc]
+def carry_out(request: Request) -> None:
+    (scene if request.task == "scene" else reduced)(request)
 
 
 if __name__ == "__main__":
-    main()
+    serve(Request, carry_out)

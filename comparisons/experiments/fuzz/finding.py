@@ -1,13 +1,13 @@
 """What a worker of the fuzzer is asked for, with how much effort, and what it finds, as data."""
 
 import json
-import os
 import re
+import shutil
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -223,59 +223,34 @@ class Request(BaseModel):
         return Grammar(self.features, self.extreme)
 
 
-# The results of a run in its folder: a line for each scene, a file for each reduced finding.
+# ---- the results of a run in its folder: a file for each scene, and for each reduced finding -----
 
 
-SCENES = "scenes.jsonl"
-FINDINGS = "findings"
+M = TypeVar("M", Checked, Reduced)
 
 
-def add(folder: Path, checked: Checked) -> None:
-    """Append what came of a scene.  Processes append whole lines at the same time."""
-    line = checked.model_dump_json().encode() + b"\n"
-    folder.mkdir(parents=True, exist_ok=True)
-    file = os.open(folder / SCENES, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
-    try:
-        os.write(file, line)
-    finally:
-        os.close(file)
+def _file(folder: Path, kind: type[Checked] | type[Reduced], number: int | str) -> Path:
+    return folder / ("findings" if kind is Reduced else "scenes") / f"{number}.json"
 
 
-class Reader:
-    """Reads what processes append: each call returns what is new."""
-
-    def __init__(self, folder: Path) -> None:
-        self._path, self._read = folder / SCENES, 0
-
-    def new(self) -> dict[int, Checked]:
-        """What was stored since the last call, by number.  A line that is not whole, of a process
-        that died, is left out."""
-        found: dict[int, Checked] = {}
-        if not self._path.exists():
-            return found
-        with self._path.open("rb") as file:
-            file.seek(self._read)
-            text = file.read()
-        whole = text[: text.rfind(b"\n") + 1]
-        self._read += len(whole)
-        for line in whole.splitlines():
-            with suppress(ValidationError):
-                checked = Checked.model_validate_json(line)
-                found[checked.number] = checked
-        return found
+def add(folder: Path, one: Checked | Reduced) -> None:
+    """Store what came of a scene, or a reduced finding."""
+    with replacing(_file(folder, type(one), one.number)) as temporary:
+        temporary.write_text(one.model_dump_json(indent=1), encoding="utf-8")
 
 
-def add_reduced(folder: Path, reduced: Reduced) -> None:
-    """Store a reduced finding."""
-    with replacing(folder / FINDINGS / f"{reduced.number}.json") as temporary:
-        temporary.write_text(reduced.model_dump_json(indent=1), encoding="utf-8")
+def read(folder: Path, kind: type[M], number: int) -> M | None:
+    """What is stored of a scene; None where nothing is, or nothing whole."""
+    with suppress(OSError, ValidationError):
+        return kind.model_validate_json(_file(folder, kind, number).read_bytes())
+    return None
 
 
-def reduced(folder: Path) -> Iterator[Reduced]:
-    """All reduced findings, by number."""
-    files = sorted((folder / FINDINGS).glob("*.json"), key=lambda file: int(file.stem))
-    for file in files:
-        yield Reduced.model_validate_json(file.read_text(encoding="utf-8"))
+def every(folder: Path, kind: type[M]) -> Iterator[M]:
+    """All that is stored, by number."""
+    files = _file(folder, kind, 0).parent.glob("*.json")
+    found = (read(folder, kind, number) for number in sorted(int(file.stem) for file in files))
+    yield from (one for one in found if one is not None)
 
 
 def check_settings(folder: Path, settings: dict[str, object]) -> bool:
@@ -291,7 +266,6 @@ def check_settings(folder: Path, settings: dict[str, object]) -> bool:
 
 def remove(folder: Path) -> None:
     """Remove the results of earlier runs."""
-    for name in (SCENES, "settings.json"):
-        (folder / name).unlink(missing_ok=True)
-    for file in (folder / FINDINGS).glob("*.json"):
-        file.unlink()
+    (folder / "settings.json").unlink(missing_ok=True)
+    for kind in (Checked, Reduced):
+        shutil.rmtree(_file(folder, kind, 0).parent, ignore_errors=True)

@@ -117,11 +117,11 @@ def run(plan: Plan, tell: Tell, say: Callable[[str], None] = lambda line: None) 
             "another folder by --out"
         )
     assets.write(plan.files)
-    reader = stored.Reader(plan.out)
-    found = Run(reader.new(), [*stored.reduced(plan.out)])
+    known = {checked.number: checked for checked in stored.every(plan.out, Checked)}
+    found = Run(known, [*stored.every(plan.out, Reduced)])
     start = time.monotonic()
     try:
-        for checked in _checked(plan, found.scenes, reader, start):
+        for checked in _checked(plan, found.scenes, start):
             found.scenes[checked.number] = checked
             found.fresh += 1
             tell(checked)
@@ -146,9 +146,7 @@ def _numbers(plan: Plan, done: dict[int, Checked]) -> Iterator[int]:
         number += 1
 
 
-def _checked(
-    plan: Plan, done: dict[int, Checked], reader: stored.Reader, start: float
-) -> Iterator[Checked]:
+def _checked(plan: Plan, done: dict[int, Checked], start: float) -> Iterator[Checked]:
     """What comes of the scenes, as they end."""
     numbers = _numbers(plan, done)
     size = BATCH if plan.seconds is None else 20 * plan.workers.threads
@@ -161,23 +159,17 @@ def _checked(
         if not batch:
             return
         requests = [_request(plan, number) for number in batch]
-        fresh: dict[int, Checked] = {}
-
-        def read(request: Request, fresh: dict[int, Checked] = fresh) -> Checked | None:
-            fresh.update(reader.new())
-            return fresh.pop(request.number, None)
-
         for tries_left in (1, 0):
             late: list[Request] = []
-            with closing(_measured(plan, requests, read, plan.limit)) as running:
+            with closing(_measured(plan, requests, _stored, plan.limit)) as running:
                 for request, found, ended in running:
                     if tries_left and LATE in (ended.failure or ""):
                         late.append(request)
                         continue
-                    if ended.failure is not None:
-                        stored.add(plan.out, _dead(request, ended))
-                        found = read(request)
-                    yield found or _dead(request, ended)
+                    if found is None:
+                        found = _dead(request, ended)
+                        stored.add(plan.out, found)
+                    yield found
                     if is_late():
                         return
             # Once more: the first time it may have compiled kernels, or the machine was busy.
@@ -244,12 +236,16 @@ def _reduce_all(plan: Plan, found: Run, say: Callable[[str], None]) -> None:
     inside = [r for r in requests if not _died(r)]
     for request, _, ended in _measured(plan, inside, _nothing, 3.0 * plan.shrink + plan.limit):
         if ended.failure is not None:
-            stored.add_reduced(plan.out, _unreduced(plan, request))
+            stored.add(plan.out, _unreduced(plan, request))
         say(f"scene {request.number}: reduced ({ended.wall:.0f} s)")
     for request in requests:
         if _died(request):
-            stored.add_reduced(plan.out, _outside(plan, request))
-    found.reduced = [*stored.reduced(plan.out)]
+            stored.add(plan.out, _outside(plan, request))
+    found.reduced = [*stored.every(plan.out, Reduced)]
+
+
+def _stored(request: Request) -> Checked | None:
+    return stored.read(request.out, Checked, request.number)
 
 
 def _nothing(request: Request) -> None:

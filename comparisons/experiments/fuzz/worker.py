@@ -227,7 +227,7 @@ def do_reduce(request: Request) -> None:
         effort = request.effort
     found = reduce(scene, fails, seconds=request.seconds)
     fails(found.scene)
-    stored.add_reduced(
+    stored.add(
         request.out,
         Reduced(
             number=request.number,

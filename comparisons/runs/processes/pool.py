@@ -138,9 +138,6 @@ def _run_here(
 _children = Children()
 """Of this process, a worker of a cluster: they go on with the next request."""
 
-_LINES = ".jsonl"
-"""Suffix of files that every request appends lines to; others are replaced."""
-
 
 def carry_out_remotely(
     asked: dict[str, Any],
@@ -168,11 +165,5 @@ def carry_out_remotely(
 def _store(files: dict[str, bytes], folder: Path) -> None:
     """Write what a worker of a cluster has sent."""
     for name, content in files.items():
-        path = folder / name
-        if path.suffix == _LINES:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with path.open("ab") as lines:
-                lines.write(content)
-        else:
-            with replacing(path) as temporary:
-                temporary.write_bytes(content)
+        with replacing(folder / name) as temporary:
+            temporary.write_bytes(content)

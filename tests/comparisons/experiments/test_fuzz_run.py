@@ -111,13 +111,12 @@ def test_it_stops_at_the_first_finding(tmp_path, fake_workers):
     assert len(found.reduced) == 1
 
 
-def test_half_a_line_is_left_out(tmp_path):
+def test_half_a_file_is_left_out(tmp_path):
     finding.add(tmp_path, Checked(number=3))
-    with (tmp_path / finding.SCENES).open("a") as file:
-        file.write('{"number": 4, "lit"')
-    reader = finding.Reader(tmp_path)
-    assert set(reader.new()) == {3}
-    assert reader.new() == {}
+    (tmp_path / "scenes" / "4.json").write_text('{"number": 4, "lit"')
+    assert [checked.number for checked in finding.every(tmp_path, Checked)] == [3]
+    finding.remove(tmp_path)
+    assert not [*finding.every(tmp_path, Checked)]
 
 
 def test_the_command_refuses_what_it_does_not_know(tmp_path):
