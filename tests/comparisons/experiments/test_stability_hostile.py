@@ -11,7 +11,7 @@ import reference_rt as rt
 from comparisons.experiments.fuzz.assets import files, write, write_files
 from comparisons.experiments.stability.harness.solids import Stretch, Truth
 from comparisons.experiments.stability.harness.solids import problem as list_problem
-from comparisons.experiments.stability.hostile import bomb, example, problem, rays, worker
+from comparisons.experiments.stability.hostile import bomb, example, problem, undefined, worker
 from comparisons.experiments.stability.hostile.damage import (
     BASES,
     as_text,
@@ -181,7 +181,7 @@ def hits_of(**changed):
     ],
 )
 def test_undefined_answers_are_seen(changed, d, wrong):
-    found = rays.undefined(hits_of(**changed), np.zeros((1, 3)), np.array([[0.0, 0.0, d]]))
+    found = undefined(hits_of(**changed), np.zeros((1, 3)), np.array([[0.0, 0.0, d]]))
     assert found.tolist() == [wrong]
 
 

@@ -32,7 +32,7 @@ from comparisons.report.plots import Curve, log_log
 from comparisons.report.templates import template, write
 from comparisons.report.terminal import fitted
 from comparisons.report.values import label, power_of_ten, typeset
-from comparisons.results.files import csv_file, write_json
+from comparisons.results.files import csv_file, plain, write_json
 from comparisons.runs.engine import Count
 
 # ---- the table of all series, for a terminal and as Markdown -------------------------------------
@@ -207,7 +207,7 @@ def _side(found: Sequence[Found], head: SeriesSummary, name: str) -> dict[str, A
     if everything is None:
         return None
     worst = None if first is None else first.worst
-    return {"cases": everything.cases, "failures": everything.failures, "worst": _finite(worst)}
+    return {"cases": everything.cases, "failures": everything.failures, "worst": plain(worst, str)}
 
 
 def _series_json(one: SeriesSummary, effort: Effort, seed: int) -> dict[str, Any]:
@@ -232,7 +232,8 @@ def _series_json(one: SeriesSummary, effort: Effort, seed: int) -> dict[str, Any
                 "broken": f.broken,
                 "again": again(f, effort, seed),
                 "outcomes": {
-                    name: _flat(f.outcomes[name]) | {"examples": _finite(f.outcomes[name].examples)}
+                    name: _flat(f.outcomes[name])
+                    | {"examples": plain(f.outcomes[name].examples, str)}
                     for name in contestants([f])
                 },
             }
@@ -245,22 +246,9 @@ def _flat(some: Outcome) -> dict[str, Any]:
     return {
         "cases": some.cases,
         "failures": some.failures,
-        "worst": _finite(some.worst),
+        "worst": plain(some.worst, str),
         "open": some.open,
     }
-
-
-def _finite(value: Any) -> Any:
-    """Numbers that JSON does not have as text, however deep: "inf", "-inf", "nan"."""
-    match value:
-        case float() if not math.isfinite(value):
-            return str(value)
-        case Mapping():
-            return {key: _finite(item) for key, item in value.items()}
-        case list() | tuple():
-            return [_finite(item) for item in value]
-        case _:
-            return value
 
 
 # ---- the page: a single file that needs no network and runs no script ----------------------------

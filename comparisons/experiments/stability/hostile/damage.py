@@ -85,11 +85,12 @@ def number(rng: np.random.Generator, old: float) -> float | int:
     way = rng.integers(8)
     if way < 5:
         return float(pick(rng, NUMBERS)) if isinstance(old, float) else _whole(rng)
+    size = float(min(max(old, -MOST), MOST))  # integers may be larger
     with np.errstate(all="ignore"):
         if way == 5:
-            return float(np.ldexp(float(old), int(rng.integers(-1100, 1100))))
+            return float(np.ldexp(size, int(rng.integers(-1100, 1100))))
         if way == 6:
-            return float(np.nextafter(float(old), pick(rng, (-np.inf, np.inf))))
+            return float(np.nextafter(size, pick(rng, (-np.inf, np.inf))))
     return -old
 
 
