@@ -66,7 +66,7 @@ def converge(
     A rung is a number of samples per pixel.  Finished rungs are kept in the output folder.
     """
     with compare_extra():
-        from comparisons.experiments.convergence.curves import Curves
+        from comparisons.experiments.convergence.findings import Curves
         from comparisons.experiments.convergence.methods import chosen
         from comparisons.experiments.convergence.outputs import (
             again,

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from comparisons.experiments.convergence.ladder import Climb
-from comparisons.experiments.convergence.methods import Shot
+from comparisons.experiments.convergence.methods import Climb, Shot
 from comparisons.experiments.convergence.store import Reference
 
 SHAPE = (12, 16, 3)

@@ -8,9 +8,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from comparisons.experiments.convergence.curves import Curves
 from comparisons.experiments.convergence.estimates import Line
-from comparisons.experiments.convergence.findings import Findings, Ratio, Target
+from comparisons.experiments.convergence.findings import Curves, Findings, Ratio, Target
 from comparisons.experiments.convergence.store import Settings
 from comparisons.report.values import percent
 from comparisons.results.files import csv_file, plain, write_json

@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from markupsafe import Markup
 
-from comparisons.experiments.convergence.curves import Crops, Curves
 from comparisons.experiments.convergence.estimates import Bias, Line
-from comparisons.experiments.convergence.findings import Ratio, Target
+from comparisons.experiments.convergence.findings import Crops, Curves, Ratio, Target
 from comparisons.experiments.convergence.starts import STAGES
 from comparisons.experiments.convergence.store import Settings
 from comparisons.report.plots import Curve, log_log

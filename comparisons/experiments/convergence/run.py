@@ -10,29 +10,33 @@ import numpy as np
 from comparisons.compare import pictures
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import budgeted
-from comparisons.experiments.convergence.curves import Curves, GridPoint, Grids, GridStep, crops_of
-from comparisons.experiments.convergence.findings import findings_of
-from comparisons.experiments.convergence.ladder import (
-    SPP,
-    Climb,
-    Cost,
-    affordable,
-    climb,
-    estimate,
-    merits,
-    rungs,
-    why_left_out,
+from comparisons.experiments.convergence.findings import (
+    Curves,
+    GridPoint,
+    Grids,
+    GridStep,
+    crops_of,
+    findings_of,
 )
 from comparisons.experiments.convergence.methods import (
     BEST,
     METHODS,
+    SPP,
     AbsentError,
+    Climb,
+    Cost,
     Method,
     Renderer,
     Stable,
+    affordable,
     chosen,
+    climb,
+    estimate,
     failing,
+    merits,
     remarks,
+    rungs,
+    why_left_out,
     with_sampler,
 )
 from comparisons.experiments.convergence.starts import starts_of

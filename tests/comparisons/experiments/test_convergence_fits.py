@@ -15,14 +15,14 @@ from comparisons.experiments.convergence.estimates import (
     time_to,
 )
 from comparisons.experiments.convergence.findings import Target, ratio
-from comparisons.experiments.convergence.ladder import (
+from comparisons.experiments.convergence.methods import (
     Cost,
+    Shot,
     affordable,
     estimate,
     rungs,
     why_left_out,
 )
-from comparisons.experiments.convergence.methods import Shot
 from comparisons.experiments.convergence.store import Settings
 
 

@@ -14,11 +14,22 @@ from typer.testing import CliRunner
 import comparisons.commands.register
 from comparisons.experiments.bench import equal_error
 from comparisons.experiments.convergence import run
-from comparisons.experiments.convergence.curves import Curves
 from comparisons.experiments.convergence.estimates import Estimate
-from comparisons.experiments.convergence.findings import Ratio, Target, compared, findings_of
-from comparisons.experiments.convergence.ladder import Climb, climb
-from comparisons.experiments.convergence.methods import METHODS, AbsentError, Shot, failing
+from comparisons.experiments.convergence.findings import (
+    Curves,
+    Ratio,
+    Target,
+    compared,
+    findings_of,
+)
+from comparisons.experiments.convergence.methods import (
+    METHODS,
+    AbsentError,
+    Climb,
+    Shot,
+    climb,
+    failing,
+)
 from comparisons.experiments.convergence.outputs import lines_of, write_results
 from comparisons.experiments.convergence.page import write_page
 from comparisons.experiments.convergence.store import Settings, Store

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from convergence_fakes import EXACT, Fake, climbs
 
-from comparisons.experiments.convergence import ladder
-from comparisons.experiments.convergence.ladder import Climb, climb
-from comparisons.experiments.convergence.methods import Shot
+from comparisons.experiments.convergence import methods
+from comparisons.experiments.convergence.methods import Climb, Shot, climb
 from comparisons.experiments.convergence.store import Store
 
 
@@ -77,7 +76,7 @@ def test_slower_than_promised_climbs_less():
 
 
 def test_long_runs_are_stored_on_the_way(tmp_path, monkeypatch):
-    monkeypatch.setattr(ladder, "STORED_EVERY", -1.0)
+    monkeypatch.setattr(methods, "STORED_EVERY", -1.0)
     kept = []
     store = Store(tmp_path / "s", "key")
     monkeypatch.setattr(store, "keep", lambda name, rung: kept.append(rung.replicates))

@@ -14,14 +14,14 @@ from typer.testing import CliRunner
 
 import comparisons.commands.register
 from comparisons.experiments import convergence
-from comparisons.experiments.convergence.curves import Curves
-from comparisons.experiments.convergence.findings import findings_of
-from comparisons.experiments.convergence.ladder import Climb, climb
+from comparisons.experiments.convergence.findings import Curves, findings_of
 from comparisons.experiments.convergence.methods import (
     METHODS,
     AbsentError,
+    Climb,
     Stable,
     chosen,
+    climb,
     with_sampler,
 )
 from comparisons.experiments.convergence.outputs import COLUMNS, write_results, write_table

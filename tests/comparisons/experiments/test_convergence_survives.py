@@ -11,8 +11,8 @@ import pytest
 from builders import SCENES
 
 PROGRAM = (
-    "from comparisons.experiments.convergence import ladder\n"
-    "ladder.STORED_EVERY = 0.0\n"  # after each sweep, not each 15 s
+    "from comparisons.experiments.convergence import methods\n"
+    "methods.STORED_EVERY = 0.0\n"  # after each sweep, not each 15 s
     "from reference_rt.cli.main import main; main()"
 )
 
