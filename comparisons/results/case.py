@@ -55,6 +55,8 @@ class Images:
     candidate: FloatArray
     reference: FloatArray
     error: FloatArray | None = None
+    witness: FloatArray | None = None
+    """A third renderer's, where one was asked."""
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,8 @@ class Children:
     ) -> Ended:
         """Have a child carry out a request, a line of JSON.
 
-        module: see `pool.run`;  folder: where the child starts, if there is such a folder;
+        module: see `pool.run`; or a command, which begins with the absolute path of a program that
+        keeps to the protocol;  folder: where the child starts, if there is such a folder;
         seconds: its time limit;  say: called with what is being done for it, "" when it begins.
         Raises ReferenceUnavailableError.
         """
@@ -118,7 +119,7 @@ class _Child:
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 (closed by `close`)
         # A session of its own: Ctrl-C is for the parent, which then ends its children.
         self._process = subprocess.Popen(
-            [sys.executable, "-m", *module],
+            list(module) if os.path.isabs(module[0]) else [sys.executable, "-m", *module],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._log,
