@@ -17,7 +17,7 @@ from typing import Any
 from numba.core.compiler_lock import global_compiler_lock
 
 from reference_rt.jit.kernel import CACHE_FOLDER, Signature, is_compiled, precompile
-from reference_rt.util.child_processes import end_with_parent
+from reference_rt.util.processes import end_with_parent
 
 PATIENCE = 60.0
 """Seconds to wait for the child when nothing else is left to do; all kernels of a scene compile in

@@ -15,9 +15,9 @@ import numpy as np
 from comparisons.experiments.bench.row import Row, within
 from comparisons.experiments.bench.setting import Setting
 from comparisons.experiments.bench.timing import ROUNDS
-from reference_rt.util.child_processes import tied
 from reference_rt.util.errors import ReferenceRtError
 from reference_rt.util.files import temporary_folder
+from reference_rt.util.processes import tied
 
 # ---- the suite smoke ----------------------------------------------------------------------------
 

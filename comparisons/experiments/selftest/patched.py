@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import reference_rt
-from reference_rt.util.child_processes import tied
 from reference_rt.util.errors import ReferenceRtError
 from reference_rt.util.files import temporary_folder
+from reference_rt.util.processes import tied
 
 PACKAGE = Path(reference_rt.__file__).resolve().parent
 

@@ -18,7 +18,7 @@ from comparisons.gate.digest import fingerprint
 from comparisons.gate.gate import LIMIT, gate_pictures, look
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference
-from comparisons.results.case import FloatArray
+from reference_rt.core.arrays import FloatArray
 from comparisons.runs.elsewhere import run_elsewhere
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.workers import Workers

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from reference_rt.util.child_processes import tied
 from reference_rt.util.errors import ReferenceUnavailableError
+from reference_rt.util.processes import tied
 
 MOST_CASES = 40
 """A child is replaced after so many: what libraries keep of each scene adds up, and a start costs

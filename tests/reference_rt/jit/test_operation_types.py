@@ -13,8 +13,7 @@ import reference_rt.rendering  # noqa: F401 -- imports all operations
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Hit, Ray
 from reference_rt.core.vec3 import Vec3
-from reference_rt.jit.links import LINK, Group, Link
-from reference_rt.jit.operation_types import declare, type_of
+from reference_rt.jit.links import LINK, Group, Link, declare, type_of
 from reference_rt.shapes import Shapes
 
 import_everything()
