@@ -9,9 +9,16 @@ from comparisons import statistics
 from comparisons.compare import diagnosis
 from comparisons.compare.looks import Looks
 from comparisons.compare.path_length import Lengths
-from comparisons.results.case import Case, Cause, FloatArray, ImageRegion, Images, RungResult
+from comparisons.results.case import (
+    Case,
+    Cause,
+    FloatArray,
+    ImageRegion,
+    Images,
+    RungResult,
+    decide,
+)
 from comparisons.results.rungs import RUNGS
-from comparisons.results.verdict import decide
 from comparisons.rungs.images import images_rung
 from comparisons.rungs.input import input_rung
 from comparisons.rungs.limited import limited

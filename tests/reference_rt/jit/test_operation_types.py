@@ -100,8 +100,8 @@ def test_all_groups_are_found():
     """One of each kind, at least."""
     found = {name.rpartition(".")[0].removeprefix("reference_rt.") for name in GROUPS}
     assert found >= {
-        *("shapes.tables", "accel.geometry", "materials.bsdfs.tables", "lights.selection.tree"),
-        *("materials.nested.flattened", "cameras", "cameras.filters", "textures.lookup"),
+        *("shapes.tables", "accel.geometry", "materials.bsdfs.tables", "lights.selection.choice"),
+        *("materials.nested.flattened", "cameras", "cameras.film", "textures.lookup"),
     }
     assert len(OPERATIONS) > 40
 
