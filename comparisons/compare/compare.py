@@ -28,8 +28,7 @@ from comparisons.mitsuba.translate.integrators import in_place_of
 from comparisons.mitsuba.translate.moved import with_float32_vertices
 from comparisons.results.case import Case, Images, RungResult
 from comparisons.rungs.layers.rung import applies
-from reference_rt.cameras.film import Film
-from reference_rt.cameras.filters import BoxFilter
+from reference_rt.cameras.film import BoxFilter, Film
 from reference_rt.cli.explain import explain
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import RayCast, Whitted

@@ -10,9 +10,16 @@ from comparisons.compare import diagnosis
 from comparisons.compare.looks import Looks
 from comparisons.compare.path_length import Lengths
 from comparisons.cycles.witness import Witness
-from comparisons.results.case import Case, Cause, FloatArray, ImageRegion, Images, RungResult
+from comparisons.results.case import (
+    Case,
+    Cause,
+    FloatArray,
+    ImageRegion,
+    Images,
+    RungResult,
+    decide,
+)
 from comparisons.results.rungs import RUNGS
-from comparisons.results.verdict import decide
 from comparisons.rungs.images import images_rung
 from comparisons.rungs.input import input_rung
 from comparisons.rungs.limited import limited

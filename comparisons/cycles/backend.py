@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 
 from comparisons.cycles.translate import write
-from comparisons.runs.processes.child import Children
+from comparisons.runs.processes import Children
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceUnavailableError

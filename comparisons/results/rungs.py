@@ -1,4 +1,4 @@
-"""The names of the rungs, in their order."""
+"""The names of the rungs, in their order; imported without NumPy, for the options of commands."""
 
 RUNGS = (
     *("scene", "run", "input", "files", "film", "geometry"),

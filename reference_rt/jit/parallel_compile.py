@@ -23,7 +23,7 @@ from reference_rt.jit.kernel import (
     is_compiling,
     precompile,
 )
-from reference_rt.util.child_processes import end_with_parent
+from reference_rt.util.processes import end_with_parent
 
 PATIENCE = 60.0
 """Seconds to wait for the child when nothing else is left to do; all kernels of a scene compile in

@@ -8,7 +8,7 @@ import time
 
 from comparisons.experiments.fuzz import finding
 from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced, Request
-from comparisons.runs.processes.protocol import carry_out, private_stdout
+from comparisons.runs.processes import carry_out, private_stdout
 
 FOUND = Finding(rung="geometry", cause="ours wrong: t", detail="1 of 9 rays")
 

@@ -22,7 +22,7 @@ from comparisons.experiments.fuzz.finding import (
 )
 from comparisons.experiments.fuzz.generate import generate
 from comparisons.experiments.fuzz.reduce import reduce
-from comparisons.runs.processes import pool
+from comparisons.runs import processes
 from reference_rt.util.errors import UsageError
 from reference_rt.util.workers import Threads, Workers
 
@@ -45,8 +45,8 @@ FEW = 40
 @dataclass(frozen=True)
 class Plan:
     """out: folder of the results;  count, seconds: of scenes and wall clock, whichever ends first;
-    first: the number of the first scene;  workers: what checks scenes, see `pool.run`;  stop: at
-    the first finding;  command: another renderer's;  scenes: data in place of generated scenes;
+    first: the number of the first scene;  workers: what checks scenes, see `processes.run`;  stop:
+    at the first finding;  command: another renderer's;  scenes: data in place of generated scenes;
     shrink: seconds for the reduction of a finding, 0: none;  limit: seconds of a scene."""
 
     out: Path
@@ -179,13 +179,13 @@ LATE = "took longer than"
 """In the failure of a request whose time was up."""
 
 
-def _outcomes(plan: Plan, requests: list[Request]) -> Iterator[pool.Outcome[Request]]:
-    running = pool.run(requests, plan.workers, plan.limit, lambda r, step: None, WORKER)
+def _outcomes(plan: Plan, requests: list[Request]) -> Iterator[processes.Outcome[Request]]:
+    running = processes.run(requests, plan.workers, plan.limit, lambda r, step: None, WORKER)
     with contextlib.closing(running):  # its processes end with it
         yield from running
 
 
-def _dead(outcome: pool.Outcome[Request]) -> Checked:
+def _dead(outcome: processes.Outcome[Request]) -> Checked:
     """The result of a scene at which its process died, hung or stopped with an error."""
     why = outcome.failure or "no result was stored"
     finding = Finding(
@@ -233,7 +233,7 @@ def _reduce_all(plan: Plan, found: Run, say: Callable[[str], None]) -> None:
     ]
     inside = [r for r in requests if not _died(r)]
     limit = 3.0 * plan.shrink + plan.limit
-    running = pool.run(inside, plan.workers, limit, lambda r, step: None, WORKER)
+    running = processes.run(inside, plan.workers, limit, lambda r, step: None, WORKER)
     with contextlib.closing(running):
         for outcome in running:
             if outcome.failure is not None:
@@ -276,7 +276,7 @@ def _outside(plan: Plan, request: Request) -> Reduced:
         one = one.model_copy(update={"out": plan.out / "tried"})
         one.out.mkdir(exist_ok=True)
         limit = min(plan.limit, 30.0) if LATE not in wanted.cause else plan.limit / 2.0
-        (outcome,) = pool.run([one], plan.workers, limit, lambda r, step: None, WORKER)
+        (outcome,) = processes.run([one], plan.workers, limit, lambda r, step: None, WORKER)
         return outcome.failure is not None and without_numbers(outcome.failure) == wanted.cause
 
     try:

@@ -36,7 +36,7 @@ from comparisons.mitsuba.backend import LLVM, SCALAR, backend, variant
 from comparisons.mitsuba.scene import picture
 from comparisons.mitsuba.translate import load
 from reference_rt.rendering.tiles import render_tile
-from reference_rt.util.child_processes import tied
+from reference_rt.util.processes import tied
 
 # ---- pictures in bands, in parts by several processes, and in plain Python -----------------------
 

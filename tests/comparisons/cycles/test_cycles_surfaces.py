@@ -15,15 +15,18 @@ SHAPES = {
     "rectangle": rt.Rectangle(),
     "triangle": rt.Triangle(v0=(0, 0, 0), v1=(1, 0.2, 0), v2=(0.1, 1, 0.3)),
     "box": rt.Box(),
-    "mesh": rt.Mesh(vertices=((0, 0, 0), (1, 0, 0), (1, 1, 0.5), (0, 1, 0)), faces=((0, 1, 2), (0, 2, 3)),
-                    uv=((0, 0), (1, 0), (1, 1), (0, 1))),
+    "mesh": rt.Mesh(
+        vertices=((0, 0, 0), (1, 0, 0), (1, 1, 0.5), (0, 1, 0)),
+        faces=((0, 1, 2), (0, 2, 3)),
+        uv=((0, 0), (1, 0), (1, 1), (0, 1)),
+    ),
     "disk": rt.Disk(),
     "cylinder": rt.Cylinder(radius=0.5, z_min=-0.4, z_max=0.9),
     "tube": rt.Cylinder(radius=0.5, capped=False),
     "cone": rt.Cone(radius=0.8, height=1.3),
     "frustum": rt.Cone(radius=0.4, height=1.1, top_radius=0.7),
     "torus": rt.Torus(major_radius=1.0, minor_radius=0.3),
-}  # fmt: skip
+}
 
 MAPS = {
     "none": (),

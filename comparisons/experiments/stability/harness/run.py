@@ -15,7 +15,7 @@ from comparisons.experiments.stability.harness.family import Family, Series, fam
 from comparisons.experiments.stability.harness.table import contestants, summarise
 from comparisons.experiments.stability.harness.worker import Request
 from comparisons.mitsuba.backend import backend
-from comparisons.runs.processes import pool
+from comparisons.runs import processes
 from comparisons.runs.provenance import everything_fingerprint
 from reference_rt.util.errors import ReferenceUnavailableError
 from reference_rt.util.workers import Workers
@@ -122,7 +122,7 @@ def shoot(choice: Choice, found: Sequence[Found], out: Path, workers: Workers) -
             pairs[one, series] = [_request(choice, *at, name) for name in (who, OURS)]
         wanted = [r for pair in pairs.values() for r in pair if _caption(r.out, key) is None]
         limit = SECONDS["full"]
-        with closing(pool.run(wanted, workers, limit, lambda *_: None, WORKER)) as running:
+        with closing(processes.run(wanted, workers, limit, lambda *_: None, WORKER)) as running:
             for _ in running:
                 pass
         for place, pair in pairs.items():
@@ -189,7 +189,7 @@ def _request(
 
 
 def _measured(requests: Sequence[Request], workers: Workers, effort: Effort) -> Iterator[Found]:
-    running = pool.run(requests, workers, SECONDS[effort], lambda *_: None, WORKER)
+    running = processes.run(requests, workers, SECONDS[effort], lambda *_: None, WORKER)
     with closing(running):
         for outcome in running:
             request = outcome.request

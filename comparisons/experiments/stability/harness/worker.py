@@ -1,7 +1,7 @@
 """`python -m comparisons.experiments.stability.harness.worker`: measures one sweep point after
-another, as `comparisons.runs.processes.pool` requests.
+another, as `comparisons.runs.processes` requests.
 
-It speaks `comparisons.runs.processes.protocol`.  A process of its own, because extreme numbers
+It speaks `comparisons.runs.processes`.  A process of its own, because extreme numbers
 crash native libraries.
 """
 
@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict
 
 from comparisons.experiments.stability.harness.core import OURS, Draw, Effort, Found, generator
 from comparisons.experiments.stability.harness.family import family
-from comparisons.runs.processes.protocol import carry_out, private_stdout
+from comparisons.runs.processes import carry_out, private_stdout
 from reference_rt.util.errors import SceneWarning
 from reference_rt.util.files import replacing, temporary_folder
 

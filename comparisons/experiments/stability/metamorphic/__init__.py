@@ -54,7 +54,7 @@ from comparisons.experiments.stability.metamorphic.rearranged import nested, rea
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.frame import round32
 from comparisons.geometry.vectors import unit_rows
-from reference_rt.shapes.csg.anchor import FAR
+from reference_rt.shapes.csg import FAR
 from reference_rt.util.files import temporary_folder
 
 # ---- images of F9's failures, 192 pixels wide ----------------------------------------------------

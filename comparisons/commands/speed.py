@@ -1,17 +1,120 @@
-"""`reference-rt converge`."""
+"""Commands that measure speed: `reference-rt bench`, `methods` and `converge`."""
 
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from comparisons.commands.options import ClusterFile, Fresh, Scheduler, compare_extra, out_folder
+from comparisons.commands.options import (
+    ClusterFile,
+    Fresh,
+    Scenes,
+    Scheduler,
+    compare_extra,
+    out_folder,
+    table_in,
+)
 from reference_rt.cli.adjusted import Defaults, by_name
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import SceneError, UsageError, printable
+
+
+@guarded
+def bench(
+    out: Annotated[Path, out_folder("results.json and bench.md")] = Path("out/bench"),
+    only: Annotated[
+        list[str] | None,
+        typer.Option(metavar="ROW", help="Only these rows, and those measured together with them."),
+    ] = None,
+    mesh: Annotated[
+        Path | None,
+        typer.Option(help="An .obj or .ply file to trace rays in. (default: a generated mesh)"),
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Smaller pictures and fewer scenes.")
+    ] = False,
+    fresh: Fresh = False,
+    markdown: Annotated[Path | None, table_in("bench")] = None,
+    scenes: Scenes = Path("scenes"),
+) -> None:
+    """Measure the renderer's speed against Mitsuba's; takes about half an hour."""
+    with compare_extra():
+        from comparisons.experiments.bench.row import Setting
+        from comparisons.experiments.bench.run import (
+            Display,
+            chosen,
+            markdown_table,
+            run,
+            terminal_table,
+        )
+        from comparisons.report import templates, terminal
+
+    groups = chosen(only or ())
+    if mesh is not None and not mesh.is_file():
+        raise UsageError(f"--mesh: there is no file '{mesh}'")
+    if markdown is not None:
+        templates.check(markdown, "bench")
+    with Display() as display:
+        setting = Setting(scenes=scenes, mesh=mesh, quick=quick, say=display.say)
+        outcome = run(groups, setting, out, display, fresh)
+    console = terminal.console()
+    console.print(terminal_table(outcome.rows, console.width))
+    if markdown is not None:
+        written = markdown_table(outcome.rows, outcome.machine, outcome.not_measured)
+        templates.rewrite(markdown, "bench", written)
+    for name, why in outcome.not_measured.items():
+        say(f"{name}: not measured: {why}", err=True)
+    say(f"{out / 'results.json'}, {out / 'bench.md'}", err=True)
+    raise typer.Exit(0 if outcome.met else 1)
+
+
+@guarded
+def methods(
+    out: Annotated[Path, out_folder("results and the page", "DIR")] = Path("out/methods"),
+    family: Annotated[
+        list[str] | None,
+        typer.Option(help="Only these: sphere, triangle, box, polygon, csg, hierarchy."),
+    ] = None,
+    full: Annotated[
+        bool, typer.Option("--full/--quick", help="More rays and runs: minutes instead of one.")
+    ] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random shapes and rays.")] = 1,
+) -> None:
+    """Time the textbook's intersection methods, in nanoseconds per ray."""
+    with compare_extra("measuring"):
+        from comparisons.experiments.methods.outputs import table, write, write_page
+        from comparisons.experiments.methods.run import FULL, QUICK, run
+        from comparisons.experiments.methods.trials import FAMILIES
+        from comparisons.runs.provenance import ours
+
+        import_module("matplotlib")  # before minutes of measuring that the page then cannot show
+    from comparisons.report import terminal
+    from reference_rt.util.console import ProgressLine
+    from reference_rt.util.files import check_writable
+
+    names = list(dict.fromkeys(family or FAMILIES))
+    if unknown := [name for name in names if name not in FAMILIES]:
+        raise UsageError(f"--family: expected one of {', '.join(FAMILIES)}, got '{unknown[0]}'")
+    page = out / "methods.html"
+    check_writable(out / "results.json", out / "results.csv", page)
+    effort, about = FULL if full else QUICK, ours()
+    rows = []
+    with ProgressLine() as progress:
+        for name in names:
+            rows += run(name, effort, seed, progress)
+            write(out, rows, effort, seed, about)
+        progress("page", 0.0)
+        write_page(page, rows, effort, seed, about)
+        progress("page", 1.0)
+    console = terminal.console()
+    for name in names:
+        console.print(table([row for row in rows if row.family == name], console.width))
+        console.print()
+    say(f"{out / 'results.json'}, results.csv, methods.html", err=True)
 
 
 @guarded

@@ -1,4 +1,7 @@
-"""Radiance RGBE images, .hdr and .pic (Ward 1991, "Real pixels"): three mantissas, one exponent."""
+"""Formats of linear radiance, decoded here: Radiance RGBE, .hdr and .pic (Ward 1991, "Real pixels":
+three mantissas, one exponent); Portable Float Maps, .pfm (float32, grey or colour, of either byte
+order); NumPy arrays of floats, .npy.
+"""
 
 import math
 import os
@@ -6,12 +9,18 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.image_files.image_file import ImageFile, StoredStrip, check_length
+from reference_rt.core.image_files.image_file import (
+    ImageFile,
+    StoredStrip,
+    as_float64,
+    check_length,
+)
 from reference_rt.util.files import open_input
 
 Rgbe = npt.NDArray[np.uint8]
@@ -177,3 +186,107 @@ def _runs(data: bytes, count: int, length: int) -> Rgbe:
     if at != len(data):
         raise ValueError(f"has {len(data) - at} bytes too many; expected {count} rows")
     return np.frombuffer(out, np.uint8).reshape(count, 4, length).transpose(0, 2, 1)
+
+
+_PATTERN = re.compile(rb"P([Ff])\s+(\d{1,9})\s+(\d{1,9})\s+([-+.\deE]{1,32})\s")
+
+
+@dataclass(frozen=True)
+class PfmFile(ImageFile):
+    """start: byte offset of the pixels;  order: NumPy's type of a number with its byte order."""
+
+    start: int = 0
+    order: str = "<f4"
+
+    def stored(self, with_opacity: bool = False) -> Iterator[StoredStrip]:
+        channels = 1 if self.is_grey else 3
+        row = self.width * channels
+        with open_input(self.path) as file:
+            for rows in self.row_ranges():
+                # The file stores rows from the bottom up.
+                file.seek(self.start + 4 * row * (self.height - rows.stop))
+                values = np.fromfile(file, self.order, row * (rows.stop - rows.start))
+                upwards = values.reshape(rows.stop - rows.start, self.width, channels)
+                yield StoredStrip(rows, upwards[::-1], None)
+
+
+def open_pfm(path: Path) -> ImageFile:
+    """Raises ValueError (what is wrong, what was expected)."""
+    with open_input(path) as file:
+        match = _PATTERN.match(file.read(_HEADER))
+        size = os.fstat(file.fileno()).st_size
+    if match is None:
+        raise ValueError("has a malformed PFM header; expected PF, width, height and scale")
+    channels = 3 if match[1] == b"F" else 1
+    width, height = int(match[2]), int(match[3])
+    try:
+        scale = float(match[4])
+    except ValueError:
+        scale = math.nan
+    if abs(scale) != 1.0:
+        raise ValueError(
+            f"has the scale {match[4].decode()}, which readers do not agree upon; expected 1 "
+            "(big-endian) or -1 (little-endian)"
+        )
+    if min(width, height) > 0:  # `open_image` refuses images without pixels
+        check_length(size - match.end(), width * height * channels * 4)
+    order = "<f4" if scale < 0.0 else ">f4"
+    return PfmFile(path, width, height, is_grey=channels == 1, start=match.end(), order=order)
+
+
+@dataclass(frozen=True)
+class NpyFile(ImageFile):
+    """array: memory-mapped, (height, width), or with 3 or 4 channels, the fourth being opacity."""
+
+    array: Any = None
+
+    def stored(self, with_opacity: bool = False) -> Iterator[StoredStrip]:
+        with open_input(self.path) as file:
+            for rows in self.row_ranges():
+                found = self.array[rows]
+                if self.array.flags.c_contiguous:
+                    # Read rather than mapped: rows that are done do not stay in memory.
+                    file.seek(self.array.offset + rows.start * self.array.strides[0])
+                    found = np.fromfile(file, found.dtype, found.size).reshape(found.shape)
+                if found.dtype.itemsize > 8:  # long doubles
+                    found = as_float64(found)
+                opacity = found[..., 3] if self.has_opacity and with_opacity else None
+                values = found[..., None] if self.is_grey else found[..., :3]
+                yield StoredStrip(rows, values, opacity)
+
+
+def open_npy(path: Path) -> ImageFile:
+    """Raises ValueError (what is wrong, what was expected)."""
+    array = map_npy(path)
+    if array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (3, 4)):
+        raise ValueError(
+            f"has the shape {array.shape}; expected (height, width), (height, width, 3), or with "
+            "opacity (height, width, 4)"
+        )
+    height, width = array.shape[:2]
+    return NpyFile(
+        path,
+        width,
+        height,
+        kind=f"float{min(64, 8 * array.dtype.itemsize)}",
+        is_grey=array.ndim == 2,
+        bits=8 * array.dtype.itemsize,
+        has_opacity=array.ndim == 3 and array.shape[2] == 4,
+        array=array,
+    )
+
+
+def map_npy(path: Path) -> npt.NDArray[Any]:
+    """The array of floats, of any shape, in a file, memory-mapped.  Raises ValueError (what is
+    wrong, what was expected), OSError."""
+    open_input(path).close()  # not a pipe, which could not be mapped
+    try:
+        mapped: npt.NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
+    except OSError:
+        raise
+    except Exception as error:  # its parser is Python's, with any of its exceptions
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise ValueError(f"cannot be read as NPY: {reason}; expected an array of floats") from None
+    if mapped.dtype.kind != "f":
+        raise ValueError(f"holds {mapped.dtype}; expected floats (float16, float32, float64)")
+    return mapped

@@ -1,26 +1,141 @@
-"""The anchor of a solid: a local origin for the coordinates of its operands, next to them.
+"""Constructive solid geometry: union, intersection and difference of solids, nested to any depth.
 
+`sphere & box - cylinder` in Python; in a scene file a tree of unions, intersections and
+differences, whose `of` lists the operands.  Operands are primitives with spans and closed meshes.
+`Solids` has operands and postfix programs of all solids of a scene.
+
+Rays are evaluated in `accel/csg.py`: the program combines, for each stretch of the ray, whether it
+is inside of each operand.
+
+The anchor of a solid is a local origin for the coordinates of its operands, next to them.
 If the operands of a solid at a distance D from the world's origin were tabulated in the world, each
 would be rounded by itself, by u D.  That would separate faces that coincide, and hide parts as thin
 as that.  Here all maps are composed exactly and moved to one anchor: operands round as if the solid
 stood at the origin, and the anchor is subtracted from a ray's origin once for all of them.
+
+To add an operation: a description as `Union` in `shapes/shape.py`; a code here; a case in
+`postfix`, and one in `accel/csg.py`.
 """
 
 from collections.abc import Iterator
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
-from reference_rt.core.arrays import FloatArray
+from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import UNIT_ROUNDOFF, Ray, SurfacePoint
-from reference_rt.core.transform import Affine, Transform, identity
+from reference_rt.core.transform import Affine, Transform, affine, compose, identity
 from reference_rt.core.vec3 import dot, length, max_abs, row
 from reference_rt.jit.kernel import kernel
-from reference_rt.shapes.csg.description import operands_of
-from reference_rt.shapes.csg.tables import Solids
+from reference_rt.shapes import Primitive
+from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.rounding import along_from
-from reference_rt.shapes.shape import Shape, Solid
+from reference_rt.shapes.shape import Difference, Intersection, Shape, Solid, Union
+
+__all__ = [
+    "AND",
+    "NOT",
+    "OR",
+    "Anchored",
+    "AnyShape",
+    "Difference",
+    "Intersection",
+    "Solid",
+    "Solids",
+    "Union",
+    "anchored",
+    "operands_of",
+    "postfix",
+]
+
+OR, AND, NOT = -1, -2, -3
+"""Operators of a program; the numbers 0, 1, 2... are the operands."""
+
+
+class Solids(NamedTuple):
+    """n solids of m operands in all.
+
+    first, operands (n,): a solid's operands;  step_first, step_count (n,): its program in `steps`;
+    depth (n,): the stack depth of its program.  kind, row (m,): the table and row of an operand's
+    primitive;  root (m,): for a mesh, whose row is -1, the root of the BVH over its triangles.
+    anchor (n, 3): the local origin for the coordinates of a solid's operands;  reach (n,): the
+    largest distance of their points from there, inf for infinite ones.
+    """
+
+    first: IntArray
+    operands: IntArray
+    step_first: IntArray
+    step_count: IntArray
+    depth: IntArray
+    steps: IntArray
+    kind: IntArray
+    row: IntArray
+    root: IntArray
+    anchor: FloatArray
+    reach: FloatArray
+
+
+class Parts(NamedTuple):
+    """For the owner numbers of primitives that are parts of a solid or of a group.
+
+    shape (k,): the shape id, an index in the scene;  part (k,): the operand id in the solid, or the
+    index of the shape in the group;  solid (k,): number of the solid, -1 if it is none;  turned
+    (k,): 1 if the outside of the solid is the inside of the operand, as of a subtracted one.
+    """
+
+    shape: IntArray
+    part: IntArray
+    solid: IntArray
+    turned: IntArray
+
+
+AnyOperand = Annotated[Primitive | Union | Intersection | Difference, Field(discriminator="type")]
+AnyShape = Annotated[
+    Primitive | Union | Intersection | Difference | Instance, Field(discriminator="type")
+]
+
+for _model in (Solid, Union, Intersection, Difference):
+    _model.model_rebuild(_types_namespace={"AnyOperand": AnyOperand})
+
+
+def operands_of(
+    shape: Shape, outer: Affine, material: str | None, turned: bool = False
+) -> Iterator[tuple[Shape, Affine, str | None, bool]]:
+    """The primitive operands of a tree, from left to right: (shape, the map that is applied after
+    its own transform, material, whether the solid's outside is its inside)."""
+    material = shape.material if shape.material is not None else material
+    if not isinstance(shape, Solid):
+        yield shape, outer, material, turned
+        return
+    outer = compose(affine(shape.transform), outer)
+    for k, operand in enumerate(shape.of):
+        takes_away = isinstance(shape, Difference) and k > 0
+        yield from operands_of(operand, outer, material, turned != takes_away)
+
+
+def postfix(shape: Shape) -> list[int]:
+    """The tree as a program: operands are numbered in the order of `operands_of`."""
+    steps: list[int] = []
+    count = 0
+
+    def visit(part: Shape) -> None:
+        nonlocal count
+        if not isinstance(part, Solid):
+            steps.append(count)
+            count += 1
+            return
+        visit(part.of[0])
+        for operand in part.of[1:]:
+            visit(operand)
+            if isinstance(part, Difference):
+                steps.append(NOT)
+            steps.append(OR if isinstance(part, Union) else AND)
+
+    visit(shape)
+    return steps
+
 
 _exact = np.vectorize(Fraction, otypes=[object])
 

@@ -1,6 +1,23 @@
-"""Child processes that carry out one request after another."""
+"""Work in child processes: a crash of a native library ends only the process that it is in.
+
+`Children` is the parent's side: it sends requests, enforces time limits, replaces children that die
+and reports why.  `run` has requests carried out by children of this process, or of the workers of
+a cluster: one that dies or hangs is replaced, and the others go on.
+
+The worker's side is JSON lines on standard input and output.  A worker is a
+module that calls `private_stdout` once and `carry_out` for each request.
+Each line of its standard input is a JSON object, a request; each line of its standard output
+is a message about it:
+
+    {"say": text}          any number of times, what is being done
+    {"done": true}         what was asked for is where it was to be put
+    {"failed": text}       it could not be made, and why
+    {"invalid": text}      the same, because a scene, or a file that it names, is invalid
+    {"unavailable": text}  nothing can be made here, and why
+"""
 
 import contextlib
+import functools
 import json
 import os
 import queue
@@ -10,14 +27,53 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+import traceback
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import CancelledError
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Generic, Protocol, TextIO, TypeVar
 
-from reference_rt.util.child_processes import tied
-from reference_rt.util.errors import ReferenceUnavailableError
+from comparisons.runs.elsewhere import check_sources
+from comparisons.runs.provenance import everything_fingerprint
+from reference_rt.util.errors import ReferenceRtError, ReferenceUnavailableError, SceneError
+from reference_rt.util.files import replacing, temporary_folder
+from reference_rt.util.processes import tied
+from reference_rt.util.workers import Threads, Workers, run_all
+
+
+def private_stdout() -> TextIO:
+    """Standard output for this caller alone: from now on whatever else prints, in Python or not,
+    goes to standard error."""
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    return answers
+
+
+def send(answers: TextIO, **message: Any) -> None:
+    """Write one line of the protocol."""
+    print(json.dumps(message), file=answers, flush=True)
+
+
+def carry_out(task: Callable[[], None], answers: TextIO) -> None:
+    """Run the task, and send how it ended."""
+    try:
+        task()
+    except BrokenPipeError:  # nobody listens any more
+        raise
+    except ReferenceUnavailableError as error:
+        send(answers, unavailable=str(error))
+    except SceneError as error:
+        send(answers, invalid=str(error))
+    except ReferenceRtError as error:
+        send(answers, failed=str(error))
+    except (Exception, SystemExit) as error:
+        traceback.print_exc()
+        send(answers, failed=f"{type(error).__name__}: {' '.join(str(error).split())}")
+    else:
+        send(answers, done=True)
+
 
 MOST_CASES = 40
 """A child is replaced after so many: what libraries keep of each scene adds up, and a start costs
@@ -65,7 +121,7 @@ class Children:
     ) -> Ended:
         """Have a child carry out a request, a line of JSON.
 
-        module: see `pool.run`; or a command, which begins with the absolute path of a program that
+        module: see `run`; or a command, which begins with the absolute path of a program that
         keeps to the protocol;  folder: where the child starts, if there is such a folder;
         seconds: its time limit;  say: called with what is being done for it, "" when it begins.
         Raises ReferenceUnavailableError.
@@ -221,3 +277,131 @@ def _signal_name(number: int) -> str:
         return signal.Signals(number).name
     except ValueError:
         return "unknown"
+
+
+class Request(Protocol):
+    """What is asked for, as one line of JSON.  output: the name of its field that says which file
+    or folder is written."""
+
+    output: ClassVar[str]
+
+    def model_dump_json(self) -> str: ...
+
+
+R = TypeVar("R", bound=Request)
+
+
+@dataclass(frozen=True)
+class Outcome(Ended, Generic[R]):
+    """How a request ended; see `Ended`."""
+
+    request: R
+
+
+def run(
+    requests: Sequence[R],
+    workers: Workers,
+    seconds: float,
+    progress: Callable[[R, str], None],
+    module: Sequence[str],
+) -> Generator[Outcome[R], None, None]:
+    """Have requests carried out, and yield outcomes as they come.
+
+    workers: `Threads` of this process, each with a child process, or those of a cluster, whose
+    workers have child processes of their own and send back the files that these write;  seconds:
+    time limit of a request;  progress: called with a request and what is being done for it, ""
+    when it begins; steps are not reported by clusters;  module: of a worker that keeps to
+    the protocol, and options of its command line.  Closing the iterator ends the processes of this
+    machine.  Raises ReferenceUnavailableError where none can be carried out; WorkersError.
+    """
+    if isinstance(workers, Threads):
+        with closing(_run_here(requests, workers, seconds, progress, module)) as found:
+            yield from found
+        return
+    folder, sources = str(Path.cwd()), everything_fingerprint()
+
+    def tasks() -> Iterator[tuple[Any, ...]]:
+        for request in requests:
+            progress(request, "")
+            asked = json.loads(request.model_dump_json())
+            yield asked, request.output, tuple(module), seconds, folder, sources
+
+    with closing(run_all(workers, carry_out_remotely, tasks())) as results:
+        for number, (ended, files) in results:
+            request = requests[number]
+            _store(files, Path(getattr(request, request.output)).parent)
+            yield Outcome(**vars(ended), request=request)
+
+
+def _run_here(
+    requests: Sequence[R],
+    workers: Threads,
+    seconds: float,
+    progress: Callable[[R, str], None],
+    module: Sequence[str],
+) -> Generator[Outcome[R], None, None]:
+    steps: queue.SimpleQueue[tuple[R, str]] = queue.SimpleQueue()
+
+    def watch() -> None:
+        while not steps.empty():
+            progress(*steps.get())
+
+    with closing(Children()) as children:
+
+        def carry_out(request: R) -> Ended:
+            say = functools.partial(_put, steps, request)
+            return children.carry_out(tuple(module), "", request.model_dump_json(), seconds, say)
+
+        with closing(run_all(workers, carry_out, zip(requests), watch)) as results:
+            for number, ended in results:
+                watch()
+                yield Outcome(**vars(ended), request=requests[number])
+
+
+def _put(steps: "queue.SimpleQueue[tuple[R, str]]", request: R, step: str) -> None:
+    steps.put((request, step))
+
+
+# ---- on other machines --------------------------------------------------------------------------
+
+_children = Children()
+"""Of this process, a worker of a cluster: they go on with the next request."""
+
+_LINES = ".jsonl"
+"""Suffix of files that every request appends lines to; others are replaced."""
+
+
+def carry_out_remotely(
+    asked: dict[str, Any],
+    output: str,
+    module: tuple[str, ...],
+    seconds: float,
+    folder: str,
+    sources: str,
+) -> tuple[Ended, dict[str, bytes]]:
+    """Carry out a request in this process, a worker of a cluster.  Returns how it ended, and the
+    contents of the files that were written, by their paths from the folder of its output.
+
+    asked, output: the request and the name of its field, see `Request`;  folder: the current one of
+    who asks, which relative paths begin in;  sources: fingerprint of what verdicts depend on.
+    Raises WorkersError if these differ here; ReferenceUnavailableError.
+    """
+    check_sources(sources)
+    with temporary_folder() as root:
+        asked = {**asked, output: str(root / Path(asked[output]).name)}
+        ended = _children.carry_out(module, folder, json.dumps(asked), seconds, lambda step: None)
+        written = [path for path in root.rglob("*") if path.is_file()]
+        return ended, {path.relative_to(root).as_posix(): path.read_bytes() for path in written}
+
+
+def _store(files: dict[str, bytes], folder: Path) -> None:
+    """Write what a worker of a cluster has sent."""
+    for name, content in files.items():
+        path = folder / name
+        if path.suffix == _LINES:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with path.open("ab") as lines:
+                lines.write(content)
+        else:
+            with replacing(path) as temporary:
+                temporary.write_bytes(content)

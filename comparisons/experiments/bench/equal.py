@@ -1,4 +1,8 @@
-"""Seconds to a relative error of 1 %, over the scenes that both renderers path trace."""
+"""Ours against Mitsuba at equal samples and at equal error.
+
+At equal samples: render times of the Cornell box, and two threads against one.  At equal error:
+seconds to a relative error of 1 %, over the scenes that both renderers path trace.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -6,11 +10,96 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.bench.row import Row
-from comparisons.experiments.bench.setting import Setting
+from comparisons.experiments.bench.row import Row, Setting, against, alternate, seconds
+from reference_rt.cameras.film import BoxFilter, Film
 from reference_rt.integrators import Path as PathTracing
+from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
-from reference_rt.util.errors import ReferenceRtError
+from reference_rt.sampling import Sobol
+from reference_rt.util.errors import ReferenceRtError, ReferenceUnavailableError
+
+SCENE, SIZE, SPP = "cornell_box", 256, 64
+
+VARIANTS = {"cornell_llvm": ("llvm_ad_rgb", 0.8), "cornell_scalar": ("scalar_rgb", 0.25)}
+"""Variant of Mitsuba and goal, by row."""
+
+
+def measure_samples(setting: Setting) -> list[Row]:
+    """Both rows.  Raises ReferenceUnavailableError."""
+    return [_samples_row(name, setting) for name in VARIANTS]
+
+
+def cornell_box(setting: Setting) -> Scene:
+    """The scene at the measured size; a quarter of the pixels for a quick run."""
+    size = SIZE // 2 if setting.quick else SIZE
+    film = Film(width=size, height=size, filter=BoxFilter())
+    return setting.load(SCENE).changed(film=film, sampler=Sobol(spp=SPP))
+
+
+def _samples_row(name: str, setting: Setting) -> Row:
+    from comparisons.mitsuba import scene as mitsuba_scene
+    from comparisons.mitsuba.backend import variant
+    from comparisons.mitsuba.translate import load
+
+    mitsuba_variant, goal = VARIANTS[name]
+    scene = cornell_box(setting)
+    size = scene.film.width
+    with variant(mitsuba_variant):
+        counterpart = load(scene)
+        seeds = iter(range(1, 1000))
+
+        def ours() -> object:
+            return render(scene, tables=scene.tables, threads=setting.threads)
+
+        def theirs() -> object:
+            return mitsuba_scene.picture(counterpart.mi_scene, SPP, next(seeds))
+
+        render(scene, tables=scene.tables, specialised=True), theirs()  # compile
+        times = alternate(
+            {"ours": lambda: seconds(ours), mitsuba_variant: lambda: seconds(theirs)},
+            say=setting.say,
+        )
+    return against(
+        name,
+        f"{SCENE} {size}x{size}, {SPP} samples per pixel: time / Mitsuba {mitsuba_variant}",
+        times["ours"],
+        (f"Mitsuba {mitsuba_variant}", times[mitsuba_variant]),
+        goal,
+        details={"seconds": times, "threads": setting.threads, "sampler": "sobol / independent"},
+    )
+
+
+# ---- a second thread ----------------------------------------------------------------------------
+
+
+def measure_threads(setting: Setting) -> list[Row]:
+    """Samples per second of two threads against one.
+
+    Raises ReferenceUnavailableError on a machine with one core.
+    """
+    if setting.threads < 2:
+        raise ReferenceUnavailableError("two threads need two cores")
+    scene = cornell_box(setting)
+    samples = scene.film.width * scene.film.height * SPP / 1e6
+
+    def rate(threads: int) -> float:
+        return samples / seconds(lambda: render(scene, tables=scene.tables, threads=threads))
+
+    render(scene, tables=scene.tables, specialised=True)  # compile
+    rates = alternate({"2 threads": lambda: rate(2), "1 thread": lambda: rate(1)}, say=setting.say)
+    return [
+        against(
+            "threads",
+            f"{SCENE}: samples per second of two threads / of one",
+            rates["2 threads"],
+            ("one thread", rates["1 thread"]),
+            1.9,
+            unit="Msamples/s",
+            better="higher",
+            details={"rates": rates},
+        )
+    ]
+
 
 TARGET = 0.01
 """Relative error: the square root of relMSE."""
@@ -24,7 +113,7 @@ DEFAULT, BEST = "mitsuba_llvm", "mitsuba_llvm_best"
 MEDIAN_GOAL, WORST_GOAL, BEST_GOAL = 0.5, 1.5, 1.0
 
 
-def measure(setting: Setting) -> list[Row]:
+def measure_error(setting: Setting) -> list[Row]:
     """Median and worst against the default sampler, median against the best one.
 
     Raises ReferenceUnavailableError.
@@ -85,7 +174,7 @@ def rows(
     details["extrapolated"] = {name: list(who) for name, who in guessed.items() if who}
     worst = max(against_default, key=lambda name: against_default[name], default="")
     return [
-        _row("error_default",
+        _error_row("error_default",
              f"{what}, median over {_scenes(against_default, DEFAULT, guessed)}: / Mitsuba llvm, "
              "its default sampler",
              found, DEFAULT, against_default, MEDIAN_GOAL, details),
@@ -102,7 +191,7 @@ def rows(
             {},
             {"worst": worst, "ratios": against_default},
         ),
-        _row("error_best",
+        _error_row("error_best",
              f"{what}, median over {_scenes(against_best, BEST, guessed)}: / Mitsuba llvm, "
              "its best sampler",
              found, BEST, against_best, BEST_GOAL, details),
@@ -138,7 +227,7 @@ def _ratios(found: dict[str, dict[str, float]], peer: str) -> dict[str, float]:
     }
 
 
-def _row(
+def _error_row(
     name: str,
     title: str,
     found: dict[str, dict[str, float]],
