@@ -22,6 +22,7 @@ from comparisons.commands.options import (
     Scheduler,
     Threads,
     TimeLimit,
+    Witness,
     compare_extra,
     out_folder,
 )
@@ -63,6 +64,7 @@ def compare(
     fresh: Fresh = False,
     define: Defaults = None,
     allow_missing: AllowMissing = False,
+    witness: Witness = None,
 ) -> None:
     """Render scenes with reference_rt and with Mitsuba, and report whether they agree.
 
@@ -89,8 +91,13 @@ def compare(
         if fixed
         else Budget(replicates=replicates or FIRST, seconds=time_limit or SECONDS)
     )
-    plan = plan_of_files(scenes, changes, budget)
-    given = {"replicates": replicates, "time-limit": time_limit, "fixed": fixed or None}
+    plan = plan_of_files(scenes, changes, budget.model_copy(update={"witness": witness}))
+    given = {
+        "replicates": replicates,
+        "time-limit": time_limit,
+        "fixed": fixed or None,
+        "witness": witness,
+    }
     work = tuple(w._replace(again=_command(w.path, changes, given)) for w in plan.work)
 
     def tell(run: Run) -> None:
@@ -102,7 +109,7 @@ def compare(
     raise typer.Exit(exit_code(run.cases, run.missing))
 
 
-def _command(path: Path, changes: "Changes", given: Mapping[str, float | bool | None]) -> str:
+def _command(path: Path, changes: "Changes", given: Mapping[str, float | str | bool | None]) -> str:
     """The command that repeats one case alone;  given: other options."""
     import shlex
 
@@ -160,6 +167,7 @@ def suite(
     github: GitHub = False,
     scenes: Scenes = Path("scenes"),
     define: Defaults = None,
+    witness: Witness = None,
 ) -> None:
     """Compare all scenes of a folder with Mitsuba.
 
@@ -181,6 +189,10 @@ def suite(
     source = load_suite(name)
     changes = Changes(defaults=by_name(define))
     planned = plan(source, scenes, tuple(only or ()), rungs, changes)
+    if witness is not None:
+        asked = {"witness": witness}
+        work = (w._replace(budget=w.budget.model_copy(update=asked)) for w in planned.work)
+        planned = planned._replace(work=tuple(work))
     folder = out or Path("out") / source.name
     where, cores = Where(workers, scheduler, cluster), os.cpu_count() or 1
     most = min(cores, MOST_WORKERS)

@@ -21,7 +21,7 @@ from markupsafe import Markup
 from comparisons.report.pictures_data import as_json, pack
 from comparisons.report.plots import histograms
 from comparisons.report.templates import encoded, template, write
-from comparisons.report.thumbnails import Thumbnail, Thumbnails, flip_map, thumbnails
+from comparisons.report.thumbnails import Thumbnail, Thumbnails, flip_map, of_witness, thumbnails
 from comparisons.report.values import shown
 from comparisons.results.case import Case, Images, Metrics, RungResult, Status, how_many
 from comparisons.results.files import named, plain
@@ -192,6 +192,7 @@ def _view(case: Case, mapped: bool) -> dict[str, Any]:
         "tiers": sorted(case.rungs, key=lambda rung: _rung(rung.name)),
         "pictures": pictures,
         "figures": _figures(case, pictures, mapped) if pictures else [],
+        "witness": of_witness(case.images, case.sides) if pictures and case.images else [],
         "histograms": _histograms(case, pictures) if pictures else [],
         "metrics": _metric_rows(case.metrics) if case.metrics else [],
         "stages": list(stages),

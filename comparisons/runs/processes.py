@@ -175,7 +175,7 @@ class _Child:
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 (closed by `close`)
         # A session of its own: Ctrl-C is for the parent, which then ends its children.
         self._process = subprocess.Popen(
-            list(module) if os.path.isabs(module[0]) else [sys.executable, "-m", *module],
+            list(module) if Path(module[0]).is_absolute() else [sys.executable, "-m", *module],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._log,

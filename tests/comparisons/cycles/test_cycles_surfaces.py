@@ -1,4 +1,4 @@
-"""Shapes as triangles for Cycles: where ours are, facing as ours do, with our texture coordinates."""
+"""Shapes as triangles for Cycles: where ours are, facing as ours do, with our uv."""
 
 from pathlib import Path
 
