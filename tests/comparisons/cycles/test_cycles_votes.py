@@ -12,6 +12,7 @@ import reference_rt as rt
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, compare_scene
 from comparisons.cycles import backend
+from reference_rt.core.transform import Scale, Translate
 
 pytestmark = [
     pytest.mark.slow,
@@ -59,9 +60,9 @@ FAULTS = {
     "path length": ("cornell_box", "integrator.max_depth", 3),
     "field of view": ("cornell_box", "camera.fov", 41.5),
     "eye": ("mesh_knot", "camera.eye", (0.1, -3.5, 2.2)),
-    "a mesh 5 % larger": ("mesh_knot", "shapes.0.transform", (rt.transform.Scale(scale=(1.05,) * 3),)),
-    "a mesh that moved": ("mesh_knot", "shapes.0.transform", (rt.transform.Translate(translate=(0.1, 0, 0)),)),
-    "another mesh": ("mesh_knot", "shapes.0.file", "meshes/box.obj"),
+    "a mesh 5 % larger": ("mesh_knot", "shapes.0.transform", (Scale(scale=(1.05,) * 3),)),
+    "a mesh that moved": ("mesh_knot", "shapes.0.transform", (Translate(translate=(0.1, 0, 0)),)),
+    "another mesh": ("mesh_knot", "shapes.0.file", "meshes/petal.ply"),
     "sky": ("mesh_knot", "lights.0.radiance", (0.15, 0.2, 0.3)),
     "index of refraction": ("caustic_glass", "materials.glass.interior_ior", 1.3),
     "a metal's eta": ("material_conductor", "materials.sample.eta", (0.2, 0.5, 0.6)),
