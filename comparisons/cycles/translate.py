@@ -38,6 +38,10 @@ from reference_rt.textures.image_file import read_image
 MOST_BOUNCES = 1024
 """Cycles' own limit."""
 
+MOST_MIRRORINGS = 100
+"""Edges of a path above which mirrors do not vote: float32's error of a direction grows with each,
+and after a thousand the picture of `deep_mirrors` is 0.6 % off where it vanishes (measured)."""
+
 MOST_TRIANGLES = 5_000_000
 """Most triangles of all copies: Cycles is given each copy."""
 
@@ -86,6 +90,10 @@ def write(scene: Scene, folder: Path, threads: int | None = None) -> None:
     background = np.zeros(3)
     with writing.collected():
         found["bounces"] = bounces_of(scene.integrator)
+        if found["bounces"] > MOST_MIRRORINGS and any(
+            isinstance(m, rt.Mirror | rt.Conductor) for m in scene.materials.values()
+        ):
+            raise IneligibleError(f"mirrors along paths of more than {MOST_MIRRORINGS} edges")
     with writing.collected():
         found["camera"] = camera_of(scene.camera, scene.film)
     for light in scene.lights:
