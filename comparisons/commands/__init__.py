@@ -1,6 +1,6 @@
-"""The commands that `comparisons` adds to `reference-rt`, one per file.
+"""The commands that `comparisons` adds to `reference-rt`, those of one subject in a file.
 
-Each file has a Typer function of its command's name, decorated with `guarded`, which turns errors
+A command is a Typer function of its name, decorated with `guarded`, which turns errors
 into messages and exit codes.  The function parses options and writes to the terminal; the work is
 done by the package that it imports when it runs, inside `compare_extra`: `reference-rt render` must
 not wait for those imports.  Arguments and outputs are checked before the work begins.

@@ -1,22 +1,34 @@
-"""`reference-rt compare`."""
+"""`reference-rt compare`, `suite` and `report`, which writes their outputs again; `convert`, which
+writes a scene for another renderer.
+"""
 
+import os
+import sys
 from collections.abc import Mapping
+from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from comparisons.commands.options import (
     AllowMissing,
+    ClusterFile,
     Fixed,
     Fresh,
+    GitHub,
+    JUnit,
+    Scenes,
+    Scheduler,
     Threads,
     TimeLimit,
+    Witness,
     compare_extra,
     out_folder,
 )
+from comparisons.results.rungs import COMPARED
 from reference_rt.cli.adjusted import Defaults, by_name
-from reference_rt.cli.guarded import guarded
+from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import UsageError
 
 if TYPE_CHECKING:
@@ -52,6 +64,7 @@ def compare(
     fresh: Fresh = False,
     define: Defaults = None,
     allow_missing: AllowMissing = False,
+    witness: Witness = None,
 ) -> None:
     """Render scenes with reference_rt and with Mitsuba, and report whether they agree.
 
@@ -64,9 +77,8 @@ def compare(
     with compare_extra():
         from comparisons.compare.budget import Budget
         from comparisons.compare.looks import FIRST, SECONDS
-        from comparisons.results.verdict import exit_code
-        from comparisons.suites.display import summarise
-        from comparisons.suites.run import Options, Run, run_cases
+        from comparisons.results.case import exit_code
+        from comparisons.suites.run import Options, Run, run_cases, summarise
         from comparisons.suites.suite import Changes, plan_of_files
 
     changes = Changes(
@@ -79,8 +91,13 @@ def compare(
         if fixed
         else Budget(replicates=replicates or FIRST, seconds=time_limit or SECONDS)
     )
-    plan = plan_of_files(scenes, changes, budget)
-    given = {"replicates": replicates, "time-limit": time_limit, "fixed": fixed or None}
+    plan = plan_of_files(scenes, changes, budget.model_copy(update={"witness": witness}))
+    given = {
+        "replicates": replicates,
+        "time-limit": time_limit,
+        "fixed": fixed or None,
+        "witness": witness,
+    }
     work = tuple(w._replace(again=_command(w.path, changes, given)) for w in plan.work)
 
     def tell(run: Run) -> None:
@@ -92,7 +109,7 @@ def compare(
     raise typer.Exit(exit_code(run.cases, run.missing))
 
 
-def _command(path: Path, changes: "Changes", given: Mapping[str, float | bool | None]) -> str:
+def _command(path: Path, changes: "Changes", given: Mapping[str, float | str | bool | None]) -> str:
     """The command that repeats one case alone;  given: other options."""
     import shlex
 
@@ -109,3 +126,176 @@ def _command(path: Path, changes: "Changes", given: Mapping[str, float | bool | 
     ]
     words += [f"-D {shlex.quote(f'{k}={v}')}" for k, v in changes.defaults.items()]
     return " ".join(["reference-rt compare", shlex.quote(str(path)), "--fresh", *words])
+
+
+MOST_WORKERS = 4
+"""Default limit of processes at a time: each takes up to 2 GB."""
+
+
+@guarded
+def suite(
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="smoke, standard, full or a .yaml file.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="Folder for results and the page. (default: out/NAME)"),
+    ] = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(metavar="GLOB", help="Only cases whose names match, such as 'material_*'."),
+    ] = None,
+    rung: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--rung", "--tier", metavar="RUNG", help=f"Only this rung: {', '.join(COMPARED)}."
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers",
+            "--jobs",
+            min=1,
+            help=f"Processes at a time. (default: all cores, at most {MOST_WORKERS})",
+        ),
+    ] = None,
+    scheduler: Scheduler = None,
+    cluster: ClusterFile = None,
+    fresh: Fresh = False,
+    junit: JUnit = None,
+    github: GitHub = False,
+    scenes: Scenes = Path("scenes"),
+    define: Defaults = None,
+    witness: Witness = None,
+) -> None:
+    """Compare all scenes of a folder with Mitsuba.
+
+    Finished cases are kept in the output folder and not run again.
+    """
+    with compare_extra():
+        from comparisons.report import ci as github_actions
+        from comparisons.report import ci as junit_xml
+        from comparisons.results.case import exit_code
+        from comparisons.suites.run import Options, Run, run_suite, summarise
+        from comparisons.suites.suite import Changes, load_suite, plan
+    from reference_rt.cli.render_options import Where
+    from reference_rt.util.files import check_writable
+    from reference_rt.util.workers import Threads
+
+    rungs = tuple(rung or ())
+    if unknown := [name for name in rungs if name not in COMPARED]:
+        raise UsageError(f"--rung: expected one of {', '.join(COMPARED)}, got '{unknown[0]}'")
+    source = load_suite(name)
+    changes = Changes(defaults=by_name(define))
+    planned = plan(source, scenes, tuple(only or ()), rungs, changes)
+    if witness is not None:
+        asked = {"witness": witness}
+        work = (w._replace(budget=w.budget.model_copy(update=asked)) for w in planned.work)
+        planned = planned._replace(work=tuple(work))
+    folder = out or Path("out") / source.name
+    where, cores = Where(workers, scheduler, cluster), os.cpu_count() or 1
+    most = min(cores, MOST_WORKERS)
+    # A cluster has as many cases at a time as threads.
+    threads = 1 if where.is_cluster else max(cores // (workers or most), 1)
+    files = {work.name: work.path.as_posix() for work in planned.work}
+    on_github = github or github_actions.is_there()
+    summary = github_actions.summary_path() if on_github else None
+    check_writable(*(path for path in (junit, summary) if path is not None))
+
+    def tell(run: Run) -> None:
+        """Write all outputs, after an interruption too: a build server must not show those of an
+        earlier run."""
+        if junit is not None:
+            junit_xml.write_junit(
+                junit, run.cases, source.name, run.walls, run.not_run, run.missing
+            )
+        if on_github:
+            github_actions.annotate(run.cases, sys.stdout, files, run.missing)
+        if summary is not None:
+            title = source.name
+            github_actions.summarise(run.cases, summary, title, run.not_run, run.missing)
+        summarise(run.cases, run.walls, run.not_run, run.missing)
+        say(f"{options.results}, {options.report}", err=True)
+
+    with closing(where.open(Threads, most)) as opened:
+        options = Options(folder, rungs, opened, threads, fresh, tell=tell)
+        run = run_suite(source, planned, options)
+    raise typer.Exit(exit_code(run.cases, run.missing))
+
+
+@guarded
+def report(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="The output folder of `suite` or `compare`.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The page to write. (default: DIR/report.html)"),
+    ] = None,
+) -> None:
+    """Write results.json and the page again, from the stored results of `suite` or `compare`.
+
+    Exit code 1: cases are missing, because the run was interrupted.
+    """
+    with compare_extra():
+        from comparisons.report import write_report, write_results
+        from comparisons.results.case import how_many
+        from comparisons.suites.run import check_stored_results, read_stored_results
+    from reference_rt.util.files import check_writable
+
+    page = out or folder / "report.html"
+    results = folder / "results.json"
+    check_stored_results(folder)
+    check_writable(results, page)
+    cases, provenance, suite, not_run, missing = read_stored_results(folder)
+    write_results(results, cases, provenance, suite, not_run, missing)
+    write_report(page, cases, provenance, missing=missing)
+    say(f"{how_many(len(cases), len(missing))}: {results}, {page}", err=True)
+    raise typer.Exit(1 if missing else 0)
+
+
+@guarded
+def convert(
+    scene: Annotated[
+        Path, typer.Argument(metavar="SCENE", help="A Mitsuba .xml scene, or one of ours.")
+    ],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="A .yaml, .json or (for Mitsuba) .xml file.")
+    ],
+    to: Annotated[
+        Literal["scene", "json"],
+        typer.Option(
+            help="scene: by the file's suffix; json: everything resolved, shapes as triangles."
+        ),
+    ] = "scene",
+    define: Defaults = None,
+    allow_missing: AllowMissing = False,
+) -> None:
+    """Write a scene in our format, as a Mitsuba scene (.xml), or as data for other renderers
+    (--to json), with its meshes and images in a folder beside it.
+
+    Scenes in our format render without Mitsuba.
+    """
+    with compare_extra("converting"):
+        from comparisons.mitsuba.writing import write_xml
+        from comparisons.mitsuba.writing.files import SUFFIXES, check_name, folder_of, write_scene
+        from comparisons.mitsuba.writing.resolved import write_resolved
+    from reference_rt.rendering.scene import Scene
+    from reference_rt.util.files import check_writable
+
+    is_mitsuba = output.suffix.lower() == ".xml" and to == "scene"
+    if to == "scene" and not is_mitsuba:
+        check_name(output, SUFFIXES)
+    check_writable(output)
+    found = Scene.load(scene, by_name(define), allow_missing)
+    if is_mitsuba:
+        count, notes = write_xml(found, output)
+        for note in notes:
+            say(f"note: {note}", err=True)
+    elif to == "json":
+        count = write_resolved(found, output)
+    else:
+        count = write_scene(found, output)
+    files = f", and {count} files in {folder_of(output)}" if count else ""
+    say(f"{output}{files}", err=True)

@@ -3,6 +3,7 @@
 import importlib.util
 from collections.abc import Iterable
 
+from comparisons.cycles import backend as cycles
 from comparisons.mitsuba import backend
 from reference_rt.cli.doctor import Check
 from reference_rt.util.errors import ReferenceUnavailableError
@@ -25,6 +26,10 @@ def checks() -> Iterable[Check]:
         yield Check(
             "FLIP", "left out: flip-evaluator is not installed", "pip install flip-evaluator"
         )
+    try:
+        yield Check("Cycles", f"by {cycles.interpreter()}")
+    except ReferenceUnavailableError as error:
+        yield Check("Cycles", "left out", str(error))
     missing = [name for name in PACKAGES if importlib.util.find_spec(name) is None]
     if missing:
         found = f"without {', '.join(missing)}"

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -70,6 +70,11 @@ AllowMissing = Annotated[
         "--allow-missing",
         help="Leave out or replace what of an .xml scene is not supported, in both renderers.",
     ),
+]
+
+Witness = Annotated[
+    Literal["cycles"] | None,
+    typer.Option(help="A third renderer, whose pictures say who stands alone: cycles."),
 ]
 
 TimeLimit = Annotated[

@@ -2,18 +2,10 @@
 
 import typer
 
-from comparisons.commands.accept import accept
-from comparisons.commands.bench import bench
-from comparisons.commands.compare import compare
-from comparisons.commands.converge import converge
-from comparisons.commands.convert import convert
-from comparisons.commands.fuzz import fuzz
-from comparisons.commands.gate import gate
-from comparisons.commands.methods import methods
-from comparisons.commands.report import report
-from comparisons.commands.selftest import selftest
-from comparisons.commands.stability import stability
-from comparisons.commands.suite import suite
+from comparisons.commands.compare import compare, convert, report, suite
+from comparisons.commands.gate import accept, gate
+from comparisons.commands.speed import bench, converge, methods
+from comparisons.commands.trials import fuzz, selftest, stability
 
 
 def register(app: typer.Typer) -> None:

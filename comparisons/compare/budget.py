@@ -1,6 +1,6 @@
 """How much work one comparison may take: samples, replicates, rays, and the bias to detect."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -37,5 +37,7 @@ class Budget(Description):
     `reference-limited`."""
     limit: Annotated[float, Field(gt=0)] = 0.005
     """The smallest relative bias of the image mean that must be detectable."""
+    witness: Literal["cycles"] | None = None
+    """A third renderer whose pictures say who stands alone (`comparisons.cycles.witness`)."""
     control: bool = False
     """Compare Mitsuba with itself (another variant, other seeds) instead of ours with Mitsuba."""

@@ -15,6 +15,7 @@ from comparisons.compare import looks, pictures, ray_starts
 from comparisons.compare.budget import Budget
 from comparisons.compare.judge import Evidence, Rendered, judge, of_replicates, picture_rungs
 from comparisons.compare.path_length import path_lengths
+from comparisons.cycles.witness import witness_of
 from comparisons.geometry.flatten import copies_of
 from comparisons.mitsuba import backend
 from comparisons.mitsuba import scene as mitsuba_scene
@@ -27,8 +28,7 @@ from comparisons.mitsuba.translate.integrators import in_place_of
 from comparisons.mitsuba.translate.moved import with_float32_vertices
 from comparisons.results.case import Case, Images, RungResult
 from comparisons.rungs.layers.rung import applies
-from reference_rt.cameras.film import Film
-from reference_rt.cameras.filters import BoxFilter
+from reference_rt.cameras.film import BoxFilter, Film
 from reference_rt.cli.explain import explain
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import RayCast, Whitted
@@ -161,11 +161,12 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Subject:
-    """scene: what we render;  reference: what Mitsuba renders; None: the same, which it is unless a
-    test plants a fault in one of them."""
+    """scene: what we render;  reference: what Mitsuba renders;  witness: what a third renderer
+    renders; None: the same, which they are unless a test plants a fault in one of them."""
 
     scene: Scene
     reference: Scene | None = None
+    witness: Scene | None = None
 
 
 def compare_scene(
@@ -181,8 +182,12 @@ def compare_scene(
     """
     if budget.control:
         return control(budgeted(subject.scene, budget), budget, say)
+    witness = None
+    if budget.witness is not None:
+        scene = budgeted(subject.witness or subject.scene, budget)
+        witness = witness_of(scene, budget.limit, threads, say)
     evidence = gather(subject, budget, say, threads, rungs)
-    return judge(evidence, budget.limit)
+    return judge(replace(evidence, witness=witness), budget.limit)
 
 
 def budgeted(scene: Scene, budget: Budget) -> Scene:

@@ -1,7 +1,7 @@
 """From the evidence about a case to its verdict."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -9,9 +9,17 @@ from comparisons import statistics
 from comparisons.compare import diagnosis
 from comparisons.compare.looks import Looks
 from comparisons.compare.path_length import Lengths
-from comparisons.results.case import Case, Cause, FloatArray, ImageRegion, Images, RungResult
+from comparisons.cycles.witness import Witness
+from comparisons.results.case import (
+    Case,
+    Cause,
+    FloatArray,
+    ImageRegion,
+    Images,
+    RungResult,
+    decide,
+)
 from comparisons.results.rungs import RUNGS
-from comparisons.results.verdict import decide
 from comparisons.rungs.images import images_rung
 from comparisons.rungs.input import input_rung
 from comparisons.rungs.limited import limited
@@ -55,7 +63,8 @@ class Evidence:
     """The input of a verdict.  name: the case's;  rungs: the deterministic ones;  rendered: the
     pictures of both sides, if any;  lights, lengths: for the diagnosis;  looks: those at a growing
     number of replicates, the last of which gives the statistics;  ray_starts: see
-    `comparisons.compare.ray_starts`, None where they cannot matter;  the rest as in `Case`."""
+    `comparisons.compare.ray_starts`, None where they cannot matter;  witness: a third renderer;
+    the rest as in `Case`."""
 
     name: str
     rungs: tuple[RungResult, ...]
@@ -68,6 +77,7 @@ class Evidence:
     lengths: Lengths | None = None
     looks: Looks | None = None
     ray_starts: RayStarts | None = None
+    witness: Witness | None = None
 
 
 def judge(evidence: Evidence, limit: float) -> Case:
@@ -88,8 +98,16 @@ def judge(evidence: Evidence, limit: float) -> Case:
         if not any(rung.status == "invalid" for rung in rungs):
             metrics = image_metrics(images)
             rungs.append(images_rung(images, metrics, rendered.replicates))
+            if evidence.witness is not None and rendered.replicates is not None:
+                heard, picture = evidence.witness(rendered.replicates, evidence.sides)
+                rungs.append(heard)
+                images = replace(images, witness=picture)
     rungs = limited(rungs)
     verdict, reason = decide(rungs, metrics)
+    if verdict != "agree" and any("alone" in rung.numbers for rung in rungs):
+        # A difference of two says that one is wrong; the third says which.
+        (heard,) = (rung.reason for rung in rungs if rung.name == "witness")
+        reason = f"{reason}; {heard}" if heard not in reason else reason
     cause: Cause | None = None
     worst: tuple[ImageRegion, ...] = ()
     if verdict == "differ":

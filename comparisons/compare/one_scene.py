@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import fields
 from html import escape
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -124,6 +125,7 @@ def compare_one(
     time_limit: float | None = SECONDS,
     limit: float = Budget().limit,
     threads: int | None = None,
+    witness: Literal["cycles"] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> NotebookCase:
     """Render a scene, or a scene file, by reference_rt and by Mitsuba, and judge the difference.
@@ -131,13 +133,14 @@ def compare_one(
     spp, size, seed: None for the scene's own.  replicates: independent pictures by each renderer at
     the first look; their number is doubled until the question is decided or `time_limit` seconds
     have passed; None: one look.  limit: the smallest relative bias of the image mean that must be
-    detectable.  threads: ours, None for all cores.  say: called with a line about each step.
+    detectable.  threads: ours, None for all cores.  witness: a third renderer, whose pictures say
+    who stands alone.  say: called with a line about each step.
 
     Mitsuba runs in this process.  Raises SceneError, ReferenceUnavailableError.
     """
     loaded = scene if isinstance(scene, Scene) else Scene.load(os.fspath(scene))
     loaded = with_settings(loaded, spp=spp, size=size, seed=seed)
     mitsuba()
-    budget = Budget(replicates=replicates, seconds=time_limit, limit=limit)
+    budget = Budget(replicates=replicates, seconds=time_limit, limit=limit, witness=witness)
     case = compare_scene(Subject(loaded), budget, say or (lambda line: None), threads)
     return NotebookCase(**{field.name: getattr(case, field.name) for field in fields(case)})

@@ -23,8 +23,8 @@ from comparisons.results.case import (
     Metrics,
     RungResult,
     Status,
+    decide,
 )
-from comparisons.results.verdict import decide
 from comparisons.rungs.images import images_rung
 from comparisons.rungs.input import input_rung
 from comparisons.statistics.metrics import image_metrics

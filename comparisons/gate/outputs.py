@@ -4,10 +4,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from comparisons.report import write_report, write_results
-from comparisons.report.ci import github, junit
-from comparisons.results.case import Case
-from comparisons.results.verdict import exit_code
+from comparisons.report import ci, write_report, write_results
+from comparisons.results.case import Case, exit_code
 from comparisons.runs.provenance import ours
 from reference_rt.util.files import check_writable
 
@@ -40,7 +38,7 @@ def prepare(out: Path, *others: Path) -> None:
 
 def ci_files(junit_file: Path | None, annotate: bool) -> tuple[Path, ...]:
     """The files that `for_ci` writes."""
-    summary = github.summary_path() if annotate or github.is_there() else None
+    summary = ci.summary_path() if annotate or ci.is_there() else None
     return tuple(path for path in (junit_file, summary) if path is not None)
 
 
@@ -50,11 +48,11 @@ def for_ci(case: Case, junit_file: Path | None, about: str, annotate: bool) -> N
     about: the scene file that annotations refer to, "" for none.  Raises ImageError.
     """
     if junit_file is not None:
-        junit.write(junit_file, [case], "gate")
-    if annotate or github.is_there():
-        github.annotate([case], sys.stdout, {case.scene: about} if about else None)
-        if (summary := github.summary_path()) is not None:
-            github.summarise([case], summary, f"gate: {case.scene}")
+        ci.write_junit(junit_file, [case], "gate")
+    if annotate or ci.is_there():
+        ci.annotate([case], sys.stdout, {case.scene: about} if about else None)
+        if (summary := ci.summary_path()) is not None:
+            ci.summarise([case], summary, f"gate: {case.scene}")
 
 
 def code_of(case: Case) -> int:

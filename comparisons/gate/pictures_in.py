@@ -10,8 +10,8 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.exr import read_headers
 from reference_rt.core.image_files import ImageFile, open_image
 from reference_rt.core.image_files.exr import ExrFile
+from reference_rt.core.image_files.float_files import map_npy
 from reference_rt.core.image_files.image_file import as_float64
-from reference_rt.core.image_files.npy import map_npy
 from reference_rt.core.image_files.pillow import PillowFile
 from reference_rt.textures.image_file import linear
 from reference_rt.util.errors import ImageError

@@ -24,9 +24,9 @@ import platformdirs
 
 from comparisons.mitsuba import llvm_libraries
 from comparisons.mitsuba.llvm_libraries import LIBRARY
-from reference_rt.util.child_processes import tied
 from reference_rt.util.errors import ReferenceUnavailableError
 from reference_rt.util.files import read_text
+from reference_rt.util.processes import tied
 
 FORCE = "REFERENCE_RT_MITSUBA_VARIANT"
 

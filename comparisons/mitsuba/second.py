@@ -18,7 +18,7 @@ from comparisons.mitsuba.backend import mitsuba
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.image_files import open_image
 from reference_rt.shapes import Mesh, Triangle
-from reference_rt.shapes.meshes.vertex_normals import smooth_normals
+from reference_rt.shapes.meshes.topology import smooth_normals
 
 ROUNDING = 2.0**-22
 """Of the largest number: a few roundings to float32, in which Mitsuba holds numbers."""

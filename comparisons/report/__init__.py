@@ -1,6 +1,6 @@
 """Outputs of a run: `results.json` for machines, one offline HTML page for people, CI formats.
 
-`results_json` and `page` write the cases (`comparisons.results.case.Case`) of `compare`, `suite`
+`page` writes the cases (`comparisons.results.case.Case`) of `compare`, `suite`
 and `gate`; `ci` writes JUnit XML and GitHub annotations.  `templates` (which also writes tables
 into documents), `plots`, `thumbnails`, `values`, `offline.html.jinja` and `macros.html.jinja` serve
 the experiments' pages too.  Radiance is in W/sr/m²; seconds are wall clock.
@@ -9,10 +9,9 @@ Every file is written whole or not at all.  Pages load nothing from the network,
 and show everything but interaction without JavaScript.  NaN and the infinities are null in JSON.
 
 To add a number to the page, add it to a rung's `numbers`: the page and `results.json` show all of
-them.  A new field of `Case` goes into `results_json`, `page.html.jinja` and `ci/junit.py`.
+them.  A new field of `Case` goes into `page.py`, `page.html.jinja` and `ci.py`.
 """
 
-from comparisons.report.page import write_report
-from comparisons.report.results_json import write_results
+from comparisons.report.page import write_report, write_results
 
 __all__ = ["write_report", "write_results"]

@@ -2,10 +2,13 @@
 
 The page loads nothing from the network (its content security policy forbids it), so it can be
 archived, mailed, or opened from disk. All text is escaped: scene names come from users. Its script
-draws the pictures from float data; without JavaScript there are thumbnails."""
+draws the pictures from float data; without JavaScript there are thumbnails.
+"""
 
 import base64
 import hashlib
+import json
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,12 +21,13 @@ from markupsafe import Markup
 from comparisons.report.pictures_data import as_json, pack
 from comparisons.report.plots import histograms
 from comparisons.report.templates import encoded, template, write
-from comparisons.report.thumbnails import Thumbnail, Thumbnails, flip_map, thumbnails
+from comparisons.report.thumbnails import Thumbnail, Thumbnails, flip_map, of_witness, thumbnails
 from comparisons.report.values import shown
-from comparisons.results.case import Case, Images, Metrics, Status, how_many
-from comparisons.results.files import named
+from comparisons.results.case import Case, Images, Metrics, RungResult, Status, how_many
+from comparisons.results.files import named, plain
 from comparisons.results.headline import headline
 from comparisons.results.rungs import RUNGS
+from reference_rt.util.files import replacing
 
 # ---- limits the size of the page: reduces or omits the float pictures of some cases --------------
 
@@ -188,6 +192,7 @@ def _view(case: Case, mapped: bool) -> dict[str, Any]:
         "tiers": sorted(case.rungs, key=lambda rung: _rung(rung.name)),
         "pictures": pictures,
         "figures": _figures(case, pictures, mapped) if pictures else [],
+        "witness": of_witness(case.images, case.sides) if pictures and case.images else [],
         "histograms": _histograms(case, pictures) if pictures else [],
         "metrics": _metric_rows(case.metrics) if case.metrics else [],
         "stages": list(stages),
@@ -255,3 +260,81 @@ def _metric_rows(metrics: Metrics) -> list[tuple[str, str]]:
         ("Mean bias", shown(dict(zip("RGB", metrics.mean_bias, strict=True)), "mean_bias")),
         ("Pixels not finite", shown(metrics.nonfinite)),
     ]
+
+
+SCHEMA = 2
+"""Increased whenever a reader of the former layout would misread the new one."""
+
+
+def write_results(
+    path: Path,
+    cases: Sequence[Case],
+    provenance: Mapping[str, Any],
+    suite: str | None = None,
+    not_run: Mapping[str, str] | None = None,
+    missing: Sequence[str] = (),
+) -> None:
+    """Write `results.json`, whole or not at all.
+
+        {"schema": 2, "suite": name or null, "provenance": {...},
+         "asked": number of requested cases, without those of "not_run",
+         "missing": [names of requested cases that were not run: the run was interrupted],
+         "not_run": {name of a case: why it was not run},
+         "cases": [{"scene", "verdict", "headline": one plain sentence, "reason",
+                    "sides": {"candidate": whose pictures, "reference": whose},
+                    "tiers": {name of a rung: {"status", "reason", and the rung's numbers}},
+                    "metrics": {"ssim", "flip", "psnr", "rmse", "relmse", "mean_bias",
+                                "nonfinite"} or null,
+                    "cause": {"name", "evidence", "explained"} or null,
+                    "worst": [{"x", "y", "width", "height", "what"}],
+                    "seconds": {side: {step: seconds}}, "notes": [...],
+                    "left_out": [features that were specialised away, and why],
+                    "again": command that runs this case alone}]}
+
+    Strict JSON (RFC 8259): NaN and the infinities become null, so a null number means "undefined or
+    unbounded" (such as the PSNR of equal pictures), never zero. Raises ValueError if two rungs of a
+    case have the same name or a number of a rung is called status or reason.
+    """
+    document = {
+        "schema": SCHEMA,
+        "suite": suite,
+        "provenance": plain(provenance),
+        "asked": len(cases) + len(missing),
+        "missing": list(missing),
+        "not_run": dict(not_run or {}),
+        "cases": [_case_data(case) for case in cases],
+    }
+    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+    # Control characters, valid in JSON, would act on a terminal.
+    text = re.sub("[\x7f-\x9f]", lambda found: f"\\u{ord(found[0]):04x}", text)
+    with replacing(path) as temporary:
+        # A lone surrogate, from a file name that is not UTF-8, becomes a JSON escape.
+        temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+
+
+def _case_data(case: Case) -> dict[str, Any]:
+    rungs = {rung.name: _rung_data(rung) for rung in case.rungs}
+    if len(rungs) < len(case.rungs):
+        raise ValueError(f"{case.scene}: two rungs have the same name")
+    return {
+        "scene": case.scene,
+        "verdict": case.verdict,
+        "headline": headline(case),
+        "reason": case.reason,
+        "sides": dict(zip(("candidate", "reference"), case.sides, strict=True)),
+        "tiers": rungs,
+        "metrics": plain(case.metrics),
+        "cause": plain(case.cause),
+        "worst": plain(case.worst),
+        "seconds": plain(case.seconds),
+        "notes": list(case.notes),
+        "left_out": list(case.left_out),
+        "again": case.again,
+    }
+
+
+def _rung_data(rung: RungResult) -> dict[str, Any]:
+    numbers: dict[str, Any] = plain(rung.numbers)
+    if clash := {"status", "reason"} & numbers.keys():
+        raise ValueError(f"{rung.name}: a number may not be called {', '.join(sorted(clash))}")
+    return {"status": rung.status, "reason": rung.reason, **numbers}

@@ -1,8 +1,8 @@
 """The result of a comparison as data, its verdict, and how it is stored.
 
 - `case`: `Case`, the result for one scene: a verdict, one `RungResult` for each rung, the pictures,
-  image metrics, the likeliest cause.  Radiance is in W/sr/m², times in seconds, places in pixels.
-- `verdict`: from rungs to the verdict of a case, from verdicts to the exit code of a run.
+  image metrics, the likeliest cause; `decide`, from rungs to the verdict of a case; `exit_code`,
+  from verdicts to that of a run.  Radiance is in W/sr/m², times in seconds, places in pixels.
 - `stored_case`: one case, `case.json` and `pictures.exr`, read back exactly or refused.
 - `files`: files with checksums for anything else that a later run continues from; values in JSON's
   types; JSON and CSV files, written whole or not at all.

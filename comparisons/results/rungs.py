@@ -1,12 +1,13 @@
-"""The names of the rungs, in their order."""
+"""The names of the rungs, in their order; imported without NumPy, for the options of commands."""
 
 RUNGS = (
     *("scene", "run", "input", "files", "film", "geometry"),
-    *("direct", "whitted", "layers", "statistics", "images"),
+    *("direct", "whitted", "layers", "statistics", "images", "witness"),
 )
 """The ladder, in order: a failure is reported at the first rung that breaks.  `scene` exists only
 if the scene or one of its files is invalid, `run` only if the case could not be completed; `input`
-checks the pictures themselves, `files` what we hold of files and descriptions."""
+checks the pictures themselves, `files` what we hold of files and descriptions; `witness` is there
+only if a third renderer is asked."""
 
 COMPARED = RUNGS[3:]
 """The rungs that compare the two renderers: those a suite can be limited to."""

@@ -14,8 +14,7 @@ from comparisons.mitsuba.scene import for_rays
 from comparisons.mitsuba.translate.cameras import translate_filter
 from comparisons.results.case import RungResult
 from reference_rt.cameras import Orthographic
-from reference_rt.cameras.film import Film
-from reference_rt.cameras.filters import Filter, GaussianFilter, film_offset
+from reference_rt.cameras.film import Film, Filter, GaussianFilter, film_offset
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.transform import Rotate, Scale, Translate, Turn
 from reference_rt.integrators import Path

@@ -20,9 +20,8 @@ from typing import Any, TypeVar
 from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 
 from comparisons.results.files import plain, sealed, unsealed
-from comparisons.runs.processes import pool
-from comparisons.runs.processes.child import Ended
-from comparisons.runs.processes.pool import R
+from comparisons.runs import processes
+from comparisons.runs.processes import Ended, R
 from reference_rt.util.console import Bar
 from reference_rt.util.files import read_text, replacing
 from reference_rt.util.workers import Workers
@@ -69,7 +68,7 @@ def measured(
     last; then of the others as they are measured, with None for the result of one that failed.
 
     read: the stored result of a request, None where there is none;  fresh: measure all;  the others
-    as `pool.run` has them.
+    as `processes.run` has them.
     """
     left = []
     for request in requests:
@@ -78,7 +77,7 @@ def measured(
             left.append(request)
         else:
             yield request, found, None
-    with closing(pool.run(left, workers, seconds, doing, module, kin)) as running:
+    with closing(processes.run(left, workers, seconds, doing, module, kin)) as running:
         for ended in running:
             yield ended.request, None if ended.failure else read(ended.request), ended
 

@@ -3,7 +3,7 @@
 A suite is a YAML file (`suite`): defaults and budgets by scene name (`comparisons.compare.budget`).
 `suite` makes the list of cases too; `run` executes them, each by a `worker` process, and stores
 every finished case with a `keys.case_key`: it is not run again until its scene, budget, sources or
-versions change.  `run` reads an output folder again, too; `display` shows progress on stderr.
+versions change.  `run` reads an output folder again, too, and shows progress on stderr.
 
 `results.json` is whole after each case.  A scene without a budget of its own gets the defaults, so
 that a new scene is in every suite.  An invalid scene or a crashed worker is a case with that

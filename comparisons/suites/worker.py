@@ -1,6 +1,6 @@
 """`python -m comparisons.suites.worker`: the worker process, which runs one case after another.
 
-It follows `comparisons.runs.processes.protocol`: it reads `Request`s and stores each case in the
+It follows `comparisons.runs.processes`: it reads `Request`s and stores each case in the
 request's folder.
 
 `--runner module:function` replaces the function `compare` (in tests, by one that crashes);
@@ -22,7 +22,7 @@ from pydantic import BaseModel, ConfigDict
 from comparisons.compare.budget import Budget
 from comparisons.results.case import WARNING, Case
 from comparisons.results.stored_case import write_case
-from comparisons.runs.processes.protocol import carry_out, private_stdout, send
+from comparisons.runs.processes import carry_out, private_stdout, send
 from comparisons.suites.suite import Changes
 from reference_rt.cli.guarded import scene_warnings
 from reference_rt.rendering.scene import Scene

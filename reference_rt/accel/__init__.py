@@ -5,7 +5,7 @@ All four find the same hits, to the last bit; only their speed differs:
 - brute force (no BVH), `shapes/brute_force.py`: one ray against VECTOR_WIDTH = 8 shapes at once;
   or, by `shapes/ray_simd.py`, VECTOR_WIDTH rays against one shape at once (spheres, rectangles and
   boxes; all other shapes one ray and one primitive at a time); through a link to shapes, one type
-  of shape after another (`shapes/brute_force_linked.py`);
+  of shape after another (`shapes/brute_force.py`);
 - single-ray traversal: the loop is in `geometry.py`, its steps are in `single_ray.py`;
 - stream traversal, `stream.py`: a block of up to BLOCK = 64 rays, each one step at a time;
 - packet traversal, `packet_traversal.py`: 16 coherent rays that share their box tests.

@@ -11,15 +11,18 @@ from reference_rt.accel.geometry import Geometry, closest_hit, occluded
 from reference_rt.accel.packet import PACKET_SIZE
 from reference_rt.accel.packet_traversal import FOUND, INCOHERENT, closest_of_packet
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.ray import BLOCK, Hit, Ray, scaled
-from reference_rt.core.ray_block import (
+from reference_rt.core.ray import (
+    BLOCK,
     HIT_FLOATS,
     HIT_INTEGERS,
     RAY_FLOATS,
+    Hit,
     HitBlock,
+    Ray,
     RayBlock,
     put_ray,
     ray_of,
+    scaled,
 )
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import kernel, local_floats, local_integers

@@ -9,17 +9,18 @@ import numpy as np
 from reference_rt import shapes as any_shape
 from reference_rt.accel.geometry import Geometry, closest_hit, geometries, occluded
 from reference_rt.accel.stream import any_of_block, closest_of_block, trace_block
-from reference_rt.core.ray import Hit, Ray
-from reference_rt.core.ray_block import (
+from reference_rt.core.ray import (
     HIT_FLOATS,
     HIT_INTEGERS,
     RAY_FLOATS,
+    Hit,
     HitBlock,
+    Ray,
     RayBlock,
     put_hit,
     ray_of,
 )
-from reference_rt.core.ray_block import hit_of as hit_in_block
+from reference_rt.core.ray import hit_of as hit_in_block
 from reference_rt.jit.function_pointer import call_pointer
 from reference_rt.jit.kernel import ByClass, kernel, signature_of
 from reference_rt.jit.links import Link

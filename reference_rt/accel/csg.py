@@ -31,8 +31,7 @@ from reference_rt.core.vec3 import dot, length
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.shapes import TRIANGLE, Shapes
-from reference_rt.shapes.csg.anchor import ray_near
-from reference_rt.shapes.csg.tables import AND, NOT, OR, Solids
+from reference_rt.shapes.csg import AND, NOT, OR, Solids, ray_near
 from reference_rt.shapes.meshes.watertight import shear_of
 
 # ---- closed meshes: a ray's crossings in order, and its origin's winding number ------------------

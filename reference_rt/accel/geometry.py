@@ -30,8 +30,7 @@ from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.links import Linkable
 from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.shapes import Packets, Shapes
-from reference_rt.shapes.csg.anchor import out_of_solid, ray_near
-from reference_rt.shapes.csg.tables import Parts, Solids
+from reference_rt.shapes.csg import Parts, Solids, out_of_solid, ray_near
 from reference_rt.shapes.instances import Instances, out_of, ray_in, tangents_out_of
 from reference_rt.shapes.meshes.watertight import PROJECTION_FLOATS, Shear, shear_of
 from reference_rt.shapes.shape import Tangents

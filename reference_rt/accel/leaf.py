@@ -5,12 +5,11 @@ from reference_rt.accel import csg
 from reference_rt.accel.bvh import Bvh, first_of, is_triangle_leaf, kind_of, row_of, size_of
 from reference_rt.accel.crossing_order import precedes
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.ray import Crossing, Hit, Ray
-from reference_rt.core.ray_block import HitBlock, RayBlock, hit_of, put_hit, ray_of
+from reference_rt.core.ray import Crossing, Hit, HitBlock, Ray, RayBlock, hit_of, put_hit, ray_of
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.simd import lowest
 from reference_rt.shapes import TRIANGLE, Shapes
-from reference_rt.shapes.csg.tables import Solids
+from reference_rt.shapes.csg import Solids
 from reference_rt.shapes.meshes import triangle
 from reference_rt.shapes.meshes.watertight import Shear, project_leaf
 

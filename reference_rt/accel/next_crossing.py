@@ -21,8 +21,8 @@ from reference_rt.core.ray import Hit, Ray
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.shapes import TABLES, Shapes
-from reference_rt.shapes.crossings import MAX_CROSSINGS, along, primitive_count
-from reference_rt.shapes.csg.tables import Solids
+from reference_rt.shapes.csg import Solids
+from reference_rt.shapes.dispatch import MAX_CROSSINGS, along, primitive_count
 from reference_rt.shapes.meshes.watertight import Shear, shear_of
 
 KINDS = len(TABLES)

@@ -21,8 +21,7 @@ from reference_rt.accel.packet import (
 )
 from reference_rt.accel.single_ray import can_be_nearer, push_sorted
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.ray import BLOCK, Ray, no_hit
-from reference_rt.core.ray_block import HitBlock, RayBlock, put_hit, put_ray
+from reference_rt.core.ray import BLOCK, HitBlock, Ray, RayBlock, no_hit, put_hit, put_ray
 from reference_rt.core.vec3 import component, row
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.simd import VECTOR_WIDTH, larger, lowest, simd_kernel, smaller

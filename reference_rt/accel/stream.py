@@ -27,8 +27,15 @@ from reference_rt.accel.bvh import (
 from reference_rt.accel.leaf import nearest_of_leaf
 from reference_rt.accel.single_ray import slab_test
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.ray import BLOCK, SURFACE_ROUNDING, no_hit
-from reference_rt.core.ray_block import HitBlock, RayBlock, put_hit, ray_of
+from reference_rt.core.ray import (
+    BLOCK,
+    SURFACE_ROUNDING,
+    HitBlock,
+    RayBlock,
+    no_hit,
+    put_hit,
+    ray_of,
+)
 from reference_rt.jit.kernel import entry_kernel, kernel, local_floats, local_uint32
 from reference_rt.jit.simd import (
     VECTOR_WIDTH,
@@ -41,7 +48,7 @@ from reference_rt.jit.simd import (
     with_sign,
 )
 from reference_rt.shapes import Shapes
-from reference_rt.shapes.csg.tables import Solids
+from reference_rt.shapes.csg import Solids
 from reference_rt.shapes.meshes.watertight import PROJECTION_FLOATS, Shear
 
 # ---- the state of a stream -----------------------------------------------------------------------

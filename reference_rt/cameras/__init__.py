@@ -1,13 +1,14 @@
-"""Cameras, one module each, and the film: picture size, layers and reconstruction filters.
+"""Cameras, and the film: picture size, layers and reconstruction filters.
 
-A camera's module has a `Camera` description, in scene units and degrees, with
+A camera has a `Camera` description, in scene units and degrees, with
 `setup(width, height)` for a picture of that many pixels, which returns a NamedTuple (a *view*); the
 kernel camera_ray(view, x, y, lens) -> `Ray` with a unit direction and no end, for the film point
 (x, y), each in [0, 1] across the picture from its top left corner; and, for a camera with a lens,
 lens_sample(view, sampler), which draws the lens point.
 
-To add a camera: its module; `AnyCamera` and the registrations below; a translator function in
-`comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.
+To add a camera: its description and kernel, in a module that has no other `camera_ray`; `AnyCamera`
+and the registrations below; a translator function in `comparisons.mitsuba.translate`; a scene; a
+row in the tests' tuple.
 """
 
 from typing import Annotated, Any
@@ -17,8 +18,7 @@ from pydantic import Field
 from reference_rt.cameras import orthographic, perspective, thin_lens
 from reference_rt.cameras.camera import LENS_CENTRE, no_lens
 from reference_rt.cameras.orthographic import Orthographic, OrthographicView
-from reference_rt.cameras.perspective import Perspective, PerspectiveView
-from reference_rt.cameras.pinhole import Pinhole
+from reference_rt.cameras.perspective import Perspective, PerspectiveView, Pinhole
 from reference_rt.cameras.thin_lens import ThinLens, ThinLensView
 from reference_rt.core.ray import Ray
 from reference_rt.jit.kernel import ByClass

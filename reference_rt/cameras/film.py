@@ -1,19 +1,259 @@
-"""Film: the picture's size, its reconstruction filter and the layers (AOVs) beside its colour."""
+"""Film: the picture's size, its layers (AOVs) beside its colour, and its reconstruction filter.
 
-from typing import Annotated, Any, Literal
+Filter importance sampling: film points are drawn from a density made of the filter.  A pixel is the
+integral of radiance times the filter around its centre.  Each pixel draws its own
+points from the filter (Ernst et al. 2006): pixels share no samples, so that any tiling and any
+number of threads give the same bits.  Where a filter is negative, points are drawn from its
+absolute value and have negative weights; the mean is unbiased, since samples are not divided by the
+sum of their weights.  Lengths are in pixels.
 
+To add a filter: its description; for a tabulated one the NamedTuple of its profile, a kernel and
+its registration; `AnyFilter`; a translator function in `comparisons.mitsuba.translate`; a scene.
+"""
+
+import functools
+import math
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
 from pydantic import BeforeValidator, Field
 
-from reference_rt.cameras.filters import (
-    AnyFilter,
-    BoxFilter,
-    CatmullRomFilter,
-    GaussianFilter,
-    LanczosFilter,
-    MitchellFilter,
-    TentFilter,
-)
-from reference_rt.core.model import Description
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.model import Description, Positive
+from reference_rt.jit.kernel import ByClass, kernel
+from reference_rt.jit.links import Linkable
+from reference_rt.sampling.distribution import cell_of
+
+
+class Filter(Description):
+    """A separable filter: the product of one function of x and of y, whose integral is 1."""
+
+    def setup(self) -> Any:
+        """The NamedTuple that `film_offset` takes."""
+        raise NotImplementedError
+
+    def value(self, x: float) -> float:
+        """The function at x pixels from the pixel's centre."""
+        tabulated: Tabulated = self.setup()
+        return float(_profile(tabulated.profile, x)) / tabulated.integral
+
+
+class BoxFilter(Filter):
+    """The mean over the pixel's square."""
+
+    type: Literal["box"] = "box"
+
+    def setup(self) -> "BoxSetup":
+        return BoxSetup(1.0)
+
+    def value(self, x: float) -> float:
+        return 1.0 if -0.5 <= x < 0.5 else 0.0
+
+
+class TentFilter(Filter):
+    """Falls linearly to zero at `radius` pixels, in x and in y."""
+
+    type: Literal["tent"] = "tent"
+    radius: Positive = 1.0
+    """Half the filter's width in x and in y, in pixels."""
+
+    def setup(self) -> "TentSetup":
+        return TentSetup(self.radius)
+
+    def value(self, x: float) -> float:
+        return max(0.0, 1.0 - abs(x) / self.radius) / self.radius
+
+
+class GaussianFilter(Filter):
+    """exp(-x² / 2 s²), lowered to reach zero at 4 s, in x and in y."""
+
+    type: Literal["gaussian"] = "gaussian"
+    stddev: Positive = 0.5
+    """The standard deviation s, in pixels."""
+
+    def setup(self) -> "Tabulated":
+        return _tabulated(Gaussian(self.stddev, math.exp(-8.0)), 4.0 * self.stddev)
+
+
+Unit = Annotated[float, Field(ge=0, le=1)]
+
+
+class MitchellFilter(Filter):
+    """Two cubics on each side, to 2 pixels (Mitchell & Netravali 1988, eq. 8)."""
+
+    type: Literal["mitchell"] = "mitchell"
+    b: Unit = 1.0 / 3.0
+    """Blur, from 0 to 1: 1 with `c` = 0 is the cubic B-spline."""
+    c: Unit = 1.0 / 3.0
+    """Ringing, from 0 to 1: the authors advise b + 2 c = 1."""
+
+    def setup(self) -> "Tabulated":
+        return _tabulated(Cubics(self.b, self.c), 2.0)
+
+
+class CatmullRomFilter(Filter):
+    """Mitchell's filter with b = 0 and c = 1/2, which interpolates: sharp, with one ring."""
+
+    type: Literal["catmull_rom"] = "catmull_rom"
+
+    def setup(self) -> "Tabulated":
+        return _tabulated(Cubics(0.0, 0.5), 2.0)
+
+
+class LanczosFilter(Filter):
+    """A sinc under the middle lobe of a wider one: sharp, with `lobes` - 1 rings (Duchon 1979)."""
+
+    type: Literal["lanczos"] = "lanczos"
+    lobes: Annotated[int, Field(ge=1, le=64)] = 3
+    """Lobes on each side, from 1 to 64; also the filter's radius in pixels."""
+
+    def setup(self) -> "Tabulated":
+        return _tabulated(WindowedSinc(float(self.lobes)), float(self.lobes), 64 * 2 * self.lobes)
+
+
+AnyFilter = Annotated[
+    BoxFilter | TentFilter | GaussianFilter | MitchellFilter | CatmullRomFilter | LanczosFilter,
+    Field(discriminator="type"),
+]
+
+
+class BoxSetup(NamedTuple):
+    width: float
+
+
+class TentSetup(NamedTuple):
+    radius: float
+
+
+class Gaussian(NamedTuple):
+    """max(0, exp(-x² / 2 stddev²) - floor)."""
+
+    stddev: float
+    floor: float
+
+
+class Cubics(NamedTuple):
+    """Mitchell's and Netravali's parameters."""
+
+    b: float
+    c: float
+
+
+class WindowedSinc(NamedTuple):
+    lobes: float
+
+
+class Tabulated(NamedTuple):
+    """A tabulated filter.  It is profile / integral;  edges, cumulative (cells + 1,): a piecewise
+    linear CDF close to that of its absolute value, from which points are drawn."""
+
+    profile: Gaussian | Cubics | WindowedSinc
+    integral: float
+    edges: FloatArray
+    cumulative: FloatArray
+
+
+@functools.cache
+def _tabulated(
+    profile: Gaussian | Cubics | WindowedSinc, radius: float, cells: int = 256
+) -> Tabulated:
+    """The table of an even profile that ends at `radius` and whose kinks are at edges of cells.
+
+    Cells are 1/64 pixel, or 1/32 of a Gaussian's s, wide; four Gauss points integrate a function
+    that is smooth inside a cell to below rounding.
+    """
+    edges = np.linspace(-radius, radius, cells + 1)
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
+    x = middle[:, None] + half[:, None] * nodes
+    values = np.array([float(_profile(profile, float(at))) for at in x.flat]).reshape(x.shape)
+    masses = half * (np.abs(values) @ weights)
+    cumulative = np.concatenate([[0.0], np.cumsum(masses)])
+    return Tabulated(profile, float(half @ (values @ weights)), edges, cumulative / cumulative[-1])
+
+
+@kernel
+def _gaussian(gaussian: Gaussian, x: float) -> float:
+    z = x / gaussian.stddev
+    return max(0.0, math.exp(-0.5 * z * z) - gaussian.floor)
+
+
+@kernel
+def _cubics(cubics: Cubics, x: float) -> float:
+    b, c = cubics.b, cubics.c
+    x = abs(x)
+    if x < 1.0:
+        return (
+            ((12.0 - 9.0 * b - 6.0 * c) * x + (-18.0 + 12.0 * b + 6.0 * c)) * x * x + 6.0 - 2.0 * b
+        ) / 6.0
+    if x < 2.0:
+        # The paper's second cubic, about its double zero at 2.
+        r = 2.0 - x
+        return ((b + 6.0 * c) * r - 6.0 * c) * r * r / 6.0
+    return 0.0
+
+
+@kernel
+def _sinc(x: float) -> float:
+    y = math.pi * x
+    return 1.0 if y == 0.0 else math.sin(y) / y
+
+
+@kernel
+def _windowed_sinc(window: WindowedSinc, x: float) -> float:
+    if abs(x) >= window.lobes:
+        return 0.0
+    return _sinc(x) * _sinc(x / window.lobes)
+
+
+_profiles = ByClass("filter_profile")
+_profiles.register(Gaussian, _gaussian)
+_profiles.register(Cubics, _cubics)
+_profiles.register(WindowedSinc, _windowed_sinc)
+_profile = _profiles.function
+
+
+@kernel
+def _box_offset(box: BoxSetup, u: float) -> tuple[float, float]:
+    return box.width * (u - 0.5), 1.0
+
+
+@kernel
+def _tent_offset(tent: TentSetup, u: float) -> tuple[float, float]:
+    """The inverse of the tent's distribution, half by half."""
+    if u < 0.5:
+        return tent.radius * (math.sqrt(2.0 * u) - 1.0), 1.0
+    return tent.radius * (1.0 - math.sqrt(2.0 * (1.0 - u))), 1.0
+
+
+@kernel
+def _tabulated_offset(table: Tabulated, u: float) -> tuple[float, float]:
+    """Uniform inside a cell of the table; the weight is the filter over the cell's density."""
+    edges, cumulative = table.edges, table.cumulative
+    cell = cell_of(cumulative, u)
+    low, high = cumulative[cell], cumulative[cell + 1]
+    span = edges[cell + 1] - edges[cell]
+    x = edges[cell] + span * (u - low) / (high - low)
+    return x, _profile(table.profile, x) / table.integral * span / (high - low)
+
+
+_offset = ByClass("film_offset")
+_offset.register(BoxSetup, _box_offset)
+_offset.register(TentSetup, _tent_offset)
+_offset.register(Tabulated, _tabulated_offset)
+_offset_by = _offset.function
+
+film_filters = Linkable()
+"""The operation `film_offset`, on a filter's setup or on a link to one."""
+
+
+@film_filters.operation
+def film_offset(setup: Any, u: float) -> tuple[float, float]:
+    """(offset from the pixel's centre in pixels, weight), along one axis; the expectation of
+    weight * g(offset) is the filter's integral of g."""
+    dx, weight = _offset_by(setup, u)
+    return dx, weight
+
 
 LayerName = Literal["albedo", "normal", "position", "depth", "id", "variance"]
 
@@ -47,16 +287,3 @@ class Film(Description):
     miss.  variance: of the pixel's mean, estimated from its samples; for `sobol` and `grid`, whose
     samples are stratified, an upper estimate.  Ray casting writes its own layers instead.
     """
-
-
-__all__ = [
-    "AnyFilter",
-    "BoxFilter",
-    "CatmullRomFilter",
-    "Film",
-    "GaussianFilter",
-    "LanczosFilter",
-    "LayerName",
-    "MitchellFilter",
-    "TentFilter",
-]

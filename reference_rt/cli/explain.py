@@ -1,27 +1,40 @@
-"""What a scene uses, and what is specialised away because the scene lacks it."""
+"""`reference-rt explain`: what a scene uses, what is specialised away because the scene lacks it,
+which kernels its picture uses, and which of them are compiled already.
+"""
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
 from typing import Any
 
+import numba
 import numpy as np
+from numba import types
+from rich.console import Console
+from rich.table import Table
 
 from reference_rt.accel import bvh
 from reference_rt.cli.limits import in_words, limits_of
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.jit.kernel import Signature, is_compiled
+from reference_rt.jit.parallel_compile import Call
 from reference_rt.lights import Lights
 from reference_rt.lights.emitters.environment_map import EnvironmentMaps
 from reference_rt.materials import any_smooth
 from reference_rt.materials.bsdfs.tables import TABLES as MATERIAL_TABLES
 from reference_rt.materials.nested.flattened import FlattenedMaterials
+from reference_rt.rendering.kernels import operation_of
 from reference_rt.rendering.scene import Scene
+from reference_rt.rendering.warm_up import picture_calls, specialised_calls
 from reference_rt.sampling import Grid
+from reference_rt.scene.likely_mistakes import likely_mistakes
 from reference_rt.shapes import TABLES as SHAPE_TABLES
 from reference_rt.shapes import Mesh, Shape
 from reference_rt.shapes.csg import Solid
 from reference_rt.shapes.shape import TabulationContext
 from reference_rt.textures import TABLES as TEXTURE_TABLES
 from reference_rt.textures.bitmap import Memory
+from reference_rt.util.errors import printable
 
 Lines = list[tuple[str, str]]
 
@@ -293,3 +306,133 @@ def _bytes(n: int) -> str:
             return f"{n:.3g} {unit}"
         n /= 1024  # type: ignore[assignment]
     return f"{n:.3g} GiB"
+
+
+_OPERATIONS = {
+    "any_hits": "shadow rays of blocks",
+    "area_density": "light densities",
+    "background": "radiance",
+    "branches": "perfect reflection and refraction",
+    "camera_ray": "camera rays",
+    "closest_hit": "closest hits",
+    "closest_hits": "closest hits of blocks",
+    "complete_block": "surface coordinates of hits of blocks",
+    "coordinates": "texture coordinates",
+    "emitted": "emission",
+    "environment_density": "light densities",
+    "enters": "sides of crossings",
+    "eval_pdf": "scattering and density",
+    "evaluate": "colours",
+    "face": "faces",
+    "film_offset": "sample offsets",
+    "gradient": "slopes",
+    "holds": "which lights",
+    "intersect": "crossings",
+    "most": "most layers",
+    "nearest_of_block": "hits of blocks",
+    "nearest_of_type": "hits",
+    "number": "layers",
+    "occluded": "shadow rays",
+    "owner": "ids",
+    "pdf": "light densities",
+    "prepare": "weights and frames",
+    "sample": "samples",
+    "sample_fixed": "light of fixed points",
+    "surface": "surface points",
+    "uv": "texture coordinates",
+}
+"""Operations whose names say too little."""
+
+_TABLES = {
+    "Areas": "area lights",
+    "BoxSetup": "filter",
+    "Environment": "constant environment",
+    "Tabulated": "filter",
+    "TentSetup": "filter",
+    "Transparents": "dielectrics",
+}
+"""Classes of tables, likewise."""
+
+_DRIVERS = {
+    "render_tile": "driver of the picture",
+    "first_hits_tile": "driver of albedo and normal",
+    "aov_tile": "driver of ray casting",
+}
+
+
+def kernels_of(scene: Scene) -> Lines:
+    """(what, which kernels): those of a scene's picture, linked and specialised."""
+    if numba.config.DISABLE_JIT:
+        return [("kernels", "NUMBA_DISABLE_JIT is set: they run as plain Python")]
+    linked, specialised = picture_calls(scene), specialised_calls(scene)
+    if all(is_compiled(*call) for call in specialised):
+        use = "this scene is rendered by them"
+    else:
+        use = "a long render compiles them meanwhile, `warm-up` with this scene beforehand"
+    lines = [
+        ("linked", f"{_compiled(linked)}; shared by all scenes"),
+        ("specialised", f"{_compiled(specialised)}: {use}"),
+    ]
+    found: dict[str, set[str]] = {}
+    for compiled, signature in linked:
+        what, operation = _named(operation_of(compiled), signature)
+        found.setdefault(what, set()).add(operation)
+    return lines + [(what, ", ".join(sorted(of_type))) for what, of_type in sorted(found.items())]
+
+
+def _compiled(calls: Iterable[Call]) -> str:
+    found = [is_compiled(*call) for call in calls]
+    return f"{sum(found)} of {len(found)} compiled"
+
+
+def _named(kernel: str, signature: Signature) -> tuple[str, str]:
+    """(the table that a kernel works on, what it computes);  of a driver, which loops over pixels:
+    (what it computes, the integrator and the sampler that it has inside)."""
+    arguments = signature if isinstance(signature, tuple) else signature.args
+    if not isinstance(arguments[0], types.CPointer):
+        classes = [getattr(of, "instance_class", type(None)).__name__ for of in arguments]
+        inside = [name.removesuffix("Setup").lower() for name in classes if name.endswith("Setup")]
+        return _DRIVERS.get(kernel, _words(kernel)), ", ".join(inside) or "one ray per pixel"
+    table = arguments[0].dtype.instance_class.__name__
+    name = kernel.strip("_").removesuffix("_nested")
+    return _TABLES.get(table, _words(table)), _OPERATIONS.get(name, _words(name))
+
+
+def _words(name: str) -> str:
+    """Of a name in either case: `RoughConductors` and `rough_conductors` become words."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])|_", " ", name).strip().lower()
+
+
+def print_page(scene: Scene) -> None:
+    """Print, on standard output, all that is known of a scene without rendering it.  Raises
+    SceneError."""
+    used, pruned = explain(scene, scene.tables)
+    near, beyond = margins(scene)
+    mistakes = [
+        (str(scene.error("", *mistake.path)), mistake.message)
+        for mistake in likely_mistakes(scene, scene.tables)
+    ]
+    console = Console()
+    for title, lines in (
+        ("used", used),
+        ("specialised away", _by_reason(pruned)),
+        ("kernels", kernels_of(scene)),
+        ("nearest to float64's limits", near),
+        ("warning: beyond float64", beyond),
+        ("warning: probably a mistake", mistakes),
+    ):
+        if not lines:
+            continue
+        table = Table(title=title, title_justify="left", show_header=False, box=None)
+        for what, why in lines:
+            table.add_row(printable(what), printable(why))
+        console.print(table)
+        console.print()
+
+
+def _by_reason(lines: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    """The same with one line for each reason: a simple scene lacks thirty things for ten."""
+    names: dict[str, list[str]] = {}
+    for what, why in lines:
+        names.setdefault(why, []).append(what)
+    return [(", ".join(some), why) for why, some in names.items()]

@@ -18,7 +18,7 @@ from reference_rt.util.errors import (
     printable,
 )
 from reference_rt.util.memory import machine_memory
-from reference_rt.util.signals import dropped, exit_code_of
+from reference_rt.util.processes import dropped, exit_code_of
 
 F = TypeVar("F", bound=Callable[..., Any])
 

@@ -19,8 +19,7 @@ from reference_rt.core.transform import Affine
 from reference_rt.core.vec3 import Vec3
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import TABLES, Mesh
-from reference_rt.shapes.csg import Solid
-from reference_rt.shapes.csg.description import operands_of
+from reference_rt.shapes.csg import Solid, operands_of
 from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.shape import Shape, TabulationContext
 

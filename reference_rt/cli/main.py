@@ -14,9 +14,8 @@ import typer
 from reference_rt.cli import render_options
 from reference_rt.cli.adjusted import Defaults, SceneArgument, adjusted, by_name, without_blas
 from reference_rt.cli.guarded import guarded, is_output_lost, lost_output, say
-from reference_rt.cli.preview_command import preview
 from reference_rt.util.errors import ImageError
-from reference_rt.util.signals import catch_signals, exit_code_of
+from reference_rt.util.processes import catch_signals, exit_code_of
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -99,14 +98,44 @@ def render(
         raise typer.Exit(code)
 
 
-app.command()(preview)
+@app.command()
+@guarded
+def preview(
+    scene: SceneArgument,
+    to: Annotated[
+        str,
+        typer.Option(
+            metavar="PLACE",
+            help="window, terminal, sixel, blocks, or a .png file that is rewritten. "
+            "(default: a window where there is a display, else SCENE.preview.png)",
+        ),
+    ] = "",
+    spp: Annotated[
+        int, typer.Option(min=1, help="Samples per pixel of the finished picture.")
+    ] = 4096,
+    target_error: Annotated[
+        str, typer.Option(help="End at this relative standard error of the picture.")
+    ] = "1%",
+    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
+    threads: Annotated[int | None, typer.Option(min=1, help="Default: all cores.")] = None,
+    define: Defaults = None,
+) -> None:
+    """Show a picture of a scene that becomes less noisy until it is closed or interrupted."""
+    from reference_rt.cli import preview as previews
+    from reference_rt.cli.render_options import share_of
+    from reference_rt.rendering.scene import Scene
+
+    loaded = adjusted(Scene.load(scene, by_name(define)), size=size)
+    view = previews.view_of(to, loaded)
+    with without_blas():
+        previews.preview(loaded, view, spp, share_of(target_error, "--target-error"), threads)
 
 
 @app.command()
 @guarded
 def explain(scene: SceneArgument, define: Defaults = None) -> None:
     """Print what a scene uses, how near to float64's limits it is, and its kernels."""
-    from reference_rt.cli.explain_page import print_page
+    from reference_rt.cli.explain import print_page
     from reference_rt.rendering.scene import Scene
 
     print_page(Scene.load(scene, by_name(define)))

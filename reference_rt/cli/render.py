@@ -24,7 +24,7 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.util.console import ProgressLine
 from reference_rt.util.errors import ImageError, UsageError
 from reference_rt.util.files import check_writable
-from reference_rt.util.signals import exit_code_of
+from reference_rt.util.processes import exit_code_of
 from reference_rt.util.workers import Processes
 
 AFTER = 60.0

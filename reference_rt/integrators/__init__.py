@@ -7,7 +7,7 @@ rays, `radiances`.  It estimates the radiance in W sr^-1 m^-2, linear sRGB, that
 origin from its (unit) direction; 0 is black.
 `RayCast` alone has no such kernel: `ray_cast.cast` computes AOVs.  Shared by all: `shading` (from a
 hit to the BSDF's input), `direct_light` (one light sample, power heuristic), `scene_tables` (what
-kernels read), `scratch` and `path_state` (buffers of a block).
+kernels read), `path.Scratch` (buffers of a block).
 
 To add an integrator: its file with description, NamedTuple and kernel; `AnyIntegrator` and its
 registrations below; its counterpart in `comparisons`.
@@ -17,13 +17,12 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from reference_rt.core.ray_block import put_vector, ray_of
+from reference_rt.core.ray import put_vector, ray_of
 from reference_rt.integrators import direct, path, whitted
 from reference_rt.integrators.direct import Direct, DirectSetup
-from reference_rt.integrators.path import Path, PathSetup
+from reference_rt.integrators.path import Path, PathSetup, Scratch
 from reference_rt.integrators.ray_cast import RayCast
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.integrators.scratch import Scratch
 from reference_rt.integrators.whitted import Whitted, WhittedSetup
 from reference_rt.jit.kernel import ByClass, kernel
 from reference_rt.sampling import Samplers, sampler_of

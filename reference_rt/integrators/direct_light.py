@@ -6,8 +6,7 @@ from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt.accel.block_query import closest_hits, hit_of
 from reference_rt.accel.geometry import closest_hit, occluded
-from reference_rt.core.ray import Hit, Ray, ray_from
-from reference_rt.core.ray_block import HitBlock, RayBlock, put_ray, ray_of
+from reference_rt.core.ray import Hit, HitBlock, Ray, RayBlock, put_ray, ray_from, ray_of
 from reference_rt.core.vec3 import Vec3, is_black, to_local
 from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
 from reference_rt.jit.kernel import kernel

@@ -8,7 +8,7 @@ from reference_rt.integrators.scene_tables import SceneTables, surface
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.links import is_absent
 from reference_rt.materials import Shading, prepare, uses_textures
-from reference_rt.materials.frame import oriented_frame
+from reference_rt.materials.material import oriented_frame
 from reference_rt.materials.textured import evaluate_textures, lookup_cache_size
 from reference_rt.shapes.shape import Tangents
 from reference_rt.textures import At, Textures

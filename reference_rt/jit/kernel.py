@@ -33,6 +33,10 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 CACHE_FOLDER = prepare_folder()
 
+Signature = Any
+"""The types of a kernel's arguments: a tuple, or Numba's signature, which has that of the result
+too."""
+
 
 def kernel(function: F) -> F:
     """Make `function` callable from compiled code, inlined; Python runs it as plain Python.
@@ -76,11 +80,20 @@ def _cache(compiled: Any, function: Callable[..., Any], name: str = "") -> None:
     if CACHE_FOLDER is not None and not numba.config.DISABLE_JIT:
         with suppress(OSError):  # without a source file
             compiled._cache = KernelCache(function, CACHE_FOLDER, name)
+            compiled.compile = _alone(compiled, compiled.compile)
 
 
-Signature = Any
-"""The types of a kernel's arguments: a tuple, or Numba's signature, which has that of the result
-too."""
+def _alone(compiled: Any, compile_it: Callable[[Signature], Any]) -> Callable[[Signature], Any]:
+    """The method `compile` of an entry kernel, but two processes do not compile the same: one waits
+    and loads what the other has compiled."""
+
+    def compile_alone(signature: Signature) -> Any:
+        if is_compiled(compiled, signature):
+            return compile_it(signature)
+        with compiled._cache.alone(signature, compiled.targetctx.codegen()):
+            return compile_it(signature)
+
+    return compile_alone
 
 
 def signature_of(*args: Any) -> Signature:
@@ -128,6 +141,12 @@ def is_cached(compiled: Callable[..., Any], signature: Signature) -> bool:
     """Whether the cache has an entry kernel for these types."""
     cache, codegen = compiled._cache, compiled.targetctx.codegen()  # type: ignore[attr-defined]
     return isinstance(cache, KernelCache) and cache.has(signature, codegen)
+
+
+def is_compiling(compiled: Callable[..., Any], signature: Signature) -> bool:
+    """Whether another process compiles an entry kernel for these types just now."""
+    cache, codegen = compiled._cache, compiled.targetctx.codegen()  # type: ignore[attr-defined]
+    return isinstance(cache, KernelCache) and cache.is_compiling(signature, codegen)
 
 
 def is_named_tuple(numba_type: Any, cls: type) -> bool:

@@ -4,13 +4,17 @@ Numba's own cache does not verify what it reads.  It writes an index of a functi
 the files themselves, without fsync: after a crash, a full disk or a damaged sector every later
 process fails while unpickling, or runs damaged machine code.  This cache has no index: a file's
 name is a digest of its key.  A file is written atomically (`files.replacing`) and begins with a
-checksum; if that is wrong, the file is deleted and the kernel compiled again.  No lock is needed:
-if two processes write the same file, the second replaces the first.
+checksum; if that is wrong, the file is deleted and the kernel compiled again.  Reading and writing
+need no lock: if two processes write the same file, the second replaces the first.
+
+Compiling takes seconds, so a process that needs a kernel which another one compiles waits for it
+(`KernelCache.alone`).
 
 The checksum protects against accidents, not against attackers: the payload is a pickle, which can
 run any code, so only the owner may read or write the folder (mode 0700).
 """
 
+import functools
 import hashlib
 import os
 import pickle
@@ -19,10 +23,15 @@ import stat
 import sys
 import time
 import warnings
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
+
+try:
+    import fcntl
+except ImportError:  # Windows: two processes may compile the same kernel
+    fcntl = None  # type: ignore[assignment]
 
 import llvmlite
 import numba
@@ -40,6 +49,9 @@ ten)."""
 _UNFINISHED_FOR = 3600.0
 """Seconds after which a temporary file is deleted: writing takes less than one, so its writer was
 killed."""
+
+_PATIENCE = 60.0
+"""Seconds to wait for a process that compiles the same kernel; one takes less than ten."""
 
 _PACKAGE = Path(__file__).parents[1]
 
@@ -133,6 +145,39 @@ def _delete(path: Path) -> None:
         shutil.rmtree(path, ignore_errors=True)
 
 
+# Which kernels are being compiled: a byte of one file each, which is locked but never written.
+# Such locks belong to a process: a forked child has none, and they end with it.
+
+
+@functools.cache
+def _lock_file(process: int) -> int | None:
+    """The descriptor of the file; None where there are no locks."""
+    if fcntl is None:
+        return None
+    with suppress(OSError):
+        return os.open(cache_root() / "compiling", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    return None
+
+
+def _lock(byte: int) -> bool:
+    """Lock a byte unless another process has locked it; True where there are no locks."""
+    if (file := _lock_file(os.getpid())) is None:
+        return True
+    try:
+        fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, byte)
+    except BlockingIOError:
+        return False
+    except OSError:  # such as a file system without locks
+        return True
+    return True
+
+
+def _unlock(byte: int) -> None:
+    if (file := _lock_file(os.getpid())) is not None:
+        with suppress(OSError):
+            fcntl.lockf(file, fcntl.LOCK_UN, 1, byte)
+
+
 def _place(file: Path) -> str:
     """A source file's path, for a file of this package within the package: an installed copy and
     the sources that it was installed from share their kernels, as does a copy elsewhere."""
@@ -168,6 +213,31 @@ class KernelCache:
     def has(self, signature: Any, codegen: Any) -> bool:
         """Whether there is a file for arguments of these types, damaged or not."""
         return self._path(self._key(signature, codegen)).is_file()
+
+    @contextmanager
+    def alone(self, signature: Any, codegen: Any) -> Iterator[None]:
+        """While this process compiles the kernel for arguments of these types.  Waits first for
+        another process that compiles it, but not for ever: it may have been stopped."""
+        byte = self._byte(signature, codegen)
+        end = time.monotonic() + _PATIENCE
+        while not (locked := _lock(byte)) and time.monotonic() < end:
+            time.sleep(0.01)
+        try:
+            yield
+        finally:
+            if locked:
+                _unlock(byte)
+
+    def is_compiling(self, signature: Any, codegen: Any) -> bool:
+        """Whether another process compiles the kernel for arguments of these types just now."""
+        byte = self._byte(signature, codegen)
+        if free := _lock(byte):
+            _unlock(byte)
+        return not free
+
+    def _byte(self, signature: Any, codegen: Any) -> int:
+        path = f"{self._folder.name}/{self._path(self._key(signature, codegen)).name}"
+        return int.from_bytes(hashlib.blake2b(path.encode(), digest_size=7).digest())
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
         """The `CompileResult` for arguments of these types; None if there is none, or if its file

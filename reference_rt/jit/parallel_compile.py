@@ -16,8 +16,14 @@ from typing import Any
 
 from numba.core.compiler_lock import global_compiler_lock
 
-from reference_rt.jit.kernel import CACHE_FOLDER, Signature, is_compiled, precompile
-from reference_rt.util.child_processes import end_with_parent
+from reference_rt.jit.kernel import (
+    CACHE_FOLDER,
+    Signature,
+    is_compiled,
+    is_compiling,
+    precompile,
+)
+from reference_rt.util.processes import end_with_parent
 
 PATIENCE = 60.0
 """Seconds to wait for the child when nothing else is left to do; all kernels of a scene compile in
@@ -103,9 +109,12 @@ def compile_all(
     if threads > 1 and len(missing) > 1 and may_fork():
         _compile_in_parallel(missing, min(threads, len(missing)) - 1, total, tell, ahead)
     else:
-        for k, call in enumerate(missing):
-            precompile(*call)
-            tell(k + 1, total)
+        # What another process compiles comes last: meanwhile this one compiles what that one needs.
+        left = list(missing)
+        while left:
+            k = next((k for k, call in enumerate(left) if not is_compiling(*call)), 0)
+            precompile(*left.pop(k))
+            tell(len(missing) - len(left), total)
     if begun:
         end = time.monotonic() + PATIENCE
         while ahead is not None and not ahead.is_done and time.monotonic() < end:

@@ -42,9 +42,8 @@ from reference_rt.lights.dispatch import (
     sample_one,
 )
 from reference_rt.lights.emitters import directional, point, projector, spot
-from reference_rt.lights.emitters.ambient import Ambient
 from reference_rt.lights.emitters.area import Areas
-from reference_rt.lights.emitters.constant import Constant, Environment
+from reference_rt.lights.emitters.constant import Ambient, Constant, Environment
 from reference_rt.lights.emitters.directional import Directional
 from reference_rt.lights.emitters.environment_map import EnvironmentMap
 from reference_rt.lights.emitters.point import Point
@@ -60,8 +59,7 @@ from reference_rt.lights.light import (
     LightSample,
     shadow_ray,
 )
-from reference_rt.lights.selection.choice import LightSampler
-from reference_rt.lights.selection.tree import Pick
+from reference_rt.lights.selection.choice import LightSampler, Pick
 from reference_rt.lights.tables import (
     Lights,
     LinkedLights,

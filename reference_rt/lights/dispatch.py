@@ -12,7 +12,7 @@ from reference_rt.jit.kernel import kernel
 from reference_rt.lights.emitters import area
 from reference_rt.lights.light import AREA, ENVIRONMENT, NO_LIGHT, LightSample
 from reference_rt.lights.selection import choice
-from reference_rt.lights.selection.tree import Pick
+from reference_rt.lights.selection.choice import Pick
 from reference_rt.lights.tables import (
     Lights,
     by_code,

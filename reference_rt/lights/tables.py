@@ -6,8 +6,7 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass, kernel
-from reference_rt.jit.links import LINK, Link
-from reference_rt.jit.operation_types import declare
+from reference_rt.jit.links import LINK, Link, declare
 from reference_rt.lights.emitters import (
     area,
     constant,
@@ -33,8 +32,7 @@ from reference_rt.lights.light import (
     SPOT,
     LightSample,
 )
-from reference_rt.lights.selection.choice import LightSampler
-from reference_rt.lights.selection.tree import LightTree
+from reference_rt.lights.selection.choice import LightSampler, LightTree
 
 
 class Lights(NamedTuple):

@@ -57,12 +57,9 @@ from reference_rt.materials.dispatch import (
     uses_textures,
     uses_u_lobe,
 )
-from reference_rt.materials.emissive import Emissive
-from reference_rt.materials.material import Branches, BsdfSample, Material
-from reference_rt.materials.nested.bump import Bump
-from reference_rt.materials.nested.normal_map import NormalMap
+from reference_rt.materials.material import Branches, BsdfSample, Emissive, Material, Shading
+from reference_rt.materials.nested.tilted import Bump, NormalMap
 from reference_rt.materials.nested.wrappers import Blend, Mask, TwoSided, Wrapper
-from reference_rt.materials.shading import Shading
 
 AnyMaterial = Annotated[
     Diffuse

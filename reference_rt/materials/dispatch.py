@@ -13,17 +13,16 @@ from reference_rt.jit.kernel import kernel
 from reference_rt.jit.links import is_absent
 from reference_rt.materials.bsdfs import tables as bsdf
 from reference_rt.materials.bsdfs.tables import Leaves
-from reference_rt.materials.material import Branches, BsdfSample, Scattered
+from reference_rt.materials.material import Branches, BsdfSample, Scattered, Shading
 from reference_rt.materials.nested import flattened
-from reference_rt.materials.nested.flattened import FlattenedMaterials
-from reference_rt.materials.nested.weighted_sum import (
+from reference_rt.materials.nested.flattened import (
+    FlattenedMaterials,
     ambient_nested,
     branches_nested,
     eval_pdf_nested,
     leaf_count,
     sample_nested,
 )
-from reference_rt.materials.shading import Shading
 from reference_rt.materials.textured import Textured, lookup_cache_size
 from reference_rt.textures import At, Colours
 

@@ -1,17 +1,31 @@
-"""The base of all materials, and the types that their kernels return.
+"""The base of all materials, and the types that their kernels take and return; the shading frame;
+and `Emissive`, which emits light besides what it scatters.
 
 Directions are in the shading frame (z is the shading normal) and point away from the surface: `wo`
 towards the viewer, `wi` towards the light.  Zero always means "no contribution": black, or a
-direction that this material never scatters to.
+direction that this material never scatters to.  A shape with an emissive material becomes an area
+light: see `reference_rt.lights.emitters.area`.
 """
 
 import math
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
+from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Description
-from reference_rt.core.vec3 import Vec3, is_black
+from reference_rt.core.ray import UNIT_ROUNDOFF, SurfacePoint
+from reference_rt.core.vec3 import (
+    Frame,
+    Vec3,
+    cross,
+    dot,
+    frame_from_normal,
+    is_black,
+    max_abs,
+    normalize,
+)
 from reference_rt.jit.kernel import kernel
-from reference_rt.textures import Palette
+from reference_rt.shapes.shape import Tangents
+from reference_rt.textures import At, ColourParameter, Palette
 
 
 class Material(Description):
@@ -125,3 +139,63 @@ def sample_branch(branches: Branches, u: float) -> BsdfSample:
 
 
 INV_PI = 1.0 / math.pi
+
+
+class Shading(NamedTuple):
+    """point: of the surface;  frame: the shading frame, n = `point.ns`;  wo: towards the viewer,
+    local;  at: where textures are looked up;  tangents: dp/du and dp/dv, local, only valid if a
+    material of the scene is `oriented`;  layers: the scratch buffer that `prepare` fills with the
+    material's flattened leaves, empty if no material of the scene is nested."""
+
+    point: SurfacePoint
+    frame: Frame
+    wo: Vec3
+    at: At
+    tangents: Tangents
+    flat_leaves: FloatArray
+
+
+_NOISE = 64.0 * UNIT_ROUNDOFF
+"""Orthogonalisation takes the part along the unit normal off a vector of size 1.  A remainder
+shorter than this is rounding noise, of some ten roundings of numbers up to 1.  A longer one is
+orthogonal to the last bits when that is done twice ("twice is enough": Parlett 1980, "The Symmetric
+Eigenvalue Problem", 6.9)."""
+
+
+@kernel
+def frame_along(n: Vec3, direction: Vec3) -> Frame:
+    """A right-handed basis around a unit normal, its `s` as far along `direction` (of any length)
+    as it can be; any where that is parallel to n, or zero."""
+    size = max_abs(direction)
+    if not size > 0.0:
+        return frame_from_normal(n)
+    s = direction / size
+    s = s - n * dot(n, s)
+    if max_abs(s) <= _NOISE:
+        return frame_from_normal(n)
+    s = normalize(s)
+    s = normalize(s - n * dot(n, s))
+    return Frame(s, cross(n, s), n)
+
+
+@kernel
+def oriented_frame(ns: Vec3, tangents: Tangents) -> Frame:
+    """The basis around a shading normal with `s` along dp/du, and t = n x s (as Mitsuba's)."""
+    return frame_along(ns, tangents.dpdu)
+
+
+class Emissive(Material):
+    """Emits the same radiance in all directions of its front: its shape is an area light."""
+
+    type: Literal["emissive"] = "emissive"
+    radiance: ColourParameter
+    """Emitted radiance: W sr^-1 m^-2, linear sRGB, or a texture."""
+    base: str | None = None
+    """Name of the material that scatters light besides.  Default: the surface scatters none."""
+
+    @property
+    def colour(self) -> tuple[float, float, float] | str:
+        return self.radiance
+
+    def tabulate(self, palette: Palette) -> Any:
+        raise TypeError("an emissive material has no row of its own: its base has")

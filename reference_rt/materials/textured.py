@@ -13,9 +13,8 @@ import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.jit.kernel import ByClass, kernel
-from reference_rt.materials.emissive import Emissive
-from reference_rt.materials.material import Material
-from reference_rt.materials.nested.bump import Bump
+from reference_rt.materials.material import Emissive, Material
+from reference_rt.materials.nested.tilted import Bump
 from reference_rt.materials.nested.wrappers import Wrapper
 from reference_rt.textures import At, Palette, texture_names
 from reference_rt.textures.lookup import CachedLookups, lookup

@@ -7,13 +7,13 @@ import numpy as np
 
 from reference_rt.accel.geometry import Geometry, geometries
 from reference_rt.cameras import views
-from reference_rt.cameras.filters import film_filters
+from reference_rt.cameras.film import film_filters
 from reference_rt.cameras.thin_lens import ThinLensView
 from reference_rt.integrators.scene_tables import LinkedScene, SceneTables
 from reference_rt.jit.links import Link, Linker
 from reference_rt.lights import Lights, LightSampler, LinkedLights
 from reference_rt.lights import tables as light_tables
-from reference_rt.lights.selection.tree import light_trees
+from reference_rt.lights.selection.choice import light_trees
 from reference_rt.materials import Materials
 from reference_rt.materials.bsdfs import tables as bsdfs
 from reference_rt.materials.nested.flattened import flattened_materials

@@ -12,23 +12,24 @@ from typing import Any, NamedTuple
 from reference_rt import sampling
 from reference_rt.accel.geometry import closest_hit
 from reference_rt.cameras import LENS_CENTRE, VIEWS, camera_ray, lens_sample
-from reference_rt.cameras.filters import film_offset
+from reference_rt.cameras.film import film_offset
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.ray import BLOCK, Ray
-from reference_rt.core.ray_block import (
+from reference_rt.core.ray import (
+    BLOCK,
     HIT_FLOATS,
     HIT_INTEGERS,
     RAY_FLOATS,
     HitBlock,
+    Ray,
     RayBlock,
     put_ray,
     vector_of,
 )
 from reference_rt.core.vec3 import Vec3, row
 from reference_rt.integrators import radiances
+from reference_rt.integrators.path import STATE_FLOATS, VECTOR_FLOATS, Scratch, prepare
 from reference_rt.integrators.ray_cast import cast
 from reference_rt.integrators.scene_tables import SceneTables, surface
-from reference_rt.integrators.scratch import STATE_FLOATS, VECTOR_FLOATS, Scratch, prepare
 from reference_rt.integrators.shading import texture_place
 from reference_rt.jit.kernel import ByClass, entry_kernel, kernel, local_floats, local_integers
 from reference_rt.jit.links import Link

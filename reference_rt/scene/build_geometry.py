@@ -13,8 +13,7 @@ from reference_rt.core.transform import identity
 from reference_rt.scene.build_hierarchies import ExpandedInstance, HierarchyBuilder, TableRows
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes import TABLES, TRIANGLE, Shape, Shapes, csg
-from reference_rt.shapes.csg import NOT, OR, Solid
-from reference_rt.shapes.csg.tables import Parts, Solids
+from reference_rt.shapes.csg import NOT, OR, Parts, Solid, Solids
 from reference_rt.shapes.instances import Instance, composed
 from reference_rt.shapes.meshes.topology import describe_boundary
 from reference_rt.shapes.shape import TabulationContext, outward

@@ -13,8 +13,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from reference_rt.cameras import AnyCamera
 from reference_rt.cameras.film import Film
 from reference_rt.cameras.perspective import Perspective
-from reference_rt.core.model import Description
-from reference_rt.core.numpy_fields import AS_DIGEST
+from reference_rt.core.model import AS_DIGEST, Description
 from reference_rt.integrators import AnyIntegrator
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.lights import AnyLight, Constant, EnvironmentMap

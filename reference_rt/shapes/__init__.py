@@ -1,10 +1,9 @@
 """Shapes: the geometry of a scene, down to rays against single primitives.
 
 - `flat/`, `curved/`, `meshes/`, `box.py`: the primitives, one file each;
-- `csg/`: solids made of primitives; `instances.py`: copies of groups of shapes;
+- `csg.py`: solids made of primitives; `instances.py`: copies of groups of shapes;
 - `tables.py`: all tables of a scene; `dispatch.py`: the kernels for any primitive;
-- `brute_force.py`, `brute_force_table.py`, `brute_force_linked.py`: rays against all primitives of
-  small scenes.
+- `brute_force.py`: rays against all primitives of small scenes.
 
 A file has a description (a `Shape`), its table (a NamedTuple of arrays, a row for each primitive,
 with the columns of `placement.owners`), `bounds(table)` and kernels.  Contract of the kernels, in
@@ -26,11 +25,8 @@ scene; a row in the tests' tuple.  Step by step: docs/extending.md.
 
 from reference_rt.core.arrays import IntArray
 from reference_rt.shapes.box import Box
-from reference_rt.shapes.brute_force import nearest, nearest_of_ray, nearest_of_rays
-from reference_rt.shapes.brute_force_table import Packets
-from reference_rt.shapes.curved.cone import Cone
-from reference_rt.shapes.curved.cylinder import Cylinder
-from reference_rt.shapes.curved.quadric import Quadric
+from reference_rt.shapes.brute_force import Packets, nearest, nearest_of_ray, nearest_of_rays
+from reference_rt.shapes.curved.quadric import Cone, Cylinder, Quadric
 from reference_rt.shapes.curved.sphere import Sphere
 from reference_rt.shapes.curved.torus import Torus
 from reference_rt.shapes.dispatch import (

@@ -1,32 +1,43 @@
 """Closest hits by brute force, without a BVH: faster for scenes of a few shapes.
 
 Given tables (`Shapes`), all of them are searched in one kernel; given a link to tables, by
-operations, one for each type (`brute_force_linked.py`).  `brute_force_table.py` has what both do
-with one table.
+operations, one for each type.  Spheres, rectangles and boxes are tested with SIMD: VECTOR_WIDTH
+shapes against one ray (`nearest_in_packets`), or one shape against VECTOR_WIDTH rays
+(`nearer_spheres`, ...).
 """
 
-from typing import Any
+from collections.abc import Callable
+from typing import Annotated, Any, NamedTuple
 
-from reference_rt.core.ray import Crossing, Hit, Ray, no_hit
-from reference_rt.core.ray_block import HitBlock, RayBlock, ray_of
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.ray import (
+    BLOCK,
+    Crossing,
+    Hit,
+    HitBlock,
+    Ray,
+    RayBlock,
+    hit_of,
+    miss,
+    no_hit,
+    put_hit,
+    ray_of,
+)
+from reference_rt.core.vec3 import row
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass, kernel, local_floats, local_integers
 from reference_rt.jit.links import Link
 from reference_rt.jit.simd import VECTOR_WIDTH
-from reference_rt.shapes import brute_force_linked as linked
-from reference_rt.shapes.brute_force_table import (
-    KIND,
-    Packets,
-    found_at,
-    nearer_boxes,
-    nearer_rectangles,
-    nearer_spheres,
-    nearest_in_packets,
-    nearest_in_table,
-)
+from reference_rt.shapes import box
+from reference_rt.shapes.box import Boxes
+from reference_rt.shapes.curved import sphere
+from reference_rt.shapes.curved.sphere import Spheres
+from reference_rt.shapes.flat import rectangle
+from reference_rt.shapes.flat.rectangle import Rectangles
 from reference_rt.shapes.meshes.triangle import Triangles
 from reference_rt.shapes.meshes.watertight import shear_of
-from reference_rt.shapes.ray_simd import begin, end
+from reference_rt.shapes.ray_simd import begin, end, resume
+from reference_rt.shapes.shape import nearest_lane
 from reference_rt.shapes.tables import (
     BOX,
     RECTANGLE,
@@ -34,7 +45,249 @@ from reference_rt.shapes.tables import (
     TABLES,
     TRIANGLE,
     Shapes,
+    by_code,
+    of_table,
 )
+
+
+class Packets(NamedTuple):
+    """The shapes in the SoA layout of `nearest_in_packets`; None for those that are in a BVH."""
+
+    spheres: FloatArray | None
+    rectangles: FloatArray | None
+    boxes: FloatArray | None
+
+
+@kernel
+def _no_crossing(table: Any, i: int, ray: Any) -> Crossing:
+    return miss()
+
+
+@kernel
+def _not_found(table: Any, i: int, ray: Ray, t: float) -> Crossing:
+    return miss()
+
+
+intersect_row = of_table("intersect", _no_crossing)
+"""intersect_row(table, i, ray): `intersect` of one table's row i; triangles take a `Shear`."""
+
+found_at = of_table("found", _not_found)
+"""found_at(table, i, ray, t): the crossing of row i that a SIMD test has found at t."""
+
+_lane_distance = of_table("lane_distance", miss)
+
+
+@kernel
+def nearest_in_packets(
+    kind: int, table: Any, packets: FloatArray | None, ray: Ray, closest: Hit
+) -> Hit:
+    """The nearest of `closest` and all shapes of a table, VECTOR_WIDTH shapes at a time."""
+    if table is None:
+        return closest
+    if packets is None:
+        return closest
+    distances = local_floats(VECTOR_WIDTH)
+    best, t = -1, closest.t
+    for k in range(len(packets)):
+        for lane in range(VECTOR_WIDTH):
+            distances[lane] = _lane_distance(table, packets, k, lane, ray)
+        best, t = nearest_lane(distances, k, best, t)
+    if best < 0:
+        return closest
+    found: Crossing = found_at(table, best, ray, t)
+    return Hit(found.t, kind, best, found.u, found.v, -1)
+
+
+@kernel
+def nearest_in_table(kind: int, table: Any, ray: Any, closest: Hit) -> Hit:
+    """The nearest of `closest` and all primitives of a table, one at a time."""
+    if table is None:
+        return closest
+    for i in range(len(table.owner)):
+        found: Crossing = intersect_row(table, i, ray)
+        if found.t < closest.t:
+            closest = Hit(found.t, kind, i, found.u, found.v, -1)
+    return closest
+
+
+KIND = 2**40
+"""`HitBlock.codes` are kind * KIND + row while types with SIMD kernels are searched."""
+
+
+@kernel
+def nearer_spheres(
+    spheres: Spheres | None, rays: RayBlock, at: int, t: FloatArray, codes: IntArray
+) -> None:
+    """VECTOR_WIDTH rays, from number `at` on, against all spheres; updates t and codes."""
+    if spheres is not None:
+        for i in range(len(spheres.owner)):
+            shape = (row(spheres.center, i), spheres.radius[i])
+            sphere.nearer(rays.numbers, at, shape, SPHERE * KIND + i, t, codes)
+
+
+@kernel
+def nearer_rectangles(
+    table: Rectangles | None, rays: RayBlock, at: int, t: FloatArray, codes: IntArray
+) -> None:
+    """The same for rectangles."""
+    if table is not None:
+        for i in range(len(table.owner)):
+            place = (row(table.center, i), row(table.normal, i))
+            shape = (*place, row(table.x_of, i), row(table.y_of, i))
+            rectangle.nearer(rays.numbers, at, shape, RECTANGLE * KIND + i, t, codes)
+
+
+@kernel
+def nearer_boxes(
+    boxes: Boxes | None, rays: RayBlock, at: int, t: FloatArray, codes: IntArray
+) -> None:
+    """The same for boxes."""
+    if boxes is not None:
+        for i in range(len(boxes.owner)):
+            box.nearer(rays.numbers, at, box.arguments(boxes, i), BOX * KIND + i, t, codes)
+
+
+Packed = Annotated[FloatArray, 3]
+"""The SoA layout of the shapes of one type: packets (k, columns, VECTOR_WIDTH)."""
+
+_NEARER: dict[int, Callable[..., None]] = {
+    SPHERE: nearer_spheres,
+    RECTANGLE: nearer_rectangles,
+    BOX: nearer_boxes,
+}
+"""The types with SIMD kernels."""
+
+_CODES = {module: code for code, _, _, module in TABLES}
+_KINDS = len(TABLES)
+
+
+def _nearest_by(module: Any) -> Callable[..., Hit]:
+    """The kernel of `nearest_of_type` for a type of shape."""
+    kind = _CODES[module]
+
+    @kernel
+    def of_packets(table: Any, packets: Packed, ray: Ray, closest: Hit) -> Hit:
+        return nearest_in_packets(kind, table, packets, ray, closest)
+
+    @kernel
+    def of_triangles(table: Any, ray: Ray, closest: Hit) -> Hit:
+        return nearest_in_table(kind, table, shear_of(ray), closest)
+
+    @kernel
+    def of_others(table: Any, ray: Ray, closest: Hit) -> Hit:
+        return nearest_in_table(kind, table, ray, closest)
+
+    if kind in _NEARER:
+        return of_packets
+    return of_triangles if kind == TRIANGLE else of_others
+
+
+@by_code(_nearest_by)
+def nearest_of_type(shapes: Shapes, kind: int, packets: Packed, ray: Ray, closest: Hit) -> Hit:
+    """The nearest of `closest` and a ray's hit with any shape of one type."""
+    return closest
+
+
+@kernel
+def _linked_nearest(shapes: Any, packets: Any, ray: Ray) -> Hit:
+    """`brute_force.nearest` through a link.  packets: `Packets` without None."""
+    closest = no_hit(ray)
+    closest = nearest_of_type(shapes, SPHERE, packets.spheres, ray, closest)
+    closest = nearest_of_type(shapes, RECTANGLE, packets.rectangles, ray, closest)
+    closest = nearest_of_type(shapes, BOX, packets.boxes, ray, closest)
+    for kind in range(TRIANGLE, _KINDS):
+        closest = nearest_of_type(shapes, kind, packets.boxes, ray, closest)  # packets: not used
+    return closest
+
+
+def _of_block_by(module: Any) -> Callable[..., None]:
+    """The kernel of `nearest_of_block` for a type of shape."""
+    kind = _CODES[module]
+    nearer = _NEARER.get(kind, nearer_spheres)
+
+    @kernel
+    def of_rays(table: Any, rays: RayBlock, hits: HitBlock, n: int) -> None:
+        t, codes = local_floats(VECTOR_WIDTH), local_integers(VECTOR_WIDTH)
+        for at in range(0, n, VECTOR_WIDTH):
+            resume(hits.numbers, hits.codes, at, t, codes)
+            nearer(table, rays, at, t, codes)
+            end(t, codes, at, hits.numbers, hits.codes)
+
+    @kernel
+    def of_triangles(table: Any, rays: RayBlock, hits: HitBlock, n: int, any_hit: bool) -> None:
+        for j in range(n):
+            if not (any_hit and hits.codes[j] >= 0):
+                shear = shear_of(ray_of(rays, j))
+                put_hit(hits, j, nearest_in_table(kind, table, shear, hit_of(hits, j)))
+
+    @kernel
+    def of_others(table: Any, rays: RayBlock, hits: HitBlock, n: int, any_hit: bool) -> None:
+        for j in range(n):
+            if not (any_hit and hits.codes[j] >= 0):
+                ray = ray_of(rays, j)
+                put_hit(hits, j, nearest_in_table(kind, table, ray, hit_of(hits, j)))
+
+    if kind in _NEARER:
+        return of_rays
+    return of_triangles if kind == TRIANGLE else of_others
+
+
+@by_code(_of_block_by)
+def nearest_of_block(
+    shapes: Shapes, kind: int, rays: RayBlock, hits: HitBlock, n: int, any_hit: bool
+) -> None:
+    """Updates the hits of the first n of `rays` with the shapes of one type.  Hits with types that
+    have SIMD kernels are codes (see `KIND`), which `complete_block` completes."""
+
+
+def _complete_by(module: Any) -> Callable[..., None] | None:
+    """The kernel of `complete_block` for a type of shape with SIMD kernels."""
+    kind = _CODES[module]
+
+    @kernel
+    def of_spheres(table: Any, hits: HitBlock, n: int) -> None:
+        for j in range(n):
+            if hits.codes[j] >= 0 and hits.codes[j] < KIND:
+                put_hit(hits, j, Hit(hits.numbers[j], kind, hits.codes[j], 0.0, 0.0, -1))
+
+    @kernel
+    def of_others(table: Any, rays: RayBlock, hits: HitBlock, n: int) -> None:
+        for j in range(n):
+            code = hits.codes[j]
+            if code >= 0 and code // KIND == kind:
+                found: Crossing = found_at(table, code % KIND, ray_of(rays, j), hits.numbers[j])
+                put_hit(hits, j, Hit(found.t, kind, code % KIND, found.u, found.v, -1))
+
+    if kind not in _NEARER:
+        return None
+    return of_spheres if kind == SPHERE else of_others
+
+
+@by_code(_complete_by)
+def complete_block(shapes: Shapes, kind: int, rays: RayBlock, hits: HitBlock, n: int) -> None:
+    """Completes the hits with the shapes of one type."""
+
+
+@kernel
+def _linked_nearest_of_rays(
+    shapes: Any, rays: RayBlock, hits: HitBlock, n: int, any_hit: bool
+) -> None:
+    """`brute_force.nearest_of_rays` through a link; it completes the hits too."""
+    for j in range(min(BLOCK, n + VECTOR_WIDTH - 1)):
+        hits.numbers[j], hits.codes[j] = rays.numbers[6 * BLOCK + j], -1
+    for kind in (SPHERE, RECTANGLE, BOX):
+        nearest_of_block(shapes, kind, rays, hits, n, any_hit)
+    if not any_hit:
+        for kind in (SPHERE, RECTANGLE, BOX):  # spheres first: their codes are below KIND
+            complete_block(shapes, kind, rays, hits, n)
+    for kind in range(TRIANGLE, _KINDS):
+        nearest_of_block(shapes, kind, rays, hits, n, any_hit)
+
+
+@kernel
+def _linked_nearest_of_ray(shapes: Any, ray: Ray, hits: HitBlock, j: int) -> Hit:
+    """`brute_force.nearest_of_ray` through a link."""
+    return hit_of(hits, j)
 
 
 @kernel
@@ -132,6 +385,6 @@ def _for(name: str, of_tables: Any, of_link: Any) -> Any:
     return choice.function
 
 
-nearest = _for("nearest", _nearest, linked.nearest)
-nearest_of_rays = _for("nearest_of_rays", _nearest_of_rays, linked.nearest_of_rays)
-nearest_of_ray = _for("nearest_of_ray", _nearest_of_ray, linked.nearest_of_ray)
+nearest = _for("nearest", _nearest, _linked_nearest)
+nearest_of_rays = _for("nearest_of_rays", _nearest_of_rays, _linked_nearest_of_rays)
+nearest_of_ray = _for("nearest_of_ray", _nearest_of_ray, _linked_nearest_of_ray)

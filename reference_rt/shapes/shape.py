@@ -81,7 +81,7 @@ class Solid(Shape):
 
     of: Annotated[tuple["AnyOperand", ...], Field(strict=False, min_length=1)]  # type: ignore[name-defined]  # noqa: F821
     """The operands, at least one: shapes that enclose space, or solids again."""
-    # `AnyOperand` names every type of shape: `shapes/csg/description.py` completes the models.
+    # `AnyOperand` names every type of shape: `shapes/csg.py` completes the models.
 
 
 class Union(Solid):

@@ -9,14 +9,11 @@ from typing import Any, NamedTuple
 
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass
-from reference_rt.jit.links import LINK
-from reference_rt.jit.operation_types import declare
+from reference_rt.jit.links import LINK, declare
 from reference_rt.shapes import box
 from reference_rt.shapes.box import Box, Boxes
 from reference_rt.shapes.curved import quadrics, sphere, torus
-from reference_rt.shapes.curved.cone import Cone
-from reference_rt.shapes.curved.cylinder import Cylinder
-from reference_rt.shapes.curved.quadric import Quadric
+from reference_rt.shapes.curved.quadric import Cone, Cylinder, Quadric
 from reference_rt.shapes.curved.quadrics import Quadrics
 from reference_rt.shapes.curved.sphere import Sphere, Spheres
 from reference_rt.shapes.curved.torus import Tori, Torus

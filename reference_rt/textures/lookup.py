@@ -6,8 +6,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass, kernel
-from reference_rt.jit.links import LINK, Link, Linkable
-from reference_rt.jit.operation_types import declare, type_of
+from reference_rt.jit.links import LINK, Link, Linkable, declare, type_of
 from reference_rt.textures import bitmap, checker, vertex_colours
 from reference_rt.textures.bitmap import Bitmaps
 from reference_rt.textures.checker import Checkers

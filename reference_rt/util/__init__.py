@@ -3,8 +3,7 @@
 - `errors.py`: exceptions that a user can cause, with exit codes; `printable` for names in messages
 - `files.py`: reading regular files within limits, and writing files atomically
 - `memory.py`: the machine's memory, in bytes; refuses what cannot fit
-- `signals.py`: SIGINT, SIGTERM and SIGHUP as exceptions
-- `child_processes.py`: children that end with their parent
+- `processes.py`: SIGINT, SIGTERM and SIGHUP as exceptions; children that end with their parent
 - `console.py`: progress bars, on standard error
 
 A message of an error is one line: what was found, then "; expected ..." what would be right.

@@ -20,8 +20,8 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from typing import Any, Protocol, TypeVar
 
-from reference_rt.util.child_processes import end_with_parent
 from reference_rt.util.errors import WorkersError
+from reference_rt.util.processes import end_with_parent
 
 T = TypeVar("T")
 

@@ -17,9 +17,7 @@ from PIL import Image
 from suite_runs import RUNNER
 from typer.testing import CliRunner, Result
 
-from comparisons.commands.compare import compare
-from comparisons.commands.report import report
-from comparisons.commands.suite import suite
+from comparisons.commands.compare import compare, report, suite
 from comparisons.gate import reference
 from comparisons.mitsuba.backend import Backend
 from comparisons.mitsuba.translate import load

@@ -7,7 +7,7 @@ import time
 
 from comparisons.experiments.fuzz import finding
 from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced, Request
-from comparisons.runs.processes.protocol import serve
+from comparisons.runs.processes import serve
 
 FOUND = Finding(rung="geometry", cause="ours wrong: t", detail="1 of 9 rays")
 

@@ -16,7 +16,17 @@ FLOORS = {
         *("materials", "lights", "integrators", "scene", "rendering", "textbook", "cli"),
     ),
     "comparisons": (
-        *("results", "geometry", "statistics", "mitsuba", "runs", "rungs", "report", "compare"),
+        *(
+            "results",
+            "geometry",
+            "statistics",
+            "mitsuba",
+            "runs",
+            "cycles",
+            "rungs",
+            "report",
+            "compare",
+        ),
         *("gate", "suites", "experiments", "commands"),
     ),
 }

@@ -10,9 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.experiments.bench.row import Row, against
-from comparisons.experiments.bench.setting import Setting
-from comparisons.experiments.bench.timing import alternate, seconds
+from comparisons.experiments.bench.row import Row, Setting, against, alternate, seconds
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators import RayCast
 from reference_rt.integrators.scene_tables import SceneTables

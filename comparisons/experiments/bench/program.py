@@ -12,12 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.bench.row import Row, within
-from comparisons.experiments.bench.setting import Setting
-from comparisons.experiments.bench.timing import ROUNDS
-from reference_rt.util.child_processes import tied
+from comparisons.experiments.bench.row import ROUNDS, Row, Setting, within
 from reference_rt.util.errors import ReferenceRtError
 from reference_rt.util.files import temporary_folder
+from reference_rt.util.processes import tied
 
 # ---- the suite smoke ----------------------------------------------------------------------------
 

@@ -1,12 +1,110 @@
-"""A row of the table: a number of ours, a peer's, and the goal of their ratio."""
+"""A row of the table: a number of ours, a peer's, and the goal of their ratio; the options of a
+benchmark, common to all groups of rows; alternating measurements of two things.
+"""
 
 import math
-from collections.abc import Sequence
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
 
-from comparisons.experiments.bench.timing import Spread, ratios, spread
+import numpy as np
+
 from comparisons.results.files import plain
+from comparisons.runs.elsewhere import cool_down
+from reference_rt.rendering.render import Progress
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.errors import UsageError
+
+ROUNDS = 7
+"""Default number of rounds: one or two disturbances do not move the median far."""
+
+
+class Spread(NamedTuple):
+    """The median of some numbers, and the quartiles around it."""
+
+    low: float
+    median: float
+    high: float
+
+
+def spread(numbers: Sequence[float]) -> Spread:
+    """Median and quartiles.  Raises ValueError for none."""
+    if len(numbers) == 0:
+        raise ValueError("nothing was measured")
+    low, median, high = np.quantile(np.asarray(numbers, dtype=np.float64), [0.25, 0.5, 0.75])
+    return Spread(float(low), float(median), float(high))
+
+
+def ratios(ours: Sequence[float], peer: Sequence[float]) -> Spread:
+    """The spread of ours / peer, round by round: a disturbance of a whole round cancels."""
+    return spread([a / b for a, b in zip(ours, peer, strict=True)])
+
+
+def seconds(run: Callable[[], object]) -> float:
+    """Wall-clock seconds of one call."""
+    start = time.perf_counter()
+    run()
+    return time.perf_counter() - start
+
+
+def alternate(
+    measures: Mapping[str, Callable[[], float]],
+    rounds: int = ROUNDS,
+    say: Callable[[str, float], None] = lambda what, fraction: None,
+) -> dict[str, list[float]]:
+    """The values of each of `measures` in each round, by name.
+
+    Every other round runs in the reverse order, so that a drift favours neither.  say: called with
+    what is being measured, and the fraction that is done.
+    """
+    found: dict[str, list[float]] = {name: [] for name in measures}
+    done, total = 0, rounds * len(measures)
+    for k in range(rounds):
+        for name in list(measures)[:: 1 if k % 2 == 0 else -1]:
+            say(name, done / total)
+            cool_down()
+            found[name].append(measures[name]())
+            done += 1
+    return found
+
+
+def _silent(what: str, fraction: float) -> None:
+    pass
+
+
+@dataclass(frozen=True)
+class Setting:
+    """scenes: folder of the suite's scenes;  mesh: file that rays are traced against, None for a
+    generated mesh;  quick: fewer scenes and smaller pictures;  threads: of our renderer;  say:
+    called with the progress."""
+
+    scenes: Path = Path("scenes")
+    mesh: Path | None = None
+    quick: bool = False
+    threads: int = field(default_factory=lambda: os.cpu_count() or 1)
+    say: Progress = _silent
+
+    def file(self, name: str) -> Path:
+        """The file of a scene.  Raises UsageError."""
+        path = self.scenes / f"{name}.yaml"
+        if not path.is_file():
+            raise UsageError(f"--scenes: there is no {path}; expected the folder of the scenes")
+        return path
+
+    def load(self, name: str) -> Scene:
+        """A scene by name.  Raises UsageError, SceneError."""
+        return Scene.load(self.file(name))
+
+    def names(self) -> list[str]:
+        """All scenes of the folder.  Raises UsageError for a folder without any."""
+        found = sorted(path.stem for path in self.scenes.glob("*.yaml"))
+        if not found:
+            raise UsageError(f"--scenes: '{self.scenes}' holds no scene; expected .yaml files")
+        return found
+
 
 Better = Literal["lower", "higher"]
 

@@ -54,7 +54,7 @@ from comparisons.experiments.convergence.store import (
 from comparisons.mitsuba.backend import SCALAR, backend
 from comparisons.mitsuba.translate import UntranslatableError, load
 from comparisons.suites.suite import Changes, read
-from reference_rt.cameras.filters import BoxFilter
+from reference_rt.cameras.film import BoxFilter
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import RayCast
 from reference_rt.rendering.image import display

@@ -16,8 +16,8 @@ from comparisons.mitsuba.backend import LLVM, backend
 from comparisons.mitsuba.llvm_libraries import LIBRARY
 from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
-from reference_rt.util.child_processes import tied
 from reference_rt.util.files import temporary_folder
+from reference_rt.util.processes import tied
 
 STAGES = ("start", "load", "build", "compile", "render")
 """start: the interpreter and what it imports;  load: the scene's file read, for Mitsuba also

@@ -17,9 +17,9 @@ from comparisons.experiments.selftest import FAULTS
 from comparisons.experiments.selftest.fault import SourceFault
 from comparisons.experiments.selftest.sensitivity import patched_text
 from comparisons.results.files import write_json
-from reference_rt.util.child_processes import tied
 from reference_rt.util.errors import ReferenceRtError
 from reference_rt.util.files import temporary_folder
+from reference_rt.util.processes import tied
 
 MOST_SCENES = 500
 

@@ -24,7 +24,7 @@ from comparisons.experiments.fuzz.finding import (
 from comparisons.experiments.fuzz.generate import generate
 from comparisons.experiments.fuzz.reduce import reduce
 from comparisons.runs import engine
-from comparisons.runs.processes.child import Ended
+from comparisons.runs.processes import Ended
 from reference_rt.util.errors import UsageError
 from reference_rt.util.workers import Threads, Workers
 
@@ -49,8 +49,8 @@ FEW = 40
 @dataclass(frozen=True)
 class Plan:
     """out: folder of the results;  count, seconds: of scenes and wall clock, whichever ends first;
-    first: the number of the first scene;  workers: what checks scenes, see `pool.run`;  stop: at
-    the first finding;  command: another renderer's;  scenes: data in place of generated scenes;
+    first: the number of the first scene;  workers: what checks scenes, see `processes.run`;  stop:
+    at the first finding;  command: another renderer's;  scenes: data in place of generated scenes;
     shrink: seconds for the reduction of a finding, 0: none;  limit: seconds of a scene."""
 
     out: Path

@@ -1,6 +1,6 @@
 """`python -m comparisons.experiments.fuzz.worker`: a process that checks and reduces scenes.
 
-It follows `comparisons.runs.processes.protocol`: it reads `Request`s and stores results in their
+It follows `comparisons.runs.processes`: it reads `Request`s and stores results in their
 folders.  Mitsuba runs in its scalar variant: for a few hundred rays of a scene that is seen once, a
 variant that compiles takes several times as long (measured: 2 s against 9 s a scene)."""
 
@@ -38,7 +38,7 @@ from comparisons.mitsuba.backend import FORCE, SCALAR
 from comparisons.mitsuba.translate import load
 from comparisons.report.thumbnails import png_url
 from comparisons.results.case import Case, RungResult
-from comparisons.runs.processes.protocol import serve
+from comparisons.runs.processes import serve
 from comparisons.statistics.metrics import encode, white_level
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import RayCast, Whitted

@@ -1,6 +1,6 @@
 """`reference-rt methods`: how long the textbook's intersection methods take.
 
-`trials` draws shapes and rays, `timing` times a method, `run` all methods of all series; `outputs`
+`trials` draws shapes and rays, `run` times all methods of all series; `outputs`
 writes and shows the rows.  Times are nanoseconds per ray and shape.  How wrong the methods are is
 measured by `comparisons.experiments.stability`, on extreme shapes and rays.
 

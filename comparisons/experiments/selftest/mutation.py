@@ -18,8 +18,7 @@ import numpy as np
 from scipy import stats
 
 from comparisons.compare.compare import Say
-from comparisons.experiments.selftest.fault import SourceFault
-from comparisons.experiments.selftest.patched import PACKAGE, run_patched, run_worker
+from comparisons.experiments.selftest.fault import PACKAGE, SourceFault, run_patched, run_worker
 from comparisons.experiments.selftest.sensitivity import Budgets, compare_patched
 from comparisons.results.files import write_json
 from comparisons.runs.elsewhere import run_elsewhere

@@ -53,7 +53,7 @@ OF_MESHES = (
         "return self.smooth and data.normals is None", "return False",
     ),
     SourceFault(
-        "smooth normals not smooth", "layers", "shapes/meshes/vertex_normals.py",
+        "smooth normals not smooth", "layers", "shapes/meshes/topology.py",
         "np.linalg.norm(sums, axis=1) > error", "np.linalg.norm(sums, axis=1) < error",
     ),
     SourceFault(
@@ -99,7 +99,7 @@ OF_TRANSFORMS = (
         "self.radius * factor * size", "1.05 * self.radius * factor * size",
     ),
     SourceFault(
-        "cylinders too long", MOVED, "shapes/curved/cylinder.py",
+        "cylinders too long", MOVED, "shapes/curved/quadric.py",
         "(r, r, self.z_max)", "(r, r, 1.05 * self.z_max)",
     ),
     SourceFault(

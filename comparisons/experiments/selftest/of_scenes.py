@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from comparisons.experiments.selftest.fault import SceneFault
-from reference_rt.cameras.filters import TentFilter
+from reference_rt.cameras.film import TentFilter
 from reference_rt.core.transform import Rotate, Scale, Turn
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Box, Cone, Cylinder, Mesh, Quadric, Torus

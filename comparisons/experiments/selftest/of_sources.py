@@ -82,7 +82,7 @@ OF_KERNELS = (
         "along_x * bitmaps.width[i], -along_y", "along_x * bitmaps.width[i], along_y",
     ),
     SourceFault(
-        "green of a normal map turned", "material_normal_map", "materials/nested/normal_map.py",
+        "green of a normal map turned", "material_normal_map", "materials/nested/tilted.py",
         "2.0 * rgb.y - 1.0", "1.0 - 2.0 * rgb.y",
     ),
     SourceFault(

@@ -15,6 +15,7 @@ from comparisons.compare.compare import Say, Subject, gather
 from comparisons.compare.judge import Evidence, judge, of_replicates, picture_rungs
 from comparisons.experiments.selftest.fault import (
     CAUGHT,
+    PACKAGE,
     Fault,
     Finding,
     PictureFault,
@@ -22,6 +23,7 @@ from comparisons.experiments.selftest.fault import (
     SourceFault,
     compared,
     finding,
+    run_patched,
 )
 from comparisons.experiments.selftest.of_pictures import (
     SCENE,
@@ -31,8 +33,7 @@ from comparisons.experiments.selftest.of_pictures import (
     gain,
     shifted,
 )
-from comparisons.experiments.selftest.patched import PACKAGE, run_patched
-from comparisons.experiments.selftest.pools import Pools, of_scene
+from comparisons.experiments.selftest.specificity import Pools, of_scene
 from comparisons.results.case import Case
 from comparisons.rungs.images import images_rung
 from comparisons.runs.elsewhere import run_elsewhere

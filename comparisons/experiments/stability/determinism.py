@@ -45,7 +45,7 @@ from comparisons.mitsuba.backend import LLVM, SCALAR, backend, variant
 from comparisons.mitsuba.scene import picture
 from comparisons.mitsuba.translate import load
 from reference_rt.rendering.executor import Prepared
-from reference_rt.util.child_processes import tied
+from reference_rt.util.processes import tied
 
 # ---- pictures in bands, in parts by several processes, and in plain Python -----------------------
 

@@ -41,7 +41,7 @@ from comparisons.experiments.stability.harness.core import (
     outcome,
 )
 from comparisons.experiments.stability.harness.steps import Rays
-from comparisons.geometry.exact.curved import torus_quartic
+from comparisons.geometry.exact.crossings import torus_quartic
 from comparisons.geometry.exact.dyadic import CERTAIN, BoolArray, Dyadic
 from comparisons.geometry.vectors import across, unit_vectors
 from reference_rt.core.ray import Ray

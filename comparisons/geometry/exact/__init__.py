@@ -15,8 +15,8 @@ as there are rays), and rays (n, 3) with directions of any length:
 Kinds are the fields of `reference_rt.shapes.Shapes`.  The surface is the one that the kernels
 compute from the row: from center, normal, radius, vertices, or from to_local and the unit shape.
 Python's integers, which never overflow, decide everything, a whole array at a time: about 5 µs a
-ray; FLINT solves the quartics of tori, about 100 µs a ray.  To add a shape: its function in `flat`
-or `curved` and its entry in `KINDS`.
+ray; FLINT solves the quartics of tori, about 100 µs a ray.  To add a shape: its function in
+`crossings` and its entry in `KINDS`.
 """
 
 from collections.abc import Callable
@@ -25,20 +25,20 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from comparisons.geometry.exact import curved, flat
+from comparisons.geometry.exact import crossings
 from comparisons.geometry.exact.crossings import Crossings, IntArray, Row
 from comparisons.geometry.exact.dyadic import NEVER, BoolArray, Dyadic, Fixed, FloatArray, nearest
 
 KINDS: dict[str, Callable[[Row, Dyadic, Dyadic], Crossings]] = {
-    "spheres": curved.spheres,
-    "rectangles": flat.rectangles,
-    "boxes": curved.boxes,
-    "triangles": flat.triangles,
-    "disks": flat.disks,
-    "planes": flat.planes,
-    "polygons": flat.polygons,
-    "quadrics": curved.quadrics,
-    "tori": curved.tori,
+    "spheres": crossings.spheres,
+    "rectangles": crossings.rectangles,
+    "boxes": crossings.boxes,
+    "triangles": crossings.triangles,
+    "disks": crossings.disks,
+    "planes": crossings.planes,
+    "polygons": crossings.polygons,
+    "quadrics": crossings.quadrics,
+    "tori": crossings.tori,
 }
 
 

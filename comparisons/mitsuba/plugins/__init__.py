@@ -9,8 +9,6 @@ name in `register` below, and a `translate_*` function that uses it."""
 from typing import Any
 
 from comparisons.mitsuba.plugins import (
-    exact_beckmann,
-    exact_bump,
     exact_coat,
     exact_coordinates,
     mesh_area,
@@ -25,7 +23,7 @@ from comparisons.mitsuba.plugins import (
 def register(mi: Any) -> None:
     """Register the plugins of this folder for the current variant."""
     plugins = (
-        *(exact_beckmann, exact_bump, exact_coat, exact_coordinates, mixtures, phong),
+        *(exact_coat, exact_coordinates, mixtures, phong),
         *(mesh_area, path_of_solids, view_rectangle, whitted),
     )
     for plugin in plugins:

@@ -19,8 +19,8 @@ from reference_rt.core.transform import Affine, apply_points, flattens
 from reference_rt.shapes import Mesh
 from reference_rt.shapes.meshes.files import read_mesh
 from reference_rt.shapes.meshes.files.data import MeshData, RawMesh, checked
+from reference_rt.shapes.meshes.topology import smooth_normals, unit
 from reference_rt.shapes.meshes.triangle_table import geometric_normals
-from reference_rt.shapes.meshes.vertex_normals import smooth_normals, unit
 from reference_rt.util.files import read_input
 from reference_rt.util.memory import check_unpacked
 

@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.mitsuba.backend import imported
-from comparisons.mitsuba.reading.foreign import OLD_ELEMENT, Note, adapt
-from comparisons.mitsuba.reading.included import Included, as_utf8
+from comparisons.mitsuba.reading.included import OLD_ELEMENT, Included, Note, adapt, as_utf8
 from reference_rt.core.transform import Affine, compose, rotate, scale, translate
 from reference_rt.util.errors import ReferenceUnavailableError, SceneError
 from reference_rt.util.files import temporary_folder
@@ -209,7 +208,7 @@ class Parsed(NamedTuple):
     state: `mitsuba.parser.ParserState`, upgraded to Mitsuba 3 and its references resolved;  file:
     the name for messages;  folder: where relative file names count from, first;  resolve: the
     file that Mitsuba finds for a name;  defaults: values for <default> elements;  written: see
-    `transforms`;  notes: what `foreign` has changed;  left_out: a line for each kind of element
+    `transforms`;  notes: what `adapt` has changed;  left_out: a line for each kind of element
     that Mitsuba does not know.
     """
 

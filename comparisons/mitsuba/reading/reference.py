@@ -81,7 +81,7 @@ def make_exact(parsed: Parsed, scene: Scene) -> None:
 
 def sample_visible(parsed: Parsed) -> list[str]:
     """Have all rough dielectrics sample visible normals: Mitsuba's other way is wrong (see
-    `plugins.exact_beckmann`).  Returns a note if any did not."""
+    `plugins.exact_coat`).  Returns a note if any did not."""
     every = [node.props for node in parsed.state.nodes]
     glasses = [props for props in every if props.plugin_name() == "roughdielectric"]
     wrong = [props for props in glasses if not props.get("sample_visible", True)]

@@ -9,11 +9,11 @@ import numpy as np
 
 from comparisons.mitsuba.reading.node import Node, Reading, triple
 from reference_rt.cameras import AnyCamera, Orthographic, Perspective, ThinLens
-from reference_rt.cameras.film import Film
-from reference_rt.cameras.filters import (
+from reference_rt.cameras.film import (
     AnyFilter,
     BoxFilter,
     CatmullRomFilter,
+    Film,
     GaussianFilter,
     LanczosFilter,
     MitchellFilter,

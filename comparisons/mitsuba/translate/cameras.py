@@ -7,9 +7,17 @@ from typing import Any
 
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.translate.textures import UntranslatableError
-from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens, filters
+from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
 from reference_rt.cameras.camera import Camera
-from reference_rt.cameras.film import Film
+from reference_rt.cameras.film import (
+    BoxFilter,
+    CatmullRomFilter,
+    Film,
+    GaussianFilter,
+    LanczosFilter,
+    MitchellFilter,
+    TentFilter,
+)
 from reference_rt.cameras.view_rectangle import CentralCamera
 from reference_rt.sampling import Grid, Independent, Sobol
 
@@ -27,24 +35,24 @@ def translate_film(film: Film) -> dict[str, Any]:
         "rfilter": translate_filter(film.filter),
         # Our pixels sample the whole filter, also beyond the picture's edge; without a border
         # Mitsuba's edge pixels would lack the samples outside.
-        "sample_border": not isinstance(film.filter, filters.BoxFilter),
+        "sample_border": not isinstance(film.filter, BoxFilter),
     }
 
 
 def translate_filter(film_filter: Any) -> dict[str, Any]:
     """A reconstruction filter's dict.  Raises UntranslatableError."""
     match film_filter:
-        case filters.BoxFilter():
+        case BoxFilter():
             return {"type": "box"}
-        case filters.TentFilter(radius=radius):
+        case TentFilter(radius=radius):
             return {"type": "tent", "radius": radius}
-        case filters.GaussianFilter(stddev=stddev):
+        case GaussianFilter(stddev=stddev):
             return {"type": "gaussian", "stddev": stddev}
-        case filters.MitchellFilter(b=b, c=c):
+        case MitchellFilter(b=b, c=c):
             return {"type": "mitchell", "B": b, "C": c}
-        case filters.CatmullRomFilter():
+        case CatmullRomFilter():
             return {"type": "catmullrom"}
-        case filters.LanczosFilter(lobes=lobes):
+        case LanczosFilter(lobes=lobes):
             return {"type": "lanczos", "lobes": lobes}
     raise UntranslatableError(film_filter, "filter")
 

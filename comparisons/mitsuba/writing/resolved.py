@@ -45,8 +45,8 @@ from reference_rt.shapes import (
     Triangle,
 )
 from reference_rt.shapes.meshes.files.data import MeshData
+from reference_rt.shapes.meshes.topology import unit
 from reference_rt.shapes.meshes.triangle_table import geometric_normals
-from reference_rt.shapes.meshes.vertex_normals import unit
 from reference_rt.shapes.shape import TabulationContext
 from reference_rt.util.errors import ReferenceRtError
 

@@ -30,7 +30,7 @@ from reference_rt.materials import Emissive
 from reference_rt.shapes import Box, Cylinder, Disk, Mesh, Rectangle, Shape, Sphere
 from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.meshes.files.data import MeshData
-from reference_rt.shapes.meshes.vertex_normals import smooth_normals
+from reference_rt.shapes.meshes.topology import smooth_normals
 
 
 class Shapes:

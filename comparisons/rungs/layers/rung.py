@@ -11,8 +11,7 @@ from comparisons.results.case import RungResult
 from comparisons.rungs.layers.seen import Centres, FilmPoints, Seen, centres, sensor_rays
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.camera import ends
-from reference_rt.cameras.film import Film
-from reference_rt.cameras.filters import Filter
+from reference_rt.cameras.film import Film, Filter
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.integrators import RayCast

@@ -18,7 +18,7 @@ from comparisons.rungs.rays.camera import camera_rays, ends
 from comparisons.rungs.rays.comparer import KINDS, Comparer
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.rays.resolution import slide
-from reference_rt.cameras.filters import Filter
+from reference_rt.cameras.film import Filter
 from reference_rt.core.arrays import FloatArray, IdArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.materials import Diffuse, Wrapper

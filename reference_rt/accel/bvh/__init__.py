@@ -1,12 +1,12 @@
 """Bounding volume hierarchies (BVHs) over any mix of primitives: how they are built and stored.
 
 Builders see only the primitives' bounding boxes (spatial splits also triangles' vertices).  `build`
-makes a binary BVH, `Nodes` in world space, by one of four methods: `sah.py` with `bins.py` and
-`spatial.py`, `median.py`, or a single leaf.  `widened` makes it a BVH of eight children a node,
-`Wide`; `joined` puts several into one `Bvh`, the arrays that traversals read (both in `wide.py`).
-`statistics` measures a BVH.
+makes a binary BVH, `Nodes` in world space, by one of four methods: `top_down.py`'s median
+splits and SAH, the latter with `bins.py` and `spatial.py`, or a single leaf.  `widened` makes it a
+BVH of eight children a node, `Wide`; `joined` puts several into one `Bvh`, the arrays that
+traversals read (both in `wide.py`).  `statistics` measures a BVH.
 
-To add a method: a module with build(boxes (n, 6)) -> (Nodes, references), deterministic, no deeper
+To add a method: a function build_...(boxes (n, 6)) -> (Nodes, references), deterministic, no deeper
 than STACK_SIZE allows, leaves of at most LEAF_SIZE; a name in `Method` and a branch in `build`; the
 method's name in the field of the scene, and in METHODS of the tests.
 """
@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from reference_rt.accel.bvh import median, sah
+from reference_rt.accel.bvh import top_down
 from reference_rt.accel.bvh.nodes import (
     FAR_SLACK,
     LEAF_SIZE,
@@ -99,9 +99,9 @@ def build(
             n = len(lower)
             return Nodes(box[None], np.zeros(1, np.int64), np.full(1, n)), np.arange(n)
         if method == "median":
-            return median.build(primitives)
+            return top_down.build_median(primitives)
         if method == "sah":
-            return sah.build(primitives, None)
+            return top_down.build_sah(primitives, None)
         if corners is None:
             corners = np.full((len(lower), 9), np.nan)
-        return sah.build(primitives, np.ascontiguousarray(corners))
+        return top_down.build_sah(primitives, np.ascontiguousarray(corners))

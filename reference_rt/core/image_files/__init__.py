@@ -1,4 +1,4 @@
-"""Reading image files: `open_image` detects the format and reads the header; one module per format.
+"""Reading image files: `open_image` detects the format and reads the header.
 
 Bitmap textures, environment maps and the image gate read with these.  The format is detected by a
 file's first bytes, not by its name.  A format's `open_*` function returns an `ImageFile` with size
@@ -13,10 +13,8 @@ in `_BEGINNINGS`; a test with files of it.
 from pathlib import Path
 
 from reference_rt.core.image_files.exr import open_exr
-from reference_rt.core.image_files.hdr import HdrFile, open_hdr
+from reference_rt.core.image_files.float_files import HdrFile, open_hdr, open_npy, open_pfm
 from reference_rt.core.image_files.image_file import ImageFile, Strip
-from reference_rt.core.image_files.npy import open_npy
-from reference_rt.core.image_files.pfm import open_pfm
 from reference_rt.core.image_files.pillow import open_with_pillow
 from reference_rt.util.files import open_input
 
@@ -34,7 +32,7 @@ def open_image(path: Path, layer: str = "", radiance: bool = False) -> ImageFile
     """The image in a file, of which only the header has been read.
 
     layer: the prefix of the channels' names of an EXR file;  radiance: decode .hdr as Radiance
-    itself does, see `hdr.HdrFile`.  Raises ValueError (what is wrong, what was expected) and
+    itself does, see `HdrFile`.  Raises ValueError (what is wrong, what was expected) and
     OSError.
     """
     with open_input(path) as file:

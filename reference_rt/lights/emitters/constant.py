@@ -1,4 +1,6 @@
-"""Constant environment: the same radiance from every direction."""
+"""Light that is the same everywhere: the constant environment, from every direction; ambient light,
+I_a of Whitted's integrator, from none.
+"""
 
 import math
 from typing import Literal, NamedTuple
@@ -11,6 +13,16 @@ from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.jit.kernel import kernel
 from reference_rt.lights.light import LightSample
 from reference_rt.sampling.warp import uniform_sphere
+
+
+class Ambient(Description):
+    """The textbook's ambient light: a `phong` material adds k_a I_a under `whitted`.  No other
+    material or integrator uses it."""
+
+    type: Literal["ambient"] = "ambient"
+    radiance: Colour
+    """The ambient radiance I_a: W sr^-1 m^-2, linear sRGB."""
+
 
 PDF = 0.25 / math.pi
 """Directions are drawn uniformly over the sphere."""

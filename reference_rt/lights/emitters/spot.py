@@ -10,7 +10,7 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Colour, Description, Direction, Vector
 from reference_rt.core.vec3 import Vec3, cross, dot, length, luminance, row
 from reference_rt.jit.kernel import kernel
-from reference_rt.lights.emitters.projected import (
+from reference_rt.lights.emitters.projector import (
     WHITE,
     ProjectedImages,
     colour_in,

@@ -1,8 +1,8 @@
 """The light sampler: which light a shadow ray is sent to.
 
 `choice.py` picks among all lights: by power if there are few, or else by the light tree for lights
-that have bounds (`tree.py`) and by power for the rest, which are
-infinitely far away.  `bounds.py` has the boxes, cones of normals and intensities of lights.
+that have bounds and by power for the rest, which are infinitely far away.  `bounds.py` has the
+boxes, cones of normals and intensities of lights.
 
 Contract: `pick(choice, tree, p, n, u)` takes a point and the unit normal there on the side that
 light may come from, n = 0 for both sides, and a number u from [0, 1).  It returns a light's number

@@ -16,6 +16,6 @@ that they return is NaN or infinite for unit directions.  A material that does n
 `transmits` is black behind.
 
 To add one: its file; in `tables.py` a code, a field of `Leaves` and a line in `TABLES`.  What
-several files share has a file too: `transparent.py`, `metal.py`, `rough.py`,
-`coated.py`, `principled_lobes.py`.
+several files share is in the simplest of them, such as `Metal` in `conductor.py`; the lobes of both
+principled materials are in `principled_lobes.py`.
 """

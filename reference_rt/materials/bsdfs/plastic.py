@@ -17,21 +17,58 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.model import Positive
 from reference_rt.core.vec3 import Vec3, max_component
 from reference_rt.jit.kernel import kernel
-from reference_rt.materials.bsdfs.coated import Coated, base_albedo
 from reference_rt.materials.material import (
     INV_PI,
     NO_BRANCHES,
     NO_SAMPLE,
     Branches,
     BsdfSample,
+    Material,
     Scattered,
     reflection,
 )
 from reference_rt.materials.microfacet.fresnel import fresnel, relative_index
 from reference_rt.sampling.warp import cosine_hemisphere
-from reference_rt.textures import At, Colours, Palette, colour_at
+from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
+
+
+class Coated(Material):
+    """A diffuse base under a clear coat; its back is black."""
+
+    smooth: ClassVar[bool] = True
+    type: str  # first, so that `to_json` writes it first
+    reflectance: ReflectanceParameter = (0.5, 0.5, 0.5)
+    """Diffuse reflectance of the base: linear sRGB from 0 to 1, or a texture."""
+    specular: ReflectanceParameter = (1.0, 1.0, 1.0)
+    """A factor of the light that the coat reflects: linear sRGB from 0 to 1, or a texture.  The
+    default, 1, is physical."""
+    interior_ior: Positive = 1.5
+    """Index of refraction of the coat."""
+    exterior_ior: Positive = 1.0
+    """Index of refraction outside the coat."""
+    nonlinear: bool = False
+    """Whether `reflectance` colours the light at every bounce below the coat, so that colours
+    saturate."""
+
+    @property
+    def colour(self) -> tuple[float, float, float] | str:
+        return self.reflectance
+
+
+@kernel
+def base_albedo(rho: Vec3, internal: float, nonlinear: int) -> Vec3:
+    """rho / (1 - c internal), c = rho if `nonlinear`, else 1: the albedo of the base, light that
+    the coat throws back included;  internal: the coat's reflectance from within."""
+    if nonlinear == 0:
+        return rho * (1.0 / (1.0 - internal))
+    return Vec3(
+        rho.x / (1.0 - rho.x * internal),
+        rho.y / (1.0 - rho.y * internal),
+        rho.z / (1.0 - rho.z * internal),
+    )
 
 
 class Plastic(Coated):

@@ -10,11 +10,12 @@ from typing import ClassVar, Literal, NamedTuple
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, dot, reflect, row
 from reference_rt.jit.kernel import kernel
-from reference_rt.materials.bsdfs.metal import Metal
-from reference_rt.materials.bsdfs.rough import Rough
-from reference_rt.materials.material import NO_SAMPLE, BsdfSample, Scattered
+from reference_rt.materials.bsdfs.conductor import Metal
+from reference_rt.materials.material import NO_SAMPLE, BsdfSample, Material, Scattered
 from reference_rt.materials.microfacet.fresnel import conductor_colour
 from reference_rt.materials.microfacet.ggx_and_smith import (
+    AlphaParameter,
+    Distribution,
     Roughnesses,
     density,
     g1,
@@ -25,6 +26,21 @@ from reference_rt.materials.microfacet.ggx_and_smith import (
     sample_visible,
 )
 from reference_rt.textures import At, Colours, Palette, colour_at
+
+
+class Rough(Material):
+    """A boundary of microfacets."""
+
+    smooth: ClassVar[bool] = True
+    distribution: Distribution = "ggx"
+    """The distribution of microfacet normals: GGX (Trowbridge-Reitz) or Beckmann."""
+    alpha: AlphaParameter = (0.1, 0.1)
+    """Roughness: the root mean square slope for `beckmann`.  A number, two [along u, along v], or a
+    texture; above 0, at most 10.  Below 1e-4 it counts as 1e-4."""
+
+    @property
+    def oriented(self) -> bool:
+        return not isinstance(self.alpha, str) and self.alpha[0] != self.alpha[1]
 
 
 class RoughConductor(Rough, Metal):

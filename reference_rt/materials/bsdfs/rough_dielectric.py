@@ -19,8 +19,8 @@ from pydantic import model_validator
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, dot, max_component, reflect
 from reference_rt.jit.kernel import kernel
-from reference_rt.materials.bsdfs.rough import Rough
-from reference_rt.materials.bsdfs.transparent import Transparent
+from reference_rt.materials.bsdfs.dielectric import Transparent
+from reference_rt.materials.bsdfs.rough_conductor import Rough
 from reference_rt.materials.material import NO_SAMPLE, BsdfSample, Scattered
 from reference_rt.materials.microfacet.fresnel import Refraction, fresnel
 from reference_rt.materials.microfacet.ggx_and_smith import (

@@ -27,7 +27,7 @@ from pydantic import Field
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.vec3 import Vec3, dot, max_component, reflect
 from reference_rt.jit.kernel import entry_kernel, kernel
-from reference_rt.materials.bsdfs.coated import Coated, base_albedo
+from reference_rt.materials.bsdfs.plastic import Coated, base_albedo
 from reference_rt.materials.material import INV_PI, NO_SAMPLE, BsdfSample, Scattered
 from reference_rt.materials.microfacet.fresnel import fresnel, relative_index
 from reference_rt.materials.microfacet.ggx_and_smith import (

@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import kernel
-from reference_rt.jit.links import LINK
-from reference_rt.jit.operation_types import declare
+from reference_rt.jit.links import LINK, declare
 from reference_rt.materials.bsdfs import (
     conductor,
     dielectric,
@@ -28,7 +27,7 @@ from reference_rt.materials.bsdfs import (
     thin_dielectric,
 )
 from reference_rt.materials.bsdfs.conductor import Conductor, Conductors
-from reference_rt.materials.bsdfs.dielectric import Dielectric
+from reference_rt.materials.bsdfs.dielectric import Dielectric, Transparents
 from reference_rt.materials.bsdfs.diffuse import Diffuse, Diffuses
 from reference_rt.materials.bsdfs.mirror import Mirror, Mirrors
 from reference_rt.materials.bsdfs.phong import Phong, Phongs
@@ -39,7 +38,6 @@ from reference_rt.materials.bsdfs.rough_conductor import RoughConductor, RoughCo
 from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric, RoughDielectrics
 from reference_rt.materials.bsdfs.rough_plastic import RoughPlastic, RoughPlastics
 from reference_rt.materials.bsdfs.thin_dielectric import ThinDielectric
-from reference_rt.materials.bsdfs.transparent import Transparents
 from reference_rt.materials.material import (
     NO_BRANCHES,
     Branches,

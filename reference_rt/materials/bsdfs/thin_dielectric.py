@@ -5,7 +5,7 @@ from typing import ClassVar, Literal
 from reference_rt.core.model import Positive
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
-from reference_rt.materials.bsdfs.transparent import Transparent, Transparents
+from reference_rt.materials.bsdfs.dielectric import Transparent, Transparents
 from reference_rt.materials.material import Branches
 from reference_rt.materials.microfacet.fresnel import fresnel
 from reference_rt.textures import At, ReflectanceParameter, colour_at

@@ -1,4 +1,4 @@
-"""Flattened materials: lists of BSDF leaves, each with a weight and a frame.
+"""Flattened materials: lists of BSDF leaves, each with a weight and a frame, and their sum.
 
 Masks, blends, two-sided materials, bump and normal maps may be nested in each other.  Each path
 from such a material to a leaf (`paths.py`) becomes a flattened leaf: the leaf with the steps that
@@ -13,10 +13,16 @@ from reference_rt.core.arrays import IntArray
 from reference_rt.core.vec3 import Frame, Vec3, to_local, to_world
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.links import Linkable, is_absent
-from reference_rt.materials.material import Material
-from reference_rt.materials.nested import bump, normal_map
-from reference_rt.materials.nested.bump import Bumps
-from reference_rt.materials.nested.normal_map import NormalMaps
+from reference_rt.materials.bsdfs import tables as bsdf
+from reference_rt.materials.bsdfs.tables import Leaves
+from reference_rt.materials.material import (
+    NO_SAMPLE,
+    Branches,
+    BsdfSample,
+    Material,
+    Scattered,
+    Shading,
+)
 from reference_rt.materials.nested.paths import (
     BACK_ONLY,
     BUMP,
@@ -26,8 +32,14 @@ from reference_rt.materials.nested.paths import (
     WEIGHT,
     MaterialPath,
 )
-from reference_rt.materials.nested.terminator import shadowing, shadowing_alpha2
-from reference_rt.materials.shading import Shading
+from reference_rt.materials.nested.tilted import (
+    Bumps,
+    NormalMaps,
+    bump_basis,
+    map_basis,
+    shadowing,
+    shadowing_alpha2,
+)
 from reference_rt.shapes.shape import Tangents
 from reference_rt.textures import At, Numbers, Palette, Textures, number_at
 from reference_rt.textures.parameter import join
@@ -55,7 +67,7 @@ class FlattenedMaterials(NamedTuple):
 class FlattenedLeaf(NamedTuple):
     """A flattened leaf at a point.  weight: from 0 to 1;  basis: its frame, in coordinates of the
     shading frame;  side: 0 if its frame is not tilted by a bump or normal map, else 1, or -1 if it
-    is flipped to the other side;  alpha2: of `terminator.shadowing`, 0 for none."""
+    is flipped to the other side;  alpha2: of `tilted.shadowing`, 0 for none."""
 
     weight: float
     basis: Frame
@@ -262,7 +274,7 @@ def _identity() -> Frame:
 def _bumped(bumps: Bumps | None, i: int, at: At, tangents: Tangents, wo: Vec3) -> Frame:
     if bumps is None:
         return _identity()
-    return bump.basis(bumps, i, at, tangents, wo)
+    return bump_basis(bumps, i, at, tangents, wo)
 
 
 @kernel
@@ -271,7 +283,7 @@ def _mapped(
 ) -> Frame:
     if maps is None:
         return _identity()
-    return normal_map.basis(maps, i, shading.at, tangents, wo)
+    return map_basis(maps, i, shading.at, tangents, wo)
 
 
 @kernel
@@ -296,3 +308,129 @@ def shadow_of(leaf: FlattenedLeaf, wi: Vec3) -> float:
     if leaf.alpha2 == 0.0:
         return 1.0
     return shadowing(leaf.alpha2, wi)
+
+
+@flattened_materials.operation
+def eval_pdf_nested(
+    flat_leaves: FlattenedMaterials, leaves: Leaves, shading: Shading, wi: Vec3
+) -> Scattered:
+    """f(wo, wi) |cos wi| of all leaves, weighted, and the density of `sample_nested`."""
+    m = shading.point.material
+    value, density, total = Vec3(0.0, 0.0, 0.0), 0.0, 0.0
+    first = flat_leaves.first[m]
+    for k in range(flat_leaves.number[m]):
+        leaf = leaf_at(shading, k)
+        if leaf.weight > 0.0:
+            total += leaf.weight
+            wo_in, wi_in = to_local(leaf.basis, shading.wo), to_local(leaf.basis, wi)
+            kind, i = flat_leaves.kind[first + k], flat_leaves.row[first + k]
+            one = bsdf.eval_pdf(leaves, kind, i, shading.at, wo_in, wi_in)
+            if scatters_from(leaf, wi):
+                value = value + one.value * (leaf.weight * shadow_of(leaf, wi))
+            elif flat_leaves.number[m] == 1:  # `sample` rejects such directions
+                continue
+            density += one.density * leaf.weight
+    return Scattered(value, density / total if total > 0.0 else 0.0)
+
+
+@flattened_materials.operation
+def sample_nested(
+    flat_leaves: FlattenedMaterials,
+    leaves: Leaves,
+    shading: Shading,
+    u_lobe: float,
+    u0: float,
+    u1: float,
+) -> BsdfSample:
+    """A direction sampled from one of the leaves."""
+    m = shading.point.material
+    first, count = flat_leaves.first[m], flat_leaves.number[m]
+    total = 0.0
+    for k in range(count):
+        total += leaf_at(shading, k).weight
+    if not total > 0.0:
+        return NO_SAMPLE
+    # Choose a layer with probability weight / total; u_lobe, rescaled within the layer's interval,
+    # is the random number for the layer's own choice.
+    rest, chosen = u_lobe * total, 0
+    leaf = leaf_at(shading, 0)
+    while rest >= leaf.weight and chosen + 1 < count:
+        rest -= leaf.weight
+        chosen += 1
+        leaf = leaf_at(shading, chosen)
+    if not leaf.weight > 0.0:
+        return NO_SAMPLE
+    u_inner = min(rest / leaf.weight, 1.0 - 2.0**-53)
+    wo_in = to_local(leaf.basis, shading.wo)
+    kind, i = flat_leaves.kind[first + chosen], flat_leaves.row[first + chosen]
+    drawn = bsdf.sample(leaves, kind, i, shading.at, wo_in, u_inner, u0, u1)
+    wi = to_world(leaf.basis, drawn.wi)
+    if drawn.pdf == 0.0:
+        return NO_SAMPLE
+    if drawn.is_delta or count == 1:
+        if not scatters_from(leaf, wi):
+            return NO_SAMPLE
+    if drawn.is_delta:
+        # weight / total is the probability of the layer, by which its contribution is divided.
+        probability = drawn.pdf * (leaf.weight / total)
+        weight = drawn.weight * (total * shadow_of(leaf, wi))
+        return BsdfSample(wi, weight, probability, drawn.eta, True)
+    if count == 1:
+        weight = drawn.weight * (total * shadow_of(leaf, wi))
+        return BsdfSample(wi, weight, drawn.pdf, drawn.eta, False)
+    # Any of the layers could have sampled this direction: use the sum of their densities.
+    found = eval_pdf_nested(flat_leaves, leaves, shading, wi)
+    if not found.density > 0.0:
+        return NO_SAMPLE
+    return BsdfSample(wi, found.value * (1.0 / found.density), found.density, drawn.eta, False)
+
+
+@flattened_materials.operation
+def leaf_count(flat_leaves: FlattenedMaterials, m: int) -> int:
+    """The number of leaves of material m."""
+    return int(flat_leaves.number[m])
+
+
+@flattened_materials.operation
+def ambient_nested(flat_leaves: FlattenedMaterials, leaves: Leaves, shading: Shading) -> Vec3:
+    """The ambient reflectance of all leaves, weighted."""
+    m = shading.point.material
+    total = Vec3(0.0, 0.0, 0.0)
+    first = flat_leaves.first[m]
+    for k in range(flat_leaves.number[m]):
+        weight = leaf_at(shading, k).weight
+        kind, i = flat_leaves.kind[first + k], flat_leaves.row[first + k]
+        value = bsdf.ambient(leaves, kind, i, shading.at)
+        total = total + value * weight
+    return total
+
+
+@flattened_materials.operation
+def branches_nested(
+    flat_leaves: FlattenedMaterials, leaves: Leaves, shading: Shading, k: int
+) -> Branches:
+    """The delta lobes of leaf k."""
+    m = shading.point.material
+    leaf = leaf_at(shading, k)
+    k += flat_leaves.first[m]
+    wo_in = to_local(leaf.basis, shading.wo)
+    kind, i = flat_leaves.kind[k], flat_leaves.row[k]
+    found = bsdf.branches(leaves, kind, i, shading.at, wo_in)
+    reflected = to_world(leaf.basis, found.reflected)
+    refracted = to_world(leaf.basis, found.refracted)
+    return Branches(
+        reflected,
+        _let(leaf, reflected, found.reflectance),
+        refracted,
+        _let(leaf, refracted, found.transmittance),
+        found.share,
+        found.passing,
+        found.eta,
+    )
+
+
+@kernel
+def _let(leaf: FlattenedLeaf, wi: Vec3, factor: Vec3) -> Vec3:
+    if not scatters_from(leaf, wi):
+        return Vec3(0.0, 0.0, 0.0)
+    return factor * (leaf.weight * shadow_of(leaf, wi))

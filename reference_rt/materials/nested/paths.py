@@ -8,8 +8,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from reference_rt.materials.material import Material
-from reference_rt.materials.nested.bump import Bump
-from reference_rt.materials.nested.normal_map import NormalMap
+from reference_rt.materials.nested.tilted import Bump, NormalMap
 from reference_rt.materials.nested.wrappers import Blend, Mask, TwoSided
 
 # Codes of steps.  WEIGHT, ONE_MINUS_WEIGHT: times w, 1 - w, for a number w of `weights`;

@@ -23,8 +23,18 @@ from reference_rt.accel.geometry import Geometry, coordinates, owner, surface
 from reference_rt.accel.next_crossing import next_crossing
 from reference_rt.accel.packet import PACKET_SIZE
 from reference_rt.core.arrays import FloatArray, IdArray, IntArray
-from reference_rt.core.ray import BLOCK, Hit, at, is_representable, scaled
-from reference_rt.core.ray_block import HIT_FLOATS, HIT_INTEGERS, RAY_FLOATS, HitBlock, RayBlock
+from reference_rt.core.ray import (
+    BLOCK,
+    HIT_FLOATS,
+    HIT_INTEGERS,
+    RAY_FLOATS,
+    Hit,
+    HitBlock,
+    RayBlock,
+    at,
+    is_representable,
+    scaled,
+)
 from reference_rt.core.vec3 import row
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel, kernel, local_floats, local_integers

@@ -6,6 +6,6 @@ are intersected in their own coordinates (`placement.py`); `quadric.py` puts a q
 coordinates where floats serve it best, exactly, when the scene is built.
 
 To add a quadric: a description whose `tabulate` calls `quadric.tabulate` with its ten coefficients
-and its clip box, as `cone.py` does; no kernels are needed.  To add another surface: a file as
+and its clip box, as `Cone` does; no kernels are needed.  To add another surface: a file as
 `torus.py`, and what `shapes` says.
 """

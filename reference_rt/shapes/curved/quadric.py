@@ -1,7 +1,8 @@
 """Quadric: a surface of second degree, clipped to a box; how rows of the table are made.
 
 Cylinders, cones and ellipsoids are rows of the same table.  The local coordinates of a row are
-those of `quadratic_form.fit`."""
+those of `quadratic_form.fit`.
+"""
 
 from collections.abc import Sequence
 from fractions import Fraction
@@ -9,9 +10,9 @@ from itertools import combinations
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Strict, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, Field, Strict, WithJsonSchema, model_validator
 
-from reference_rt.core.model import Vector
+from reference_rt.core.model import Positive, Vector
 from reference_rt.core.transform import Affine
 from reference_rt.shapes.curved.quadrics import Quadrics
 from reference_rt.shapes.placement import columns
@@ -256,3 +257,67 @@ def ellipsoid(context: TabulationContext, m: Affine, middle: Vector, radius: flo
     lower = [Fraction(x) - Fraction(radius) for x in middle]
     upper = [Fraction(x) + Fraction(radius) for x in middle]
     return tabulate(context, m, form, lower, upper, (False, False, False), True)
+
+
+class Cylinder(Shape):
+    """A cylinder about the z axis, from `z_min` to `z_max`; outward normals.
+
+    Surface coordinates: u around from +x, v up from `z_min`, each from 0 to 1; on a cap x and y
+    over the square around it.  Faces: 0 is the side, 3 the bottom, 6 the top.
+    """
+
+    type: Literal["cylinder"] = "cylinder"
+    radius: Positive = 1.0
+    """Radius about the z axis, before the transform, in scene units."""
+    z_min: float = 0.0
+    """Lower end on the z axis, before the transform, in scene units."""
+    z_max: float = 1.0
+    """Upper end on the z axis, above `z_min`, before the transform."""
+    capped: bool = True
+    """Whether it is a solid, closed by two disks.  Otherwise it is the side alone, seen from both
+    sides."""
+
+    @model_validator(mode="after")
+    def _has_a_height(self) -> Self:
+        if not self.z_min < self.z_max:
+            raise ValueError(
+                f"expected 'z_min' below 'z_max', got {self.z_min:g} and {self.z_max:g}"
+            )
+        return self
+
+    def tabulate(self, context: TabulationContext) -> Quadrics:
+        r = self.radius
+        form = (*map(Fraction, (1, 1, 0, 0, 0, 0, 0, 0, 0)), -(Fraction(r) ** 2))
+        lower, upper = (-r, -r, self.z_min), (r, r, self.z_max)
+        clipped = (False, False, True)
+        return tabulate(context, self.map_in(context), form, lower, upper, clipped, self.capped)
+
+
+class Cone(Shape):
+    """A cone or truncated cone about the z axis, from z = 0 to z = `height`; outward normals, at an
+    apex along the axis.
+
+    Surface coordinates: u around from +x, v up from z = 0, each from 0 to 1; on a cap x and y over
+    the square around the wider one.  Faces: 0 is the side, 3 the bottom, 6 the top.
+    """
+
+    type: Literal["cone"] = "cone"
+    radius: Positive = 1.0
+    """Radius at z = 0, before the transform, in scene units."""
+    height: Positive = 1.0
+    """Height along z, before the transform, in scene units."""
+    top_radius: Annotated[float, Field(ge=0)] = 0.0
+    """Radius at z = `height`, at least 0, before the transform; 0, the default, makes an apex."""
+    capped: bool = True
+    """Whether it is a solid, closed by disks.  Otherwise it is the side alone, seen from both
+    sides."""
+
+    def tabulate(self, context: TabulationContext) -> Quadrics:
+        r, top = Fraction(self.radius), Fraction(self.top_radius)
+        slope = (top - r) / Fraction(self.height)
+        zero, one = Fraction(0), Fraction(1)
+        form = (one, one, -slope * slope, zero, zero, zero, zero, zero, -2 * r * slope, -r * r)
+        reach = max(self.radius, self.top_radius)
+        lower, upper = (-reach, -reach, 0.0), (reach, reach, self.height)
+        clipped = (False, False, True)
+        return tabulate(context, self.map_in(context), form, lower, upper, clipped, self.capped)

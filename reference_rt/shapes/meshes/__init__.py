@@ -3,8 +3,7 @@
 - `mesh.py`: the description of a mesh; `files/`: readers of mesh files;
 - `triangle_table.py`: the table; `triangle.py`: the kernels; `watertight.py`: a triangle in ray
   space;
-- `vertex_normals.py`, `topology.py`: vertex normals for meshes without any; whether a mesh is
-  closed.
+- `topology.py`: vertex normals for meshes without any; whether a mesh is closed.
 
 The contract is that of `shapes`, except that `intersect` takes a `Shear`, which is made once per
 ray.  A ray through a shared edge or vertex meets exactly those of the triangles around it that it

@@ -9,12 +9,12 @@ from pydantic import model_validator
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.diagnosis import FieldError
-from reference_rt.core.numpy_fields import AS_DIGEST, Floats2, Floats3, Integers3
+from reference_rt.core.model import AS_DIGEST, Floats2, Floats3, Integers3
 from reference_rt.core.transform import IDENTITY, Affine
 from reference_rt.shapes.meshes.files import MeshData, read_mesh
 from reference_rt.shapes.meshes.files.data import RawMesh, checked
+from reference_rt.shapes.meshes.topology import smooth_normals
 from reference_rt.shapes.meshes.triangle_table import Triangles, facing, have_area, soup
-from reference_rt.shapes.meshes.vertex_normals import smooth_normals
 from reference_rt.shapes.shape import Shape, TabulationContext
 
 _MOST_NAMED = 12

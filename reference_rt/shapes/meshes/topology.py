@@ -1,11 +1,19 @@
-"""Whether a mesh is closed, and where it is not: for solids, which need an inside."""
+"""The edges and vertices of meshes: whether a mesh is closed, and where it is not (solids need an
+inside); vertex normals for meshes without any.
 
-from typing import NamedTuple
+A vertex normal is the mean normal of the faces around the vertex, weighted by
+each face's angle there (Thürmer & Wüthrich 1998, "Computing vertex normals from polygonal facets",
+Journal of Graphics Tools 3(1)).  Unlike with weights of area, or equal ones, the result does not
+depend on how a surface is cut into triangles.
+"""
+
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.ray import UNIT_ROUNDOFF
 
 
 class BoundaryEdges(NamedTuple):
@@ -89,3 +97,89 @@ def describe_boundary(triangles: FloatArray, most: int = 3) -> str:
 
 def _shown(p: list[float]) -> str:
     return "(" + ", ".join(f"{x:.9g}" for x in p) + ")"
+
+
+TERM = 16
+"""The most roundings of a face's term of a sum: ten of its unit normal, three of its angle, one of
+their product."""
+
+
+def smooth_normals(vertices: FloatArray, faces: IntArray, uv: FloatArray | None) -> FloatArray:
+    """Unit normals (m, 9) at the corners of faces (m, 3), from positions (n, 3).
+
+    Vertices of the same position and texture coordinates uv (n, 2) are one: files repeat a vertex
+    for each face (.stl does), but along a seam of the texture the two sides have normals of their
+    own, as in Mitsuba and trimesh.
+
+    A face without area adds nothing.  Where the normals of a vertex cancel, as on two sides of a
+    sheet, and where no face around it has an area, each corner has the normal of its own face, or
+    (0, 0, 1) if that has no area either.
+    """
+    number, firsts = number_rows(vertices if uv is None else np.column_stack([vertices, uv]))
+    vertex = number[faces]
+    n, angles = _normals_and_angles(vertices[faces])
+    has_area: npt.NDArray[np.bool_] = np.any(n != 0.0, axis=1)
+    weights = np.where(has_area[:, None], angles, 0.0)
+    terms = weights[:, :, None] * n[:, None, :]
+    sums = np.stack([_summed(vertex, terms[:, :, k], len(firsts)) for k in range(3)], axis=1)
+    total = _summed(vertex, weights, len(firsts))
+    count = _summed(vertex, np.ones(vertex.shape), len(firsts))
+    # The error of a sum of k terms: k - 1 roundings of the sum of their sizes, and those of each.
+    error = UNIT_ROUNDOFF * (count + TERM) * total
+    smooth = np.linalg.norm(sums, axis=1) > error
+    own = np.where(has_area[:, None], n, [0.0, 0.0, 1.0])
+    at_corners = np.where(smooth[vertex][:, :, None], unit(sums)[vertex], own[:, None, :])
+    return np.ascontiguousarray(at_corners.reshape(-1, 9))
+
+
+def unit(vectors: FloatArray) -> FloatArray:
+    """(n, 3) vectors, of any length, normalised; 0 stays 0."""
+    largest = np.abs(vectors).max(axis=1, keepdims=True)
+    scaled = np.divide(vectors, largest, out=np.zeros_like(vectors), where=largest > 0.0)
+    length = np.linalg.norm(scaled, axis=1, keepdims=True)
+    return np.asarray(np.divide(scaled, length, out=scaled, where=length > 0.0))
+
+
+def _summed(vertex: IntArray, values: FloatArray, count: int) -> FloatArray:
+    return np.asarray(
+        np.bincount(vertex.ravel(), weights=values.ravel(), minlength=count), np.float64
+    )
+
+
+def _normals_and_angles(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Unit normals (m, 3), 0 without area, and the angles (m, 3) at the corners (m, 3, 3)."""
+    # Scaled by powers of two, which is exact, so that no difference or product overflows.
+    corners = _near_one(corners)
+    edges = _near_one(np.roll(corners, -1, axis=1) - corners)  # from each corner to the next
+    a, b = edges[:, 0], -edges[:, 2]
+    cross = np.stack(
+        [_determinant(a[:, k - 2], a[:, k - 1], b[:, k - 2], b[:, k - 1]) for k in range(3)], axis=1
+    )
+    double_area = np.linalg.norm(cross, axis=1)
+    cosines = -np.einsum("mki,mki->mk", edges, np.roll(edges, 1, axis=1))
+    return unit(cross), np.arctan2(double_area[:, None], cosines)
+
+
+def _near_one(rows: FloatArray) -> FloatArray:
+    """(m, 3, 3), each of the m scaled by a power of two so that its largest number is about 1."""
+    _, exponent = np.frexp(np.abs(rows).max(axis=(1, 2)))
+    return np.asarray(np.ldexp(rows, -exponent[:, None, None]))
+
+
+def _determinant(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
+    """a d - b c to within two roundings, also for slivers, whose two products nearly cancel."""
+    x, y = a * d, b * c
+    return np.asarray((x - y) + (_lost(a, d, x) - _lost(b, c, y)))
+
+
+def _lost(a: FloatArray, b: FloatArray, product: FloatArray) -> Any:
+    """a b - product, exactly (Dekker 1971, "A floating-point technique for extending the available
+    precision", Numerische Mathematik 18): factors are cut into halves of 26 bits."""
+    (a1, a2), (b1, b2) = _halves(a), _halves(b)
+    return ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2
+
+
+def _halves(a: FloatArray) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    c = (2.0**27 + 1.0) * a
+    high = c - (c - a)
+    return high, a - high

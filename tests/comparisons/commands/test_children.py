@@ -98,7 +98,7 @@ time.sleep(600)
 
 POOL = """
 import sys
-from comparisons.runs.processes.pool import run
+from comparisons.runs.processes import run
 from reference_rt.util.workers import Threads
 class Asked:
     def model_dump_json(self):

@@ -14,8 +14,7 @@ import comparisons.compare.compare
 import comparisons.mitsuba.translate
 from comparisons.compare.budget import Budget
 from comparisons.mitsuba.translate import UntranslatableError
-from comparisons.results.case import Case
-from comparisons.results.verdict import exit_code
+from comparisons.results.case import Case, exit_code
 from reference_rt.cli.main import app
 from reference_rt.rendering.scene import Scene
 

@@ -8,11 +8,19 @@ from typing import Any
 import pytest
 from bench_rows import FIELDS, a_table, made_up
 
-from comparisons.experiments.bench import equal_error
-from comparisons.experiments.bench.row import LIMIT, against, row_from, within
+from comparisons.experiments.bench import equal
+from comparisons.experiments.bench.row import (
+    LIMIT,
+    Setting,
+    against,
+    alternate,
+    ratios,
+    row_from,
+    seconds,
+    spread,
+    within,
+)
 from comparisons.experiments.bench.run import machine
-from comparisons.experiments.bench.setting import Setting
-from comparisons.experiments.bench.timing import alternate, ratios, seconds, spread
 
 SCENES = Path(__file__).parents[3] / "scenes"
 
@@ -63,9 +71,7 @@ def test_a_linear_drift_favours_nobody() -> None:
 
 def test_seconds_are_those_of_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = iter([10.0, 12.5])
-    monkeypatch.setattr(
-        "comparisons.experiments.bench.timing.time.perf_counter", lambda: next(clock)
-    )
+    monkeypatch.setattr("comparisons.experiments.bench.row.time.perf_counter", lambda: next(clock))
     assert seconds(lambda: None) == 2.5
 
 
@@ -130,7 +136,7 @@ def test_equal_error_takes_the_median_of_the_scenes_ratios() -> None:
         "c": {"ours": 3.0, "mitsuba_llvm": 1.5},
         "d": {"mitsuba_llvm": 1.5},
     }
-    median, worst, best = equal_error.rows(times, {"e": "why"})
+    median, worst, best = equal.rows(times, {"e": "why"})
     assert (median.ratio, median.met) == (0.5, True)
     assert (worst.ratio, worst.met, worst.details["worst"]) == (2.0, False, "c")
     assert (best.ratio, best.met) == (0.75, True)
@@ -145,7 +151,7 @@ def test_who_never_reaches_the_error_takes_infinitely_long() -> None:
         "b": {"ours": never, "mitsuba_llvm": 1.0, "mitsuba_llvm_best": never},
         "c": {"ours": never, "mitsuba_llvm": never, "mitsuba_llvm_best": 1.0},
     }
-    median, worst, best = equal_error.rows(times, {})
+    median, worst, best = equal.rows(times, {})
     assert median.details["ratios"] == {"a": 0.0, "b": never}
     assert not worst.met
     assert best.details["ratios"] == {"a": 0.0, "c": never}
@@ -155,13 +161,13 @@ def test_who_never_reaches_the_error_takes_infinitely_long() -> None:
 
 
 def test_equal_error_of_nothing_meets_no_goal() -> None:
-    assert not any(row.met for row in equal_error.rows({}, {}))
+    assert not any(row.met for row in equal.rows({}, {}))
 
 
 @pytest.mark.slow
 def test_only_path_traced_scenes_of_the_standard_suite_count() -> None:
-    names = set(equal_error.path_traced(Setting(scenes=SCENES, quick=True)))
-    assert names == set(equal_error.QUICK)
+    names = set(equal.path_traced(Setting(scenes=SCENES, quick=True)))
+    assert names == set(equal.QUICK)
 
 
 # ---- table --------------------------------------------------------------------------------------

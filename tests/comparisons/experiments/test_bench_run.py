@@ -9,10 +9,8 @@ from bench_rows import FIELDS, made_up
 from typer.testing import CliRunner
 
 from comparisons.experiments.bench import run
-from comparisons.experiments.bench.groups import GROUPS, Group, chosen
-from comparisons.experiments.bench.row import Row
-from comparisons.experiments.bench.setting import Setting
-from comparisons.experiments.bench.table import Display
+from comparisons.experiments.bench.row import Row, Setting
+from comparisons.experiments.bench.run import GROUPS, Display, Group, chosen
 from reference_rt.cli.main import _add_commands, app
 from reference_rt.util.errors import ReferenceUnavailableError, UsageError
 

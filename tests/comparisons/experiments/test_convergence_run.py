@@ -37,8 +37,7 @@ from comparisons.experiments.convergence.store import (
     weights,
 )
 from comparisons.mitsuba.translate import to_mitsuba
-from reference_rt.cameras.film import Film
-from reference_rt.cameras.filters import BoxFilter
+from reference_rt.cameras.film import BoxFilter, Film
 from reference_rt.cli.main import app
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import UsageError

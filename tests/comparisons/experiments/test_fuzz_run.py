@@ -11,7 +11,7 @@ from builders import HELPERS
 from junitparser import JUnitXml
 from typer.testing import CliRunner
 
-from comparisons.commands.fuzz import fuzz
+from comparisons.commands.trials import fuzz
 from comparisons.experiments.fuzz import finding, summary
 from comparisons.experiments.fuzz import run as running
 from comparisons.experiments.fuzz.fields import features as known
@@ -205,7 +205,7 @@ REGRESSIONS = sorted((SCENES / "regressions").glob("*.yaml"))
 @pytest.mark.slow
 @pytest.mark.parametrize("path", REGRESSIONS, ids=lambda path: path.stem)
 def test_what_was_found_before_is_mended(path, monkeypatch):
-    from comparisons.commands.fuzz import _data
+    from comparisons.commands.trials import _data
     from comparisons.experiments.fuzz.check import check
 
     data = _data(path, path.parent.parent)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from comparisons.experiments.selftest.fault import PACKAGE, run_worker
 from comparisons.experiments.selftest.mutation import (
     FEW_RAYS,
     PLAIN,
@@ -18,7 +19,6 @@ from comparisons.experiments.selftest.mutation import (
     summary,
     write,
 )
-from comparisons.experiments.selftest.patched import PACKAGE, run_worker
 
 ROOT = Path(__file__).parents[3]
 

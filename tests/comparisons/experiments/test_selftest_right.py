@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from comparisons.experiments.selftest.pools import Pools
 from comparisons.experiments.selftest.sensitivity import Calibration, calibration, of_pools
 from comparisons.experiments.selftest.specificity import (
     CASES,
     KINDS,
     OF_KINDS,
     Alarms,
+    Pools,
     RightCase,
     alarms_of,
     verdict,

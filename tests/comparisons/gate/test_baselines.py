@@ -9,7 +9,7 @@ import pytest
 import typer
 from typer.testing import CliRunner, Result
 
-from comparisons.commands.accept import accept
+from comparisons.commands.gate import accept
 from comparisons.gate import baselines
 from comparisons.gate.digest import scene_digest
 from comparisons.gate.errors import BaselineEditedError, BaselineMissingError

@@ -10,7 +10,7 @@ from gate_checks import SCENE, files, pictures, run, status, write
 from junitparser import JUnitXml
 from typer.testing import CliRunner
 
-from comparisons.commands.accept import accept
+from comparisons.commands.gate import accept
 from comparisons.gate import reference
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.image import srgb, write_png

@@ -11,7 +11,7 @@ from gate_checks import files, run, status
 from junitparser import JUnitXml
 from typer.testing import CliRunner
 
-from comparisons.commands.accept import accept
+from comparisons.commands.gate import accept
 from comparisons.gate.baselines import MOST_KEPT
 from comparisons.gate.digest import Copies, fingerprint
 from comparisons.gate.gate import gate_pictures

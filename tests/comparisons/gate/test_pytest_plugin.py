@@ -10,7 +10,7 @@ from gate_checks import BALL
 from typer import Typer
 from typer.testing import CliRunner
 
-from comparisons.commands.accept import accept
+from comparisons.commands.gate import accept
 
 pytest_plugins = ["pytester"]
 

@@ -11,8 +11,7 @@ from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.mitsuba import accuracy
 from comparisons.mitsuba.accuracy import both_sides, clearcoat_error, directions, table_error
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.plugins.exact_beckmann import approximate_g1, exact_g1
-from comparisons.mitsuba.plugins.exact_coat import smooth_reflectance
+from comparisons.mitsuba.plugins.exact_coat import approximate_g1, exact_g1, smooth_reflectance
 from comparisons.mitsuba.translate.materials import translate_material
 from comparisons.mitsuba.translate.textures import TranslationContext
 from comparisons.rungs.rays import arbiter

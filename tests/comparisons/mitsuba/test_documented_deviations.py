@@ -12,7 +12,7 @@ import pytest
 from comparisons.mitsuba import translate
 from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.notes import COSINES, base_error, notes_of
-from comparisons.mitsuba.plugins.exact_beckmann import approximate_g1, exact_g1
+from comparisons.mitsuba.plugins.exact_coat import approximate_g1, exact_g1
 from comparisons.mitsuba.scene import for_rays, picture
 from comparisons.mitsuba.translate import load
 from comparisons.mitsuba.translate.materials import translate_material

@@ -13,7 +13,7 @@ from mitsuba_dicts import hits_of, rays_at
 from PIL import Image
 from typer.testing import CliRunner, Result
 
-from comparisons.commands.convert import convert
+from comparisons.commands.compare import convert
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.reading import meshes, read_file
 from comparisons.mitsuba.writing.files import write_scene

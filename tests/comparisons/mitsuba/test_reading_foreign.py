@@ -16,7 +16,7 @@ from test_reading_plugins import fast, filled
 
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.reading import included, read_file
-from comparisons.mitsuba.reading.foreign import PRIMAL
+from comparisons.mitsuba.reading.included import PRIMAL
 from comparisons.mitsuba.reading.reference import changes_to, own_scene
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneError, SceneWarning

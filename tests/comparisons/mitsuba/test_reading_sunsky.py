@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from comparisons.commands.convert import convert
+from comparisons.commands.compare import convert
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.reading import read_file
 from comparisons.mitsuba.reading.lights import HEIGHT, WIDTH

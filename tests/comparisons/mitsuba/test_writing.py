@@ -15,7 +15,7 @@ from builders import SCENES, every_law, every_light
 from typer.testing import CliRunner
 
 import reference_rt as rt
-from comparisons.commands.convert import convert
+from comparisons.commands.compare import convert
 from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.scene import for_rays, picture
 from comparisons.mitsuba.writing import write_xml

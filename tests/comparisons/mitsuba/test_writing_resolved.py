@@ -12,7 +12,7 @@ from builders import SCENES, every_light, every_shape
 from typer.testing import CliRunner
 
 import reference_rt as rt
-from comparisons.commands.convert import convert
+from comparisons.commands.compare import convert
 from comparisons.mitsuba.writing.resolved import FORMAT, is_closed, tessellated, write_resolved
 from comparisons.rungs.rays.camera import camera_rays
 from reference_rt.rendering import query

@@ -7,8 +7,8 @@ import xml.etree.ElementTree as ElementTree
 import pytest
 from junitparser import Error, Failure, JUnitXml, Skipped
 
-from comparisons.report.ci import github, junit
-from comparisons.report.ci.ranking import SEVERITY, ranked
+from comparisons.report import ci
+from comparisons.report.ci import SEVERITY, ranked
 from comparisons.results.case import Case, Cause, RungResult
 from comparisons.results.rungs import RUNGS
 from reference_rt.util.errors import ImageError
@@ -47,7 +47,7 @@ def test_junit_says_what_failed_and_why(tmp_path):
     path = tmp_path / "junit.xml"
     cause = Cause("gain", "1.02 times", 0.99)
     cases = [*EVERY, case("differ", "other", cause=cause, again="do it again")]
-    junit.write(path, cases, "smoke", {"other": 12.3456}, {"left": "no need"})
+    ci.write_junit(path, cases, "smoke", {"other": 12.3456}, {"left": "no need"})
     suite = next(iter(JUnitXml.fromfile(str(path))))
     assert (suite.name, suite.tests, suite.failures) == ("smoke", 9, 4)
     assert (suite.errors, suite.skipped) == (1, 1)
@@ -73,7 +73,7 @@ def test_junit_says_what_failed_and_why(tmp_path):
 
 def test_junit_is_xml_whatever_the_text(tmp_path):
     path = tmp_path / "junit.xml"
-    junit.write(path, [case("differ", NASTY, NASTY), case("agree", "b", NASTY)], NASTY, None,
+    ci.write_junit(path, [case("differ", NASTY, NASTY), case("agree", "b", NASTY)], NASTY, None,
                 {NASTY: NASTY})  # fmt: skip
     root = ElementTree.parse(path).getroot()
     message = root.find(".//failure").get("message")
@@ -83,7 +83,7 @@ def test_junit_is_xml_whatever_the_text(tmp_path):
 
 
 def test_junit_of_nothing_is_whole(tmp_path):
-    junit.write(tmp_path / "junit.xml", [], "smoke")
+    ci.write_junit(tmp_path / "junit.xml", [], "smoke")
     assert next(iter(JUnitXml.fromfile(str(tmp_path / "junit.xml")))).tests == 0
 
 
@@ -94,7 +94,7 @@ COMMAND = re.compile(r"::(\w+) ([^:\r\n]*)::([^\r\n]*)\n")
 
 def annotations(cases, **more):
     stream = io.StringIO()
-    github.annotate(cases, stream, **more)
+    ci.annotate(cases, stream, **more)
     found = COMMAND.findall(stream.getvalue())
     assert "".join(f"::{k} {p}::{m}\n" for k, p, m in found) == stream.getvalue()
     return [(k, dict(pair.split("=", 1) for pair in p.split(",")), m) for k, p, m in found]
@@ -146,7 +146,7 @@ def test_the_summary_has_every_case_the_worst_first(tmp_path):
     path = tmp_path / "summary.md"
     path.write_text("before\n")
     cause = Cause("gain", "1.02 times", 0.99)
-    github.summarise([*EVERY, case("differ", "z", cause=cause)], path, "smoke", {"left": "no need"})
+    ci.summarise([*EVERY, case("differ", "z", cause=cause)], path, "smoke", {"left": "no need"})
     text = path.read_text()
     assert text.startswith("before\n## smoke\n")
     assert "8 cases: **1** invalid, **2** differ, **1** inconclusive" in text
@@ -159,7 +159,7 @@ def test_the_summary_has_every_case_the_worst_first(tmp_path):
 
 def test_nothing_in_the_summary_is_markup(tmp_path):
     path = tmp_path / "summary.md"
-    github.summarise([case("differ", NASTY, NASTY)], path, NASTY)
+    ci.summarise([case("differ", NASTY, NASTY)], path, NASTY)
     *_, row = path.read_text(encoding="utf-8").rstrip().split("\n")
     assert len(re.findall(r"(?<!\\)\|", row)) == 4
     assert not re.search(r"(?<!\\)[<`*@\[]", row)
@@ -169,31 +169,31 @@ def test_a_long_summary_says_what_it_drops(tmp_path):
     path = tmp_path / "summary.md"
     path.write_text("x" * 500_000)
     cases = [case("differ", f"s{k:05}", "é" * 2000) for k in range(3000)]
-    github.summarise(cases, path, "smoke")
+    ci.summarise(cases, path, "smoke")
     text = path.read_text(encoding="utf-8")
-    assert len(text.encode()) <= github.MOST_BYTES
+    assert len(text.encode()) <= ci.MOST_BYTES
     kept = len(re.findall(r"^\| s\d+ \|", text, re.MULTILINE))
     assert 100 < kept < 3000
     assert f"{3000 - kept} more cases are not shown" in text
     assert "| s00000 |" in text
     before = path.read_text(encoding="utf-8")
-    path.write_text("x" * github.MOST_BYTES)
-    github.summarise(cases, path, "smoke")
-    assert path.read_text() == "x" * github.MOST_BYTES
+    path.write_text("x" * ci.MOST_BYTES)
+    ci.summarise(cases, path, "smoke")
+    assert path.read_text() == "x" * ci.MOST_BYTES
     assert before
 
 
 def test_a_summary_that_cannot_be_written_is_reported(tmp_path):
     with pytest.raises(ImageError, match="cannot be written"):
-        github.summarise(EVERY, tmp_path, "smoke")
+        ci.summarise(EVERY, tmp_path, "smoke")
 
 
 def test_github_is_known_by_its_environment(monkeypatch):
     monkeypatch.delenv("GITHUB_ACTIONS", raising=False)
     monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)
-    assert not github.is_there()
-    assert github.summary_path() is None
+    assert not ci.is_there()
+    assert ci.summary_path() is None
     monkeypatch.setenv("GITHUB_ACTIONS", "true")
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", "/x/y")
-    assert github.is_there()
-    assert str(github.summary_path()) == "/x/y"
+    assert ci.is_there()
+    assert str(ci.summary_path()) == "/x/y"

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from comparisons.report.results_json import SCHEMA, write_results
+from comparisons.report.page import SCHEMA, write_results
 from comparisons.results.case import Case, Cause, ImageRegion, Metrics, RungResult
 
 

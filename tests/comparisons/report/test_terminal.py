@@ -8,10 +8,10 @@ from bench_rows import made_up
 from rich.console import Console
 from rich.text import Text
 
-from comparisons.experiments.bench import table as bench_table
+from comparisons.experiments.bench import run as bench_table
 from comparisons.report.terminal import MOST_LINES, console, fitted
 from comparisons.results.case import Case, Cause, RungResult
-from comparisons.suites.display import summarise
+from comparisons.suites.run import summarise
 
 
 def printed(what, width):
@@ -84,7 +84,7 @@ def test_a_pipe_obeys_columns(columns, width, monkeypatch, capsys):
 
 def test_the_bench_at_80_columns():
     rows = [made_up(name, ratio) for name, ratio in (("one", 0.5), ("another row", 3.0))]
-    lines = printed(bench_table.terminal(rows, 80), 80)
+    lines = printed(bench_table.terminal_table(rows, 80), 80)
     assert all(len(line) <= 80 for line in lines)
     assert len(lines) <= MOST_LINES * (len(rows) + 1)
 

@@ -2,8 +2,7 @@
 
 import pytest
 
-from comparisons.results.case import Case, Metrics, RungResult
-from comparisons.results.verdict import decide, exit_code
+from comparisons.results.case import Case, Metrics, RungResult, decide, exit_code
 
 METRICS = Metrics(1.0, 0.0, 60.0, 0.0, 0.0, (0.0, 0.0, 0.0), 0)
 

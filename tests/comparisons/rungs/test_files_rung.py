@@ -15,12 +15,12 @@ from mesh_writers import FACES, POINTS, SQUARE, TRIANGLES, XYZ, Gltf, binary_stl
 from comparisons.experiments.fuzz import random_files
 from comparisons.rungs import files
 from reference_rt.core import transform
-from reference_rt.core.image_files import hdr
+from reference_rt.core.image_files import float_files
 from reference_rt.lights.emitters import environment_map
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Cylinder, Sphere, Torus, instances, shape
 from reference_rt.shapes.meshes import mesh as meshes
-from reference_rt.shapes.meshes import vertex_normals
+from reference_rt.shapes.meshes import topology
 from reference_rt.textures import image_file
 
 Patch = pytest.MonkeyPatch
@@ -62,8 +62,8 @@ def _normals_by_the_matrix(m: Any, normals: Any) -> Any:
 
 
 def _half_a_mantissa(patch: Patch) -> None:
-    right = hdr._radiance
-    patch.setattr(hdr, "_radiance", lambda rgbe, middle: right(rgbe, 0.5))
+    right = float_files._radiance
+    patch.setattr(float_files, "_radiance", lambda rgbe, middle: right(rgbe, 0.5))
 
 
 PLANTED: dict[str, tuple[str, Callable[[Patch], None], str]] = {
@@ -246,13 +246,13 @@ def test_smooth_normals(tmp_path: Path, monkeypatch: Patch) -> None:
     scene = parsed(tmp_path, shapes=[{**mesh, "transform": [{"scale": [1, -2, 0.5]}]}])
     right = files(scene)
     assert right.status == "agree", right.reason
-    by_angle = vertex_normals._normals_and_angles
+    by_angle = topology._normals_and_angles
 
     def equally(corners: Any) -> Any:
         normals, angles = by_angle(corners)
         return normals, np.ones_like(angles)
 
-    monkeypatch.setattr(vertex_normals, "_normals_and_angles", equally)
+    monkeypatch.setattr(topology, "_normals_and_angles", equally)
     assert "has the normal" in files(scene).reason
 
 

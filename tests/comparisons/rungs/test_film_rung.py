@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from comparisons.rungs.film import film
-from reference_rt.cameras.filters import (
+from reference_rt.cameras.film import (
     CatmullRomFilter,
     Filter,
     GaussianFilter,

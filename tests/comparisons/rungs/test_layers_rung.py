@@ -12,8 +12,7 @@ from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.translate import load
 from comparisons.rungs import layers
 from comparisons.rungs.layers import rung
-from reference_rt.cameras.film import Film
-from reference_rt.cameras.filters import BoxFilter, MitchellFilter
+from reference_rt.cameras.film import BoxFilter, Film, MitchellFilter
 from reference_rt.integrators import RayCast
 from reference_rt.rendering import render as rendering
 from reference_rt.rendering.scene import Scene

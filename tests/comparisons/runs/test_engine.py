@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from comparisons.runs import engine
-from comparisons.runs.processes.pool import _Turns
+from comparisons.runs.processes import _Turns
 
 
 @dataclass(frozen=True)

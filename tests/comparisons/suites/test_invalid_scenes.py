@@ -6,7 +6,7 @@ import pytest
 from junitparser import JUnitXml
 from suite_runs import RAY_CAST, run_in, scenes
 
-from comparisons.results.verdict import exit_code
+from comparisons.results.case import exit_code
 from comparisons.suites.keys import files_digest
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneError

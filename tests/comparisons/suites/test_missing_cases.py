@@ -14,11 +14,9 @@ from junitparser import JUnitXml
 from report_page import case
 from suite_runs import processes, run_in, scenes, signal_in_the_next_case
 
-from comparisons.report import write_report
-from comparisons.report.ci import github, junit
-from comparisons.results.case import RungResult, how_many
-from comparisons.results.verdict import exit_code
-from comparisons.suites.display import summarise
+from comparisons.report import ci, write_report
+from comparisons.results.case import RungResult, exit_code, how_many
+from comparisons.suites.run import summarise
 
 pytestmark = pytest.mark.usefixtures("fake_runners")
 
@@ -53,7 +51,7 @@ def test_the_page(tmp_path):
 
 
 def test_junit(tmp_path):
-    junit.write(tmp_path / "junit.xml", RAN, "smoke", missing=MISSING)
+    ci.write_junit(tmp_path / "junit.xml", RAN, "smoke", missing=MISSING)
     (suite,) = JUnitXml.fromfile(str(tmp_path / "junit.xml"))
     assert (suite.tests, suite.errors, suite.failures, suite.skipped) == (4, 2, 0, 0)
     (error,) = {test.name: test for test in suite}["<c>"].result
@@ -61,17 +59,17 @@ def test_junit(tmp_path):
 
 
 def test_github(tmp_path):
-    github.summarise(RAN, tmp_path / "summary.md", "smoke", missing=MISSING)
+    ci.summarise(RAN, tmp_path / "summary.md", "smoke", missing=MISSING)
     summary = (tmp_path / "summary.md").read_text(encoding="utf-8")
     assert "2 of 4 cases run: **2** agree" in summary
     assert "| \\<c\\> | ❌ missing | the run was interrupted before this case |" in summary
     stream = io.StringIO()
-    github.annotate(RAN, stream, missing=MISSING)
+    ci.annotate(RAN, stream, missing=MISSING)
     assert stream.getvalue() == "::error title=2 of 4 cases run::Missing: <c>, d\n"
     stream = io.StringIO()
     many = [case("differ", f"s{k:02d}") for k in range(20)]
-    github.annotate(many, stream, missing=MISSING)
-    assert stream.getvalue().count("::error") == github.MOST_ANNOTATIONS
+    ci.annotate(many, stream, missing=MISSING)
+    assert stream.getvalue().count("::error") == ci.MOST_ANNOTATIONS
 
 
 def test_the_terminal(capsys):
@@ -88,7 +86,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background
 from dataclasses import replace
 import typer
 from comparisons.commands.compare import compare
-from comparisons.commands.suite import suite
+from comparisons.commands.compare import suite
 from comparisons.mitsuba.backend import Backend
 from comparisons.suites import run
 run.backend = lambda: Backend("llvm_ad_rgb", "0", "", None)

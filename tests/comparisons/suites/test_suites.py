@@ -7,8 +7,8 @@ from suite_runs import NOISY, RAY_CAST, SCENES, processes, run_in, scenes, suite
 
 from comparisons.compare.budget import Budget
 from comparisons.mitsuba.backend import Backend
+from comparisons.results.case import exit_code
 from comparisons.results.stored_case import read_case
-from comparisons.results.verdict import exit_code
 from comparisons.suites.keys import case_key, files_digest
 from comparisons.suites.suite import BUILT_IN, Changes, load_suite, parse_suite, plan
 from reference_rt.rendering.scene import Scene

@@ -10,9 +10,9 @@ import pytest
 from suite_runs import processes, run_in, scenes, signal_in_the_next_case
 
 from comparisons.compare.budget import Budget
+from comparisons.results.case import exit_code
 from comparisons.results.stored_case import read_case, read_stored_case
-from comparisons.results.verdict import exit_code
-from comparisons.runs.processes import child, pool
+from comparisons.runs import processes as children
 from comparisons.suites import run
 from comparisons.suites.run import read_stored_results
 from comparisons.suites.worker import Request
@@ -62,7 +62,7 @@ def test_a_process_that_hangs_is_ended(tmp_path):
 
 @pytest.mark.slow
 def test_processes_are_shared_out(tmp_path, monkeypatch):
-    monkeypatch.setattr(child, "MOST_CASES", 2)
+    monkeypatch.setattr(children, "MOST_CASES", 2)
     names = [f"slow{k}" for k in range(2)] + [f"z{k}" for k in range(3)]
     folder = scenes(tmp_path / "scenes", *names)
     found = run_in(tmp_path / "out", folder, workers=Threads(2), threads=3)
@@ -80,7 +80,7 @@ def test_where_no_case_can_run_nothing_is_said_of_any(tmp_path):
     request = Request(name="a", scene=folder / "a.yaml", budget=Budget(), folder=tmp_path)
     worker = ("comparisons.suites.worker", "--runner", "no_such_module:f")
     with pytest.raises(ReferenceUnavailableError, match="no_such_module"):
-        list(pool.run([request], Threads(1), 60.0, lambda *_: None, worker))
+        list(children.run([request], Threads(1), 60.0, lambda *_: None, worker))
 
 
 INTERRUPTED = """

@@ -175,7 +175,7 @@ def test_cases_that_fail_on_a_cluster(machines, tmp_path, monkeypatch):
     assert [c.rungs[0].numbers for c in again.cases if c.verdict == "agree"] == [
         c.rungs[0].numbers for c in found.cases if c.verdict == "agree"
     ]
-    monkeypatch.setattr("comparisons.runs.processes.pool.everything_fingerprint", lambda: "other")
+    monkeypatch.setattr("comparisons.runs.processes.everything_fingerprint", lambda: "other")
     with pytest.raises(WorkersError, match="has other sources"):
         whole(tmp_path / "more", folder, cluster, RUNNER)
     cluster.close()

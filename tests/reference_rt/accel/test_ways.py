@@ -16,12 +16,13 @@ from reference_rt.accel.packet import PACKET_SIZE, SPAN_FLOATS, packet_of
 from reference_rt.accel.packet_traversal import enter_packet
 from reference_rt.accel.single_ray import enter, slab_ray_of
 from reference_rt.core import transform
-from reference_rt.core.ray import BLOCK, Ray
-from reference_rt.core.ray_block import (
+from reference_rt.core.ray import (
+    BLOCK,
     HIT_FLOATS,
     HIT_INTEGERS,
     RAY_FLOATS,
     HitBlock,
+    Ray,
     RayBlock,
     put_ray,
     ray_of,

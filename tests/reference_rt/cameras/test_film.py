@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import reference_rt as rt
-from reference_rt.cameras.filters import film_offset
+from reference_rt.cameras.film import film_offset
 from reference_rt.core import transform
 
 EVERY = [

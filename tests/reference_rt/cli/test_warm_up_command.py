@@ -15,7 +15,7 @@ from builders import SCENES
 from rich.console import Console
 
 import reference_rt as rt
-from reference_rt.cli.explain_kernels import kernels_of
+from reference_rt.cli.explain import kernels_of
 from reference_rt.cli.warm_up import CountBar
 from reference_rt.rendering.kernels import cost
 from reference_rt.rendering.warm_up import linked_calls, picture_calls

@@ -24,6 +24,10 @@ from reference_rt.jit.kernel import entry_kernel
 def halve(x):
     x[0] *= 0.5
 
+@entry_kernel
+def double(x):
+    x[0] *= 2.0
+
 def run():
     x = np.ones(1)
     halve(x)
@@ -163,3 +167,46 @@ def test_what_others_compile_is_found_in_the_cache(tmp_path):
             check=True,
         )
         assert done.stdout.strip() == f"{[before] * 2} some [-6.]"
+
+
+_HELD = """
+import time
+from reference_rt.jit import parallel_compile
+from reference_rt.jit.kernel import signature_of
+
+def noting(kernel, name, until):
+    compile_it = kernel._compiler.compile
+
+    def compile(*types):
+        print(name, flush=True)
+        while until and not Path(until).exists():
+            time.sleep(0.01)
+        return compile_it(*types)
+
+    kernel._compiler.compile = compile
+
+noting(halve, "halve", HOLD)
+noting(double, "double", None)
+parallel_compile.may_fork = lambda: False
+calls = [(kernel, signature_of(np.ones(1))) for kernel in (halve, double)]
+parallel_compile.precompile_all(calls, 2)
+run()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no locks")
+@pytest.mark.parametrize("is_killed", [False, True])
+def test_what_another_process_compiles_is_waited_for(is_killed, start, tmp_path):
+    """The second process begins with the kernel that the first one is not at.  If the first one is
+    killed, the second compiles that, too."""
+    first = start(_HELD.replace("HOLD", "'release'"))
+    assert first.stdout.readline() == "halve\n"  # it holds
+    second = start(_HELD.replace("HOLD", "None"))
+    assert second.stdout.readline() == "double\n"
+    if is_killed:
+        first.kill()
+        first.wait()
+    else:
+        (tmp_path / "release").touch()
+        assert _done(first) == (0, "")  # it finds `double` in the cache
+    assert _done(second) == (0, "halve" if is_killed else "")

@@ -13,8 +13,7 @@ import reference_rt.rendering  # noqa: F401 -- imports all operations
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Hit, Ray
 from reference_rt.core.vec3 import Vec3
-from reference_rt.jit.links import LINK, Group, Link
-from reference_rt.jit.operation_types import declare, type_of
+from reference_rt.jit.links import LINK, Group, Link, declare, type_of
 from reference_rt.shapes import Shapes
 
 import_everything()
@@ -101,8 +100,8 @@ def test_all_groups_are_found():
     """One of each kind, at least."""
     found = {name.rpartition(".")[0].removeprefix("reference_rt.") for name in GROUPS}
     assert found >= {
-        *("shapes.tables", "accel.geometry", "materials.bsdfs.tables", "lights.selection.tree"),
-        *("materials.nested.flattened", "cameras", "cameras.filters", "textures.lookup"),
+        *("shapes.tables", "accel.geometry", "materials.bsdfs.tables", "lights.selection.choice"),
+        *("materials.nested.flattened", "cameras", "cameras.film", "textures.lookup"),
     }
     assert len(OPERATIONS) > 40
 

@@ -10,9 +10,9 @@ from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.lights.emitters.point import Point
 from reference_rt.lights.emitters.spot import Spot
-from reference_rt.lights.selection import tree as light_tree
+from reference_rt.lights.selection import choice as light_tree
 from reference_rt.lights.selection.bounds import LightBounds, of_points, of_spots
-from reference_rt.lights.selection.tree import build
+from reference_rt.lights.selection.choice import build
 
 U = 2.0**-53
 ANY_SIDE = np.zeros(3)
@@ -21,13 +21,13 @@ ANY_SIDE = np.zeros(3)
 @entry_kernel
 def _probabilities(tree, p, n, out):
     for k in range(len(out)):
-        out[k] = light_tree.probability(tree, row(p, 0), row(n, 0), k)
+        out[k] = light_tree.probability_in_tree(tree, row(p, 0), row(n, 0), k)
 
 
 @entry_kernel
 def _picks(tree, p, n, u, light, probability):
     for k in range(len(u)):
-        light[k], probability[k] = light_tree.pick(tree, row(p, 0), row(n, 0), u[k])
+        light[k], probability[k] = light_tree.pick_in_tree(tree, row(p, 0), row(n, 0), u[k])
 
 
 def probabilities(tree, p, n):

@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 
 from reference_rt.core.vec3 import Vec3, luminance, to_local
 from reference_rt.jit.kernel import entry_kernel
-from reference_rt.materials.frame import oriented_frame
-from reference_rt.materials.nested import bump, normal_map
-from reference_rt.materials.nested.bump import Bump
-from reference_rt.materials.nested.normal_map import NormalMap
+from reference_rt.materials.material import oriented_frame
+from reference_rt.materials.nested import tilted
+from reference_rt.materials.nested.tilted import Bump, NormalMap
 from reference_rt.shapes.shape import Tangents
 from reference_rt.textures.bitmap import table_of
 from reference_rt.textures.checker import Checkers
@@ -48,12 +47,12 @@ def ramp(along_u, along_v, n=8):
 
 def bumped(textures, tangents, u=0.5, v=0.4, scale=1.0):
     table = Bump(base="b", height="t", scale=scale).tabulate(PALETTE)
-    return bump.basis(table, 0, at(textures, u, v), tangents, UP)
+    return tilted.bump_basis(table, 0, at(textures, u, v), tangents, UP)
 
 
 def mapped(textures, tangents, u=0.5, v=0.4):
     table = NormalMap(base="b", normals="t").tabulate(PALETTE)
-    return normal_map.basis(table, 0, at(textures, u, v), tangents, UP)
+    return tilted.map_basis(table, 0, at(textures, u, v), tangents, UP)
 
 
 def assert_basis(frame, n):
@@ -146,7 +145,7 @@ def test_frames_for_any_tangents(dpdu, dpdv, slope, power):
     size = math.ldexp(1.0, power)
     tangents = Tangents(dpdu * size, dpdv * size)
     with np.errstate(all="ignore"):
-        n = bump.tilted(slope.x, slope.y, tangents)
+        n = tilted.tilted(slope.x, slope.y, tangents)
         frame = bumped(texture(ramp(*slope[:2])), tangents)
     assert abs(math.hypot(*n) - 1.0) <= 8 * U
     assert_basis(frame, frame.n)
@@ -170,7 +169,7 @@ def test_against_the_surface_itself():
         world = Tangents(Vec3(*e[0]), Vec3(*e[1]))
         frame = oriented_frame(Vec3(*n), world)
         local = Tangents(to_local(frame, world.dpdu), to_local(frame, world.dpdv))
-        found = np.array(bump.tilted(s, t, local)) @ np.array(frame)
+        found = np.array(tilted.tilted(s, t, local)) @ np.array(frame)
         condition = np.linalg.norm(e[0]) * np.linalg.norm(e[1]) / np.linalg.norm(np.cross(*e))
         np.testing.assert_allclose(found, raised, rtol=0, atol=64 * U * condition)
 
@@ -202,7 +201,7 @@ def test_normal_maps_that_change_nothing():
 def _bases(bumps, maps, textures, u, v, tangents, out):
     at = At(textures, u, v, Vec3(-1.0, -1.0, -1.0))
     for k, frame in enumerate(
-        (bump.basis(bumps, 0, at, tangents, UP), normal_map.basis(maps, 0, at, tangents, UP))
+        (tilted.bump_basis(bumps, 0, at, tangents, UP), tilted.map_basis(maps, 0, at, tangents, UP))
     ):
         out[k, 0], out[k, 1], out[k, 2] = frame.s
         out[k, 3], out[k, 4], out[k, 5] = frame.t

@@ -12,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from reference_rt.core.vec3 import Vec3, dot
 from reference_rt.jit.kernel import entry_kernel
-from reference_rt.materials.bsdfs.rough import Rough
+from reference_rt.materials.bsdfs.rough_conductor import Rough
 from reference_rt.materials.microfacet import ggx_and_smith
 from reference_rt.materials.microfacet.ggx_and_smith import (
     BECKMANN,

@@ -11,11 +11,11 @@ from builders import SCENES, every_law, every_light, every_shape
 import reference_rt as rt
 from reference_rt.accel.geometry import Geometry, geometries
 from reference_rt.cameras import views
-from reference_rt.cameras.filters import film_filters
+from reference_rt.cameras.film import film_filters
 from reference_rt.integrators import INTEGRATORS
 from reference_rt.jit.links import LINK
 from reference_rt.lights.dispatch import by_code as lights
-from reference_rt.lights.selection.tree import light_trees
+from reference_rt.lights.selection.choice import light_trees
 from reference_rt.materials.bsdfs.tables import by_code as bsdfs
 from reference_rt.materials.nested.flattened import FlattenedMaterials, flattened_materials
 from reference_rt.rendering import kernels

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mesh_writers import POINTS, Gltf, changed, corners, read, written
 
-from reference_rt.shapes.meshes.files import join, read_mesh
+from reference_rt.shapes.meshes.files import data, read_mesh
 
 
 def test_gltf(tmp_path):
@@ -127,7 +127,7 @@ def test_gltf_buffers_are_files_in_its_folder(tmp_path, uri):
 
 
 def test_instances_do_not_fill_the_memory(tmp_path, monkeypatch):
-    monkeypatch.setattr(join, "LIMIT", 99)
+    monkeypatch.setattr(data, "LIMIT", 99)
     content = {
         n: changed(
             lambda f, n=n: f.root.update(

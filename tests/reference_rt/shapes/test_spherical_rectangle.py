@@ -12,17 +12,16 @@ from reference_rt.core import transform
 from reference_rt.core.ray import SurfacePoint
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel
-from reference_rt.shapes.flat import rectangle, spherical_rectangle
-from reference_rt.shapes.flat.rectangle import Rectangle
-from reference_rt.shapes.flat.spherical_rectangle import solid_angle_of
+from reference_rt.shapes.flat import rectangle
+from reference_rt.shapes.flat.rectangle import Rectangle, solid_angle_of
 from reference_rt.shapes.shape import TabulationContext
 
 
 @entry_kernel
 def _points(h, sides, u, out):
-    seen = spherical_rectangle.project(h, sides[0], sides[1], sides[2], sides[3])
+    seen = rectangle.project(h, sides[0], sides[1], sides[2], sides[3])
     for k in range(len(u)):
-        out[k, 0], out[k, 1] = spherical_rectangle.sample(seen, u[k, 0], u[k, 1])
+        out[k, 0], out[k, 1] = rectangle.sample_seen(seen, u[k, 0], u[k, 1])
 
 
 @entry_kernel
@@ -84,7 +83,7 @@ def exact_solid_angle(h, x0, x1, y0, y1):
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_solid_angle(case):
-    found = spherical_rectangle.project(*case).solid_angle
+    found = rectangle.project(*case).solid_angle
     # Four angles of at most pi/2, each right to some u, and the sums of them.  Close above the
     # middle the triangles' denominators cancel, by at most length over height.
     cancels = max(abs(x) for x in case[1:]) / case[0]
@@ -117,9 +116,9 @@ def strip(h, x, y0, y1):
 def test_points_are_where_their_share_of_the_solid_angle_ends(name):
     """u0 is the share of the rectangle's solid angle up to x, by quadrature."""
     h, x0, x1, y0, y1 = CASES[name]
-    seen = spherical_rectangle.project(*CASES[name])
+    seen = rectangle.project(*CASES[name])
     for u0 in (0.0, 0.1, 0.5, 0.9, 1.0):
-        x, y = spherical_rectangle.sample(seen, u0, 0.5)
+        x, y = rectangle.sample_seen(seen, u0, 0.5)
         assert x0 <= x <= x1
         assert y0 <= y <= y1
         below = strip(h, x, y0, y1) - strip(h, x0, y0, y1)
@@ -135,7 +134,7 @@ def test_points_are_uniform_in_solid_angle():
     p_values = []
     for h, x0, x1, y0, y1 in (CASES[name] for name in PLAIN):
         corner, size = np.array([x0, y0]), np.array([x1 - x0, y1 - y0])
-        whole = spherical_rectangle.project(h, x0, x1, y0, y1).solid_angle
+        whole = rectangle.project(h, x0, x1, y0, y1).solid_angle
         q = np.empty((len(u), 2))
         _points(h, np.array([x0, x1, y0, y1]), u, q)
 

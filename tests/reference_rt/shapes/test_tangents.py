@@ -16,7 +16,7 @@ from reference_rt.core import transform
 from reference_rt.core.ray import Hit, Ray
 from reference_rt.core.vec3 import Vec3, frame_from_normal, normalize, row
 from reference_rt.jit.kernel import entry_kernel
-from reference_rt.materials.frame import frame_along, oriented_frame
+from reference_rt.materials.material import frame_along, oriented_frame
 from reference_rt.shapes import TABLES
 from reference_rt.shapes.meshes import triangle
 from reference_rt.shapes.shape import Tangents

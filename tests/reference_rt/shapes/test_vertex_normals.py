@@ -7,8 +7,8 @@ from mesh_writers import ascii_stl, binary_stl
 
 import reference_rt as rt
 from reference_rt.core import transform
+from reference_rt.shapes.meshes.topology import smooth_normals
 from reference_rt.shapes.meshes.triangle_table import geometric_normals
-from reference_rt.shapes.meshes.vertex_normals import smooth_normals
 from reference_rt.shapes.shape import TabulationContext
 
 EPS = np.finfo(float).eps

@@ -32,7 +32,7 @@ from reference_rt.core.arrays import IntArray
 from reference_rt.core.transform import Transform, rotate
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.shapes import Cone, Cylinder, Quadric, Sphere, Torus
-from reference_rt.shapes.brute_force_table import intersect_row
+from reference_rt.shapes.brute_force import intersect_row
 from reference_rt.shapes.curved.quadrics import Quadrics
 from reference_rt.shapes.curved.torus import Tori
 from reference_rt.shapes.shape import Shape, TabulationContext

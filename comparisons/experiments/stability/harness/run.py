@@ -26,7 +26,7 @@ from comparisons.experiments.stability.harness.core import (
 )
 from comparisons.mitsuba.backend import backend
 from comparisons.runs import engine
-from comparisons.runs.processes.protocol import serve
+from comparisons.runs.processes import serve
 from comparisons.runs.provenance import everything_fingerprint
 from reference_rt.util.errors import ReferenceUnavailableError, SceneWarning
 from reference_rt.util.files import replacing, temporary_folder

@@ -33,8 +33,8 @@ from reference_rt.rendering.picture import Picture, provenance
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
-from reference_rt.util.child_processes import tied
 from reference_rt.util.errors import ImageError
+from reference_rt.util.processes import tied
 
 # Hostile cases in processes of their own: one that dies is replaced, and the others go on.
 #

@@ -55,7 +55,7 @@ from comparisons.experiments.stability.metamorphic.rays import Outcomes
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.frame import round32
 from comparisons.geometry.vectors import unit_rows
-from reference_rt.shapes.csg.anchor import FAR
+from reference_rt.shapes.csg import FAR
 from reference_rt.util.files import temporary_folder
 
 # ---- the motions of the series -------------------------------------------------------------------

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from reference_rt.shapes.meshes.files import gltf, obj, off, other, ply, stl
+from reference_rt.shapes.meshes.files import gltf, obj, other, ply
 from reference_rt.shapes.meshes.files.data import MeshData, RawMesh, checked
 from reference_rt.util.files import read_input
 
@@ -34,8 +34,8 @@ Reader = Callable[[bytes, Path], RawMesh]
 _READERS: dict[str, Reader] = {
     ".obj": lambda content, folder: obj.read(content),
     ".ply": lambda content, folder: ply.read(content),
-    ".stl": lambda content, folder: stl.read(content),
-    ".off": lambda content, folder: off.read(content),
+    ".stl": lambda content, folder: other.read_stl(content),
+    ".off": lambda content, folder: other.read_off(content),
     ".glb": gltf.read_glb,
     ".gltf": gltf.read_gltf,
 }

@@ -17,8 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from reference_rt.core import transform
-from reference_rt.shapes.meshes.files.data import RawMesh
-from reference_rt.shapes.meshes.files.join import joined
+from reference_rt.shapes.meshes.files.data import RawMesh, joined
 from reference_rt.shapes.meshes.files.polygons import fans
 from reference_rt.util.files import read_input
 from reference_rt.util.memory import check_unpacked

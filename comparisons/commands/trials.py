@@ -1,0 +1,389 @@
+"""Commands that look for faults of the harness and of both renderers: `reference-rt selftest`,
+`stability` and `fuzz`.
+"""
+
+import os
+import re
+from collections.abc import Callable
+from contextlib import closing
+from fnmatch import fnmatchcase
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from comparisons.commands.options import (
+    ClusterFile,
+    Fresh,
+    JUnit,
+    NumberOfWorkers,
+    Scenes,
+    Scheduler,
+    compare_extra,
+    out_folder,
+    table_in,
+)
+from reference_rt.cli.guarded import guarded, say
+from reference_rt.util.errors import UsageError
+from reference_rt.util.workers import Workers
+
+
+@guarded
+def selftest(
+    out: Annotated[Path, out_folder("selftest.json and selftest.md")] = Path("out"),
+    only: Annotated[
+        list[str] | None, typer.Option(help="Only faults whose names match this pattern.")
+    ] = None,
+    seeds: Annotated[int, typer.Option(min=0, help="Runs of each kind of right renderer.")] = 1000,
+    power: Annotated[
+        bool, typer.Option(help="Measure how often biases of each size are caught.")
+    ] = True,
+    mutants: Annotated[
+        int,
+        typer.Option(min=0, help="In place of all that: so many random changes of the kernels."),
+    ] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random changes.")] = 0,
+    scenes: Scenes = Path("scenes"),
+    workers: NumberOfWorkers = None,
+    scheduler: Scheduler = None,
+    cluster: ClusterFile = None,
+) -> None:
+    """Test the harness: plant faults and check that the suites catch them; count false alarms."""
+    from reference_rt.cli.render_options import Where
+    from reference_rt.util.workers import Processes
+
+    where = Where(workers, scheduler, cluster)
+
+    def opened() -> Workers:
+        return where.open(Processes, os.cpu_count() or 1)
+
+    if mutants:
+        _mutate(mutants, seed, scenes, out, opened)
+        return
+    from rich.console import Console
+
+    from comparisons.experiments.selftest import FAULTS
+    from comparisons.experiments.selftest.run import SUITES, run
+    from reference_rt.util.files import check_writable
+
+    patterns = only or ["*"]
+    faults = [f for f in FAULTS if any(fnmatchcase(f.name, pattern) for pattern in patterns)]
+    if not faults:
+        raise UsageError(f"--only: no fault matches {', '.join(patterns)}")
+    files = out / "selftest.json", out / "selftest.md"
+    check_writable(*files)
+    console = Console(stderr=True, highlight=False)
+
+    def say(line: str) -> None:
+        console.print(line, markup=False, soft_wrap=True)
+
+    with closing(opened()) as some:
+        outcome = run(faults, scenes, seeds, out, say, power, some)
+    for suite in SUITES:
+        caught, total = outcome.share(suite)
+        say(f"{suite}: {caught} of {total} faults caught")
+    for alarms in outcome.alarms:
+        if not alarms.holds:
+            say(f"{alarms.kind}, {alarms.name}: {alarms.false_alarms} false alarms")
+    say(", ".join(map(str, files)))
+    raise typer.Exit(0 if outcome.holds else 1)
+
+
+def _mutate(count: int, seed: int, scenes: Path, out: Path, opened: Callable[[], Workers]) -> None:
+    """Mutation testing; writes what is known after each mutant."""
+    from rich.console import Console
+
+    from comparisons.experiments.selftest.mutation import FILES, mutation, summary, write
+    from comparisons.experiments.selftest.run import SUITES, budgets_of
+    from reference_rt.util.files import check_writable
+
+    check_writable(*(out / name for name in FILES))
+    console = Console(stderr=True, highlight=False)
+
+    def say(line: str) -> None:
+        console.print(line, markup=False, soft_wrap=True)
+
+    by_suite = budgets_of(scenes)
+    budgets = {suite: by_suite[suite] for suite in reversed(SUITES)}  # the small one first
+    fates = []
+    with closing(opened()) as workers:
+        for fate in mutation(count, seed, scenes, budgets, say, workers):
+            fates.append(fate)
+            where = f" ({fate.by}, {fate.rung}, {fate.scene})" if fate.rung else ""
+            say(f"{fate.file}:{fate.line} {fate.what}: {fate.outcome}{where}")
+            write(fates, seed, out)
+    say(summary(fates))
+
+
+@guarded
+def stability(
+    out: Annotated[Path, out_folder("results and the page", "DIR")] = Path("out/stability"),
+    family: Annotated[
+        list[str] | None, typer.Option(help="Only this family, F1 to F14: repeat for several.")
+    ] = None,
+    full: Annotated[
+        bool, typer.Option("--full/--quick", help="All settings: about 20 minutes instead of 2.")
+    ] = False,
+    series: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Only this series; needs one --family.")
+    ] = None,
+    at: Annotated[
+        float | None, typer.Option(metavar="X", help="Only this setting; needs --series.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all random scenes and rays.")] = 1,
+    workers: NumberOfWorkers = None,
+    scheduler: Scheduler = None,
+    cluster: ClusterFile = None,
+    mitsuba: Annotated[
+        bool, typer.Option("--mitsuba/--no-mitsuba", help="Measure Mitsuba too.")
+    ] = True,
+    fresh: Fresh = False,
+    markdown: Annotated[Path | None, table_in("stability")] = None,
+) -> None:
+    """Find where reference_rt and Mitsuba fail as scenes become extreme.
+
+    Exact arithmetic and closed forms decide which answer is right.
+    """
+    with compare_extra():
+        from comparisons.experiments.stability.harness import outputs
+        from comparisons.experiments.stability.harness.core import MODULES, Effort, summaries
+        from comparisons.experiments.stability.harness.core import family as family_of
+        from comparisons.experiments.stability.harness.run import (
+            Choice,
+            mitsuba_is_there,
+            run,
+            shoot,
+        )
+        from comparisons.report import templates, terminal
+        from comparisons.runs.provenance import ours, provenance
+
+        import_module("matplotlib")  # before minutes of measuring that the page then cannot show
+    from reference_rt.cli.render_options import Where
+    from reference_rt.util.files import check_writable
+    from reference_rt.util.workers import Threads
+
+    names = tuple(dict.fromkeys(family or MODULES))
+    if unknown := [name for name in names if name not in MODULES]:
+        raise UsageError(f"--family: expected one of {', '.join(MODULES)}, got '{unknown[0]}'")
+    if series is not None:
+        if len(names) > 1:
+            raise UsageError("--series: expected one --family with it")
+        known = family_of(names[0]).by_name
+        if series not in known:
+            raise UsageError(f"--series: expected one of {', '.join(known)}, got '{series}'")
+    if at is not None and series is None:
+        raise UsageError("--at: expected a --series with it")
+    page = out / "stability.html"
+    kept = out / "settings" / "a setting", out / "pictures" / "a picture"
+    check_writable(out / "results.json", out / "results.csv", page, *kept)
+    if markdown is not None:
+        templates.check(markdown, "stability")
+    missing = mitsuba_is_there() if mitsuba else "not asked"
+    effort: Effort = "full" if full else "quick"
+    choice = Choice(names, effort, seed, series, at, not missing)
+    facts = provenance() if not missing else ours() | {"mitsuba": f"takes no part: {missing}"}
+    where = Where(workers, scheduler, cluster)
+    with (
+        closing(where.open(Threads, os.cpu_count() or 1)) as opened,
+        outputs.Display(len(choice.settings())) as display,
+    ):
+        display.line(f"seed {seed}; Mitsuba {facts['mitsuba']}")
+        found = run(choice, out, opened, display.done, fresh)
+        outputs.write_results(out, found, effort, seed, facts)
+        display.line("pictures and page")
+        pictures = shoot(choice, found, out, opened)
+        outputs.write_page(page, found, pictures, effort, seed, facts)
+    console = terminal.console()
+    console.print(outputs.terminal(found, console.width))
+    if markdown is not None:
+        templates.rewrite(markdown, "stability", outputs.markdown(found, effort, seed, facts))
+    holds = True
+    for one in (s for some in summaries(found).values() for s in some):
+        holds &= one.holds
+        for f in one.found:
+            if f.broken or f.x in one.failed:
+                say(f"again: {outputs.again(f, effort, seed)}", err=True)
+                for example in f.ours.examples if f.ours else ():
+                    say(f"  {dict(example)}", err=True)
+    say(f"{out / 'results.json'}, results.csv, stability.html", err=True)
+    raise typer.Exit(0 if holds else 1)
+
+
+@guarded
+def fuzz(
+    count: Annotated[
+        int | None, typer.Option(min=1, help="Scenes to check. (default: 100, or until --time)")
+    ] = None,
+    time: Annotated[
+        str | None,
+        typer.Option(metavar="DURATION", help="Begin scenes for so long: 90s, 10m or 2h."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all scenes.")] = 0,
+    first: Annotated[int, typer.Option(min=0, help="Number of the first scene.")] = 0,
+    rungs: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Only these, comma-separated: render, identities, files, film, geometry, direct, "
+            "whitted, layers, statistics.  `files` alone: random files of every format.",
+        ),
+    ] = None,
+    features: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Types or groups of types that every scene has, comma-separated: csg,glass,torus.",
+        ),
+    ] = None,
+    extreme: Annotated[
+        bool, typer.Option("--extreme", help="Also scenes that are far, tiny or thin.")
+    ] = False,
+    scene: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="Check this scene instead: repeat for several."),
+    ] = None,
+    rays: Annotated[
+        int | None, typer.Option(min=16, help="Camera rays of each scene. (default: 48)")
+    ] = None,
+    renderer: Annotated[
+        str | None,
+        typer.Option(
+            metavar="COMMAND",
+            help="Compare this renderer with ours, in place of Mitsuba: "
+            '"prog {scene} -o {output} --seed {seed} --spp {spp}", as in `gate`.',
+        ),
+    ] = None,
+    stop: Annotated[bool, typer.Option("--stop", help="Stop at the first finding.")] = False,
+    reduce: Annotated[
+        float,
+        typer.Option(min=0.0, metavar="SECONDS", help="Time to reduce a finding; 0: do not."),
+    ] = 120.0,
+    workers: NumberOfWorkers = None,
+    scheduler: Scheduler = None,
+    cluster: ClusterFile = None,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Remove stored results first, and check all again.")
+    ] = False,
+    out: Annotated[Path, out_folder("results and the page", "DIR")] = Path("out/fuzz"),
+    junit: JUnit = None,
+    planted: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PATTERN",
+            help="In place of all that: plant the source faults of `selftest` whose names match, "
+            "and measure how soon each is found.",
+        ),
+    ] = None,
+) -> None:
+    """Search for scenes that the two renderers, or two descriptions of one scene, disagree on.
+
+    Random valid scenes are rendered, changed in ways that must not matter, and compared with
+    Mitsuba; a scene that fails is reduced to a few lines. A run with the same options and folder
+    goes on where the last one ended.
+
+    Exit codes: 0: nothing was found; 1: findings; 2: wrong usage; 4: Mitsuba is missing.
+    """
+    with compare_extra("fuzzing"):
+        from comparisons.experiments.fuzz import summary
+        from comparisons.experiments.fuzz.fields import features as known
+        from comparisons.experiments.fuzz.finding import RUNGS, Effort, Grammar, remove
+        from comparisons.experiments.fuzz.run import Plan, run
+        from comparisons.experiments.fuzz.summary import Display, write_page
+        from comparisons.runs.provenance import provenance
+    from reference_rt.cli.render_options import Where
+    from reference_rt.util.files import check_writable
+    from reference_rt.util.workers import Threads
+
+    where = Where(workers, scheduler, cluster)
+    if planted is not None:
+        if where.is_cluster:
+            raise UsageError("--planted: changes the renderer's sources here; expected --workers")
+        _plant(planted, out, seed, workers or os.cpu_count() or 1)
+        return
+    effort: dict[str, Any] = {} if rays is None else {"pixels": rays, "light_pixels": rays}
+    if rungs is not None:
+        effort["rungs"] = _rungs(rungs, RUNGS)
+    names = () if features is None else tuple(features.split(","))
+    known(names)
+    seconds = None if time is None else _seconds(time)
+    page = out / "fuzz.html"
+    check_writable(out / "fuzz.json", page, *([junit] if junit else []))
+    if fresh:
+        remove(out)
+    scenes = tuple(_data(path, out) for path in scene or ())
+    with closing(where.open(Threads, os.cpu_count() or 1)) as opened:
+        plan = Plan(
+            out=out,
+            seed=seed,
+            count=count if count is not None or time is not None else 100,
+            seconds=seconds,
+            first=first,
+            workers=opened,
+            grammar=Grammar(names, extreme),
+            effort=Effort(**effort),
+            stop=stop,
+            command=renderer or "",
+            scenes=scenes,
+            shrink=reduce,
+        )
+        with Display(len(plan.scenes) or plan.count) as display:
+            found = run(plan, display.done, display.line)
+    facts = provenance()
+    summary.write_results(plan, found, facts, junit)
+    write_page(page, plan, found, facts)
+    for line in summary.words(found):
+        say(line)
+    for one, times in summary.distinct(found):
+        say(f"{one.finding.rung}: {one.finding.cause} ({times} scenes, such as {one.number})")
+        say(f"  {one.finding.detail.splitlines()[0][:300]}")
+        say(f"  {summary.again(plan, one)}")
+    say(f"{out / 'fuzz.json'}, fuzz.html", err=True)
+    raise typer.Exit(1 if found.findings else 0)
+
+
+def _plant(pattern: str, out: Path, seed: int, workers: int) -> None:
+    """Search for planted faults, and say what became of each."""
+    from comparisons.experiments.fuzz.planted import FILE, search, source_faults, summary
+    from reference_rt.util.files import check_writable
+
+    faults = [fault for fault in source_faults() if fnmatchcase(fault.name, pattern)]
+    if not faults:
+        raise UsageError(f"--planted: no source fault matches {pattern}")
+    check_writable(out / FILE)
+    found = []
+    for one in search(faults, out, seed, workers):
+        found.append(one)
+        after = f"after {one.scenes} scenes: {one.rung}: {one.cause}" if one.scenes else "not found"
+        say(f"{one.fault}: {after}; {one.shapes} shapes, {one.lines} lines")
+    say(summary(found))
+    raise typer.Exit(0 if all(one.scenes for one in found) else 1)
+
+
+def _rungs(text: str, known: tuple[str, ...]) -> tuple[str, ...]:
+    names = tuple(text.split(","))
+    for name in names:
+        if name not in known:
+            raise UsageError(f"--rungs: expected some of {', '.join(known)}, got '{name}'")
+    return names
+
+
+def _seconds(text: str) -> float:
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)([smh])", text)
+    if match is None:
+        raise UsageError(f"--time: expected a duration such as 90s, 10m or 2h, got '{text}'")
+    return float(match[1]) * {"s": 1.0, "m": 60.0, "h": 3600.0}[match[2]]
+
+
+def _data(path: Path, out: Path) -> dict[str, Any]:
+    """The data of a scene file; the files that it names must lie in the run's folder of files, or
+    beside it, from where they are copied."""
+    import json
+
+    from comparisons.experiments.fuzz.assets import bring
+    from reference_rt.rendering.scene import Scene
+
+    scene = Scene.load(path)
+    data: dict[str, Any] = json.loads(scene.to_json())
+    bring(data, scene.folder, out / "files")
+    return data

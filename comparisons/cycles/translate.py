@@ -1,0 +1,426 @@
+"""Scene -> Cycles: one `singledispatch` function for each kind, which raises `IneligibleError` for
+what Cycles does not compute exactly.
+
+Contract: the functions return plain data that `worker` reads: numbers, lists, names of .npy and
+.npz files beside it.  They take descriptions, never tables; maps are of `geometry.affine`, files
+are read by `mitsuba.second`.
+"""
+
+import json
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import singledispatch
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import reference_rt as rt
+from comparisons.cycles.surfaces import IneligibleError, Surface, name_of, surface_of
+from comparisons.geometry import affine
+from comparisons.geometry.flatten import copies_of, place_of
+from comparisons.geometry.frame import SHARE, round32
+from comparisons.mitsuba.second import described_image
+from comparisons.mitsuba.translate.cameras import focus_of
+from comparisons.mitsuba.translate.moved import frame_of, moved
+from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
+from reference_rt.core.arrays import FloatArray
+from reference_rt.integrators import Direct
+from reference_rt.integrators import Path as PathTracing
+from reference_rt.lights import Constant, Directional, Point
+from reference_rt.materials import Blend, Emissive, TwoSided
+from reference_rt.rendering.scene import Scene
+from reference_rt.textures import Bitmap, Checker
+from reference_rt.textures.image_file import read_image
+
+MOST_BOUNCES = 1024
+"""Cycles' own limit."""
+
+MOST_MIRRORINGS = 100
+"""Edges of a path above which mirrors do not vote: float32's error of a direction grows with each,
+and after a thousand the picture of `deep_mirrors` is 0.6 % off where it vanishes (measured)."""
+
+MOST_TRIANGLES = 5_000_000
+"""Most triangles of all copies: Cycles is given each copy."""
+
+
+Data = dict[str, Any]
+
+
+@dataclass
+class Writing:
+    """A scene being written.  folder: of its files;  files: how many there are;  named: the
+    materials;  reasons: why Cycles is not eligible."""
+
+    scene: Scene
+    folder: Path
+    files: int = 0
+    named: dict[str, Data] = field(default_factory=dict)
+    reasons: list[str] = field(default_factory=list)
+
+    @contextmanager
+    def collected(self) -> Iterator[None]:
+        """Collects the reason of an IneligibleError, so that all of a scene are known."""
+        try:
+            yield
+        except IneligibleError as error:
+            if str(error) not in self.reasons:
+                self.reasons.append(str(error))
+
+    def save(self, array: FloatArray | None = None, **arrays: Any) -> str:
+        """The name of a new file that holds an array, or arrays by name."""
+        self.files += 1
+        if array is not None:
+            name = f"{self.files}.npy"
+            np.save(self.folder / name, array)
+        else:
+            name = f"{self.files}.npz"
+            np.savez(self.folder / name, **arrays)
+        return name
+
+
+def write(scene: Scene, folder: Path, threads: int | None = None) -> None:
+    """Write a scene for `worker` into a folder, in the coordinates that suit float32 best.  Raises
+    IneligibleError with all reasons, SceneError for a file that cannot be used."""
+    writing = Writing(moved(scene, frame_of(scene)), folder)
+    scene = writing.scene
+    found: Data = {"threads": threads or 0, "lights": [], "materials": writing.named}
+    background = np.zeros(3)
+    with writing.collected():
+        found["bounces"] = bounces_of(scene.integrator)
+        if found["bounces"] > MOST_MIRRORINGS and any(
+            isinstance(m, rt.Mirror | rt.Conductor) for m in scene.materials.values()
+        ):
+            raise IneligibleError(f"mirrors along paths of more than {MOST_MIRRORINGS} edges")
+    with writing.collected():
+        found["camera"] = camera_of(scene.camera, scene.film)
+    for light in scene.lights:
+        with writing.collected():
+            if isinstance(light, Constant):
+                background += light.radiance
+            else:
+                found["lights"].append(light_of(light))
+    found["background"] = background.tolist()
+    found["meshes"] = _meshes(writing)
+    if writing.reasons:
+        raise IneligibleError("; ".join(writing.reasons))
+    (folder / "scene.json").write_text(json.dumps(found), encoding="utf-8")
+
+
+def bounces_of(integrator: Any) -> int:
+    """Cycles' bounces: edges of a path without the first and the last one."""
+    if getattr(integrator, "hide_emitters", False):
+        raise IneligibleError("lamps that cameras do not see")
+    if isinstance(integrator, Direct):
+        if not (integrator.light_samples and integrator.bsdf_samples):
+            raise IneligibleError("direct light by one strategy alone")
+        return 0
+    if not isinstance(integrator, PathTracing):
+        raise IneligibleError(f"the integrator {integrator.type}")
+    edges = integrator.max_depth
+    if edges is not None and edges < 2:
+        raise IneligibleError("emission alone (max_depth below 2)")
+    return MOST_BOUNCES if edges is None else min(edges - 2, MOST_BOUNCES)
+
+
+# ---- cameras -------------------------------------------------------------------------------------
+
+
+def camera_of(camera: Any, film: Any) -> Data:
+    """The camera looks along its -z, with +y up.  width: of what it sees at distance 1, or of an
+    orthographic view;  shift: of that rectangle, in widths;  aspect: width over height of a
+    pixel."""
+    if not isinstance(camera, Perspective | ThinLens | Pinhole | Orthographic):
+        raise IneligibleError(f"the camera {camera.type}")
+    eye, target = np.array(camera.eye), np.array(camera.target)
+    back = eye - target
+    right = np.cross(camera.up, back)
+    axes = np.stack([right, np.cross(back, right), back], axis=1)
+    axes /= np.linalg.norm(axes, axis=0)
+    l, r, b, t = _edges(camera, film)
+    if isinstance(camera, Pinhole):  # upside down
+        axes[:, :2] *= -1.0
+    width, height = r - l, t - b
+    aperture, focus = 0.0, 1.0
+    if isinstance(camera, ThinLens):
+        aperture, focus = camera.aperture_radius, focus_of(camera)
+    return {
+        "type": "ORTHO" if isinstance(camera, Orthographic) else "PERSP",
+        "matrix": np.column_stack([axes, eye]).tolist(),
+        "width": width,
+        "shift": [(l + r) / 2.0 / width, (b + t) / 2.0 / width],
+        "aspect": width / film.width / (height / film.height),
+        "resolution": [film.width, film.height],
+        # Cycles' near plane is not 0: of a scene of unit size it is nothing.
+        "clip": [camera.near or 1e-5, camera.far or 1e6],
+        "aperture": aperture,
+        "focus": focus,
+    }
+
+
+def _edges(camera: Any, film: Any) -> tuple[float, float, float, float]:
+    """Left, right, bottom and top edge of what a camera sees, at distance 1 of a central one."""
+    w, h = film.width, film.height
+    if isinstance(camera, Pinhole):
+        x = camera.film_width / camera.film_distance / 2.0
+    elif camera.view is not None:
+        distance = getattr(camera, "distance", None) or 1.0
+        l, r, b, t = (edge / distance for edge in camera.view)
+        return l, r, b, t
+    elif isinstance(camera, Orthographic):
+        x = 1.0 if camera.width is None else camera.width / 2.0
+    else:
+        axis = camera.fov_axis or "x"
+        side = {"x": w, "y": h, "diagonal": math.hypot(w, h), "smaller": min(w, h)}
+        across = side.get(axis, max(w, h))
+        x = math.tan(math.radians(45.0 if camera.fov is None else camera.fov) / 2.0) * w / across
+    return -x, x, -x * h / w, x * h / w
+
+
+# ---- lights --------------------------------------------------------------------------------------
+
+
+@singledispatch
+def light_of(light: Any) -> Data:
+    """A light of Blender: watts of points are 4 pi times their radiant intensity."""
+    raise IneligibleError(f"the light {light.type}")
+
+
+@light_of.register
+def _(light: Point) -> Data:
+    place = np.column_stack([np.eye(3), light.position])
+    watts = [4.0 * math.pi * x for x in light.intensity]
+    return {"type": "POINT", "colour": watts, "matrix": place.tolist()}
+
+
+@light_of.register
+def _(light: Directional) -> Data:
+    """A sun shines along its -z."""
+    back = -np.array(light.direction) / np.linalg.norm(light.direction)
+    aside = np.cross(back, np.eye(3)[np.argmin(np.abs(back))])
+    aside /= np.linalg.norm(aside)
+    axes = np.column_stack([aside, np.cross(back, aside), back, np.zeros(3)])
+    return {"type": "SUN", "colour": list(light.irradiance), "matrix": axes.tolist()}
+
+
+# ---- materials and textures ----------------------------------------------------------------------
+
+BLACK: Data = {"type": "black"}
+
+
+def _rgb(value: Any) -> list[float]:
+    return [float(x) for x in np.broadcast_to(value, 3)]
+
+
+def _colour(value: Any, writing: Writing) -> Any:
+    if isinstance(value, str):
+        return texture_of(writing.scene.textures[value], writing)
+    return _rgb(value)
+
+
+def _number(value: Any, writing: Writing) -> Any:
+    return _colour(value, writing) if isinstance(value, str) else float(value)
+
+
+@singledispatch
+def texture_of(texture: Any, writing: Writing) -> Data:
+    """A texture's data."""
+    raise IneligibleError(f"the texture {texture.type}")
+
+
+@texture_of.register
+def _(texture: Checker, writing: Writing) -> Data:
+    uv = affine.of_uv(texture.uv)[:2].tolist()
+    colours = {"first": _rgb(texture.first), "second": _rgb(texture.second)}
+    return {"type": "checker", "uv": uv, **colours}
+
+
+@texture_of.register
+def _(texture: Bitmap, writing: Writing) -> Data:
+    folder = writing.scene.folder
+    ours = read_image(folder / texture.file, texture.encoding, texture.scale, texture.layer)
+    path = folder / texture.file
+    values = described_image(path, texture.encoding, texture.scale, texture.layer, ours)
+    return {
+        "type": "image",
+        "uv": affine.of_uv(texture.uv)[:2].tolist(),
+        "file": writing.save(values),
+        "interpolation": {"bilinear": "Linear", "nearest": "Closest"}[texture.filter],
+        "extension": {"repeat": "REPEAT", "clamp": "EXTEND", "mirror": "MIRROR"}[texture.wrap],
+    }
+
+
+@singledispatch
+def shader_of(material: Any, writing: Writing) -> Data:
+    """The shader of a material: black from behind where the material is."""
+    raise IneligibleError(f"the material {material.type}")
+
+
+def _front(shader: Data) -> Data:
+    return {"type": "sides", "front": shader, "back": BLACK}
+
+
+@shader_of.register
+def _(material: rt.Diffuse, writing: Writing) -> Data:
+    return _front({"type": "diffuse", "colour": _colour(material.reflectance, writing)})
+
+
+@shader_of.register
+def _(material: rt.Mirror, writing: Writing) -> Data:
+    return _front({"type": "glossy", "colour": _colour(material.reflectance, writing)})
+
+
+@shader_of.register
+def _(material: rt.Conductor, writing: Writing) -> Data:
+    _only(material, reflectance=1.0)
+    metal = {"type": "metal", "eta": _rgb(material.eta), "k": _rgb(material.k), "roughness": 0.0}
+    return _front(metal)
+
+
+@shader_of.register
+def _(material: rt.RoughConductor, writing: Writing) -> Data:
+    _only(material, reflectance=1.0, distribution="ggx")
+    alphas = {material.alpha} if isinstance(material.alpha, str) else set(material.alpha)
+    (alpha, *others) = alphas
+    if others or isinstance(alpha, str) or alpha > MOST_ALPHA:
+        raise IneligibleError(
+            f"the material {material.type}, but for one alpha of at most {MOST_ALPHA:g}: Cycles' "
+            "masking is height-correlated"
+        )
+    roughness = alpha**0.5
+    metal = {"type": "metal", "eta": _rgb(material.eta), "k": _rgb(material.k)}
+    return _front({**metal, "roughness": roughness})
+
+
+@shader_of.register
+def _(material: rt.Dielectric, writing: Writing) -> Data:
+    _only(material, reflectance=1.0, transmittance=1.0)
+    ior = material.interior_ior / material.exterior_ior
+    return {"type": "glass", "ior": ior, "roughness": 0.0}
+
+
+MOST_ALPHA = 0.15
+"""Largest roughness of metals that vote.  Cycles' masking of microfacets is Smith's height-
+correlated form, ours and Mitsuba's the separable one: at 60 degrees from the normal, both ways,
+they differ by 0.03 % at this roughness (Lambda² / (1 + 2 Lambda) with Lambda = 0.017)."""
+
+
+def _only(material: Any, **values: Any) -> None:
+    for name, expected in values.items():
+        found = getattr(material, name)
+        if not np.all(np.asarray(found) == expected):
+            raise IneligibleError(
+                f"the material {material.type} with another {name} than {expected}"
+            )
+
+
+@shader_of.register
+def _(material: Emissive, writing: Writing) -> Data:
+    if isinstance(material.radiance, str):
+        raise IneligibleError("a textured lamp")
+    emission = {"type": "emission", "radiance": _rgb(material.radiance)}
+    if material.base is None:
+        return _front(emission)
+    return {"type": "sum", "of": [_front(emission), _named(material.base, writing)]}
+
+
+@shader_of.register
+def _(material: TwoSided, writing: Writing) -> Data:
+    front = _bare(_named(material.base, writing))
+    back = front if material.back is None else _bare(_named(material.back, writing))
+    return {"type": "sides", "front": front, "back": back}
+
+
+def _bare(shader: Data) -> Data:
+    """What is seen from the front, on either side."""
+    if shader["type"] == "sides" and shader["back"] == BLACK:
+        return _bare(shader["front"])
+    if shader["type"] in ("sum", "mix", "sides", "glass"):
+        raise IneligibleError("two_sided of a material that is made of others, or of glass")
+    return shader
+
+
+@shader_of.register
+def _(material: Blend, writing: Writing) -> Data:
+    first, second = _named(material.first, writing), _named(material.second, writing)
+    weight = _number(material.weight, writing)
+    return {"type": "mix", "weight": weight, "first": first, "second": second}
+
+
+def _named(name: str | None, writing: Writing) -> Data:
+    return shader_of(rt.Diffuse() if name is None else writing.scene.materials[name], writing)
+
+
+# ---- shapes --------------------------------------------------------------------------------------
+
+
+def _meshes(writing: Writing) -> list[Data]:
+    """The meshes of all copies.  Instances share their files, and have matrices."""
+    scene, found, triangles = writing.scene, [], 0
+    made: dict[int, Surface] = {}
+    shared: dict[int, str] = {}
+    for copy in copies_of(scene):
+        for member in copy.members:
+            for leaf in member.leaves:
+                with writing.collected():
+                    if member.tree is not None:
+                        raise IneligibleError("solids (CSG)")
+                    key = id(leaf.shape)
+                    if key not in made:
+                        made[key] = surface_of(leaf.shape, scene.folder)
+                    surface, name = made[key], _material(leaf.material, writing)
+                    if surface.uv is None and _has_texture(writing.named[name]["shader"]):
+                        raise IneligibleError(f"the shape {name_of(leaf.shape)} under a texture")
+                    m = affine.map_in(leaf.shape, place_of(scene, leaf, copy.outer))
+                    if not _holds(
+                        affine.apply_points(
+                            m, surface.vertices[surface.faces[:MEASURED]].reshape(-1, 3)
+                        ).reshape(-1, 3, 3)
+                    ):
+                        raise IneligibleError(
+                            f"the shape {name_of(leaf.shape)}, too small for float32"
+                        )
+                    one: Data = {"material": name}
+                    if copy.instance < 0 or affine.mirrors(m):
+                        triangles += len(surface.faces)
+                        one["file"] = writing.save(**surface.placed(m))
+                    else:
+                        if key not in shared:
+                            triangles += len(surface.faces)
+                            shared[key] = writing.save(**surface.placed(affine.IDENTITY))
+                        one |= {"file": shared[key], "matrix": m.tolist()}
+                    found.append(one)
+                if triangles > MOST_TRIANGLES:
+                    writing.reasons.append(f"more than {MOST_TRIANGLES:,} triangles")
+                    return found
+    return found
+
+
+def _material(name: str | None, writing: Writing) -> str:
+    """The name, in what is written, of a shape's material."""
+    key = "" if name is None else name
+    if key not in writing.named:
+        material = None if name is None else writing.scene.materials[name]
+        sampling = "FRONT" if isinstance(material, Emissive) else "NONE"
+        writing.named[key] = {"sampling": sampling, "shader": _named(name, writing)}
+    return key
+
+
+MEASURED = 10_000
+"""Most triangles of a shape of which it is measured whether float32 holds them."""
+
+
+def _holds(corners: FloatArray) -> bool:
+    """Whether float32 moves the corners of triangles by at most a hundredth of the shortest edge's
+    usual length (the median), as in `mitsuba.translate.moved`."""
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).min(axis=1)
+    moved = np.abs(round32(corners) - corners).max()
+    return bool(moved <= SHARE * np.median(edges))
+
+
+def _has_texture(value: Any) -> bool:
+    if isinstance(value, dict):
+        return "uv" in value or any(map(_has_texture, value.values()))
+    return isinstance(value, list) and any(map(_has_texture, value))

@@ -1,0 +1,130 @@
+"""The rung `witness`: with Cycles' pictures a difference of two renderers is one of three, and says
+who stands alone."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from comparisons import statistics
+from comparisons.cycles.backend import Cycles, interpreter
+from comparisons.cycles.surfaces import IneligibleError
+from comparisons.results.case import RungResult, Status
+from reference_rt.core.arrays import FloatArray
+from reference_rt.rendering.scene import Scene
+
+PAIRS = ((0, 1), (0, 2), (1, 2))
+
+Witness = Callable[
+    [tuple[FloatArray, FloatArray], tuple[str, str]], tuple[RungResult, FloatArray | None]
+]
+"""Takes the replicates of both sides, and whose they are; returns the rung, and the witness's mean
+picture."""
+
+
+def witness_of(
+    scene: Scene,
+    limit: float,
+    threads: int | None,
+    say: Callable[[str], None],
+) -> Witness:
+    """The witness of a scene's pictures.  limit: as in `statistics.compare`;  threads: of Cycles,
+    None for all cores.  Raises ReferenceUnavailableError where there is no Cycles."""
+    interpreter()
+
+    def hear(
+        replicates: tuple[FloatArray, FloatArray], sides: tuple[str, str]
+    ) -> tuple[RungResult, FloatArray | None]:
+        count = max(2, *(len(side) for side in replicates))
+        try:
+            cycles = Cycles(scene, threads)
+        except IneligibleError as error:
+            reason = f"Cycles has no equal of {error}: it does not vote"
+            return RungResult("witness", "not-applicable", reason), None
+        with cycles:
+            pictures = cycles.render(count, scene.resolved_sampler.spp)
+        say(f"witness: {count} pictures by Cycles ({sum(cycles.seconds):.1f} s)")
+        rung = vote((*replicates, pictures), (*sides, "Cycles'"), limit)
+        rung.numbers["version"] = f"Blender {cycles.version}"
+        rung.numbers["seconds"] = float(np.median(cycles.seconds))
+        return rung, pictures.mean(axis=0)
+
+    return hear
+
+
+def vote(
+    replicates: tuple[FloatArray, FloatArray, FloatArray], names: tuple[str, str, str], limit: float
+) -> RungResult:
+    """Who of three renderers stands alone.  names: of the candidate, the reference, the witness.
+
+    Each pair is judged as two renderers are, at a third of the level: so the chance that right
+    renderers are said to differ is that of one comparison.  Somebody stands alone if he differs
+    from both others, and these agree; or if their noise hides whether they do, but not a difference
+    half as large as his.
+    """
+    found = {
+        (a, b): statistics.compare(replicates[a], replicates[b], limit=limit, level=1.0 / 3.0)
+        for a, b in PAIRS
+    }
+    numbers = {
+        "pairs": [
+            {
+                "sides": [names[a], names[b]],
+                "status": found[a, b].status,
+                "bias": [float(x) for x in bias(replicates[a], replicates[b])],
+            }
+            for a, b in PAIRS
+        ],
+    }
+    status_of = {pair: rung.status for pair, rung in found.items()}
+    alone = [k for k in range(3) if _stands_alone(k, status_of, replicates)]
+    if alone:
+        k, (a, b) = alone[0], [j for j in range(3) if j != alone[0]]
+        by = " and ".join(_bias_text(replicates[k], replicates[j]) for j in (a, b))
+        reason = (
+            f"{names[k]} differs from {names[a]} and {names[b]} by {by} of the image mean, and "
+            f"these two by {_bias_text(replicates[a], replicates[b])}: {names[k]} stands alone"
+        )
+        # Two that agree with each other and not with the witness may share a fault: nobody is
+        # acquitted.  Where the reference stands alone, the witness confirms the candidate.
+        status: Status = "agree" if k == 1 else "differ"
+        return RungResult("witness", status, reason, numbers | {"alone": names[k]})
+    statuses = {r.status for r in found.values()}
+    if statuses == {"agree"}:
+        by = _bias_text(replicates[0], replicates[2])
+        reason = f"{names[2]} agrees with both: {names[0]} differ from it by {by} of the image mean"
+        return RungResult("witness", "agree", reason, numbers)
+    told = "; ".join(f"{names[a]} and {names[b]}: {found[a, b].status}" for a, b in PAIRS)
+    return RungResult("witness", "not-applicable", f"no vote ({told})", numbers)
+
+
+SURE = 3.5
+"""Standard errors: a bias is beyond as many in 0.05 % of comparisons."""
+
+
+def _stands_alone(
+    k: int, status: dict[tuple[int, int], Status], replicates: tuple[FloatArray, ...]
+) -> bool:
+    (others,) = (pair for pair in PAIRS if k not in pair)
+    own = [pair for pair in PAIRS if k in pair]
+    if any(status[pair] != "differ" for pair in own):
+        return False
+    if status[others] != "inconclusive":
+        return status[others] == "agree"
+    mean, error = bias(*(replicates[j] for j in others))
+    least = min(abs(bias(*(replicates[j] for j in pair))[0]) for pair in own)
+    return abs(mean) + SURE * error < least / 2.0
+
+
+def bias(a: FloatArray, b: FloatArray) -> tuple[float, float]:
+    """The relative difference of the image means of a and b, and its standard error."""
+    means = [x.mean(axis=(1, 2, 3)) for x in (a, b)]
+    middle = means[1].mean()
+    if middle == 0.0:
+        return 0.0, 0.0
+    error = np.sqrt(sum(m.var(ddof=1) / len(m) for m in means if len(m) > 1))
+    return float(means[0].mean() / middle - 1.0), float(error / abs(middle))
+
+
+def _bias_text(a: FloatArray, b: FloatArray) -> str:
+    mean, error = (100.0 * x for x in bias(a, b))
+    return f"{mean:+.2g} ± {error:.1g} %"

@@ -1,0 +1,114 @@
+"""Who of three renderers stands alone, and a Cycles that is absent, broken or hangs."""
+
+import sys
+
+import numpy as np
+import pytest
+
+import reference_rt as rt
+from comparisons.cycles import backend
+from comparisons.cycles.translate import IneligibleError
+from comparisons.cycles.witness import vote
+from reference_rt.util.errors import ReferenceUnavailableError
+
+NAMES = ("ours", "Mitsuba's", "Cycles'")
+LIMIT = 0.02
+
+
+def _pictures(seed, *, factor=1.0, spread=0.05, shadow=1.0, count=8):
+    """Replicates of a picture with noise in proportion to its brightness; `shadow` multiplies a
+    tile."""
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[0:48, 0:48]
+    mean = (0.5 + 0.4 * np.sin(x / 9.0) * np.cos(y / 7.0))[..., None] * [1.0, 0.8, 0.6]
+    mean[16:32, 16:32] *= shadow
+    return factor * mean * (1.0 + spread * rng.standard_normal((count, 48, 48, 3)))
+
+
+@pytest.mark.parametrize("who", [0, 1, 2])
+@pytest.mark.parametrize(
+    ("fault", "noisy"),
+    [({"factor": 1.05}, 0.05), ({"shadow": 0.8}, 0.05), ({"factor": 0.9}, 0.6)],
+    ids=["bright", "in one tile", "and the others noisy"],
+)
+def test_the_one_that_differs_stands_alone(who, fault, noisy):
+    sides = [_pictures(k, **(fault if k == who else {"spread": noisy})) for k in range(3)]
+    rung = vote(tuple(sides), NAMES, LIMIT)
+    assert rung.numbers["alone"] == NAMES[who]
+    assert rung.status == ("agree" if who == 1 else "differ")
+
+
+def test_nobody_stands_alone_where_all_agree_and_where_all_differ():
+    agree = vote(tuple(_pictures(k) for k in range(3)), NAMES, LIMIT)
+    assert agree.status == "agree"
+    differ = vote(tuple(_pictures(k, factor=1.0 + 0.1 * k) for k in range(3)), NAMES, LIMIT)
+    assert differ.status == "not-applicable"
+    for rung in (agree, differ):
+        assert "alone" not in rung.numbers
+        assert len(rung.numbers["pairs"]) == 3
+
+
+@pytest.mark.slow
+def test_false_votes():
+    """Of 1,000 triples of right renderers at most 0.1 % are said to be alone, and at most 0.3 %
+    (three pairs of a third of the level each: as of one comparison) do not agree."""
+    found = [
+        vote(tuple(_pictures(3 * k + j, spread=0.1) for j in range(3)), NAMES, LIMIT)
+        for k in range(1000)
+    ]
+    assert sum("alone" in rung.numbers for rung in found) <= 1
+    assert sum(rung.status != "agree" for rung in found) <= 3
+
+
+SCENE = rt.Scene(
+    shapes=(rt.Sphere(),),
+    lights=(rt.Constant(radiance=(1, 1, 1)),),
+    film=rt.Film(width=4, height=4),
+)
+
+
+@pytest.mark.parametrize(
+    ("program", "said"),
+    [
+        ("", "pip install bpy"),
+        ("/no/such/python", "no such program"),
+        (sys.executable, "No module named 'bpy'"),
+    ],
+)
+def test_without_cycles_it_is_said_how_to_get_it(program, said, monkeypatch):
+    monkeypatch.setenv(backend.PYTHON, program)
+    with pytest.raises(ReferenceUnavailableError, match=said), backend.Cycles(SCENE) as cycles:
+        cycles.render(1, 1)
+
+
+FAKES = {
+    "dies": ("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", "died by signal 9"),
+    "hangs": ("import time; time.sleep(600)", "took longer than"),
+    "fails": ("""input(); print('{"failed": "no memory"}', flush=True); input()""", "no memory"),
+}
+
+
+@pytest.mark.parametrize("fault", FAKES)
+def test_a_cycles_that_breaks_is_reported(fault, monkeypatch, tmp_path):
+    code, said = FAKES[fault]
+    program = tmp_path / "python"
+    program.write_text(f"#!{sys.executable}\n{code}\n")
+    program.chmod(0o700)
+    monkeypatch.setenv(backend.PYTHON, str(program))
+    monkeypatch.setattr(backend, "SECONDS", 2.0)
+    with pytest.raises(ReferenceUnavailableError, match=said), backend.Cycles(SCENE) as cycles:
+        cycles.render(1, 1)
+
+
+def test_all_reasons_are_given(monkeypatch, tmp_path):
+    monkeypatch.setenv(backend.PYTHON, sys.executable)
+    scene = rt.Scene(
+        integrator=rt.Whitted(),
+        materials={"glossy": rt.Plastic()},
+        shapes=(rt.Plane(), rt.Sphere(material="glossy"), rt.Sphere() - rt.Box()),
+        lights=(rt.Spot(origin=(0, 0, 5), target=(0, 0, 0), intensity=(1, 1, 1)),),
+    )
+    with pytest.raises(IneligibleError) as caught:
+        backend.Cycles(scene)
+    for part in ("whitted", "plastic", "plane", "CSG", "spot"):
+        assert part in str(caught.value)
