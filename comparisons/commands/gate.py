@@ -18,6 +18,7 @@ from comparisons.commands.options import (
     Threads,
     compare_extra,
 )
+from comparisons.commands.truth import truth_gate
 from reference_rt.cli.adjusted import Defaults, adjusted, by_name
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import ReferenceRtError, UsageError, printable
@@ -50,6 +51,14 @@ def gate(
         typer.Option(metavar="NAME", help="Compare with a baseline written by `accept` instead."),
     ] = None,
     baselines: Baselines = Path("baselines"),
+    truth: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Compare with the formula of this case of `truth` instead; with --command also an "
+            "area, a pattern, or all.",
+        ),
+    ] = None,
     command: Annotated[
         str | None,
         typer.Option(
@@ -139,6 +148,14 @@ def gate(
 
     if (command is None) == (not candidates):
         raise UsageError("expected either candidates or --command")
+    if truth is not None:
+        others = {"scene": scene, "reference": reference, "variance": variance}
+        for name, value in {**others, "baseline": baseline, "size": size}.items():
+            if value is not None:
+                raise UsageError(f"--{name}: does not apply to --truth; expected one of them")
+        numbers = {"replicates": replicates, "spp": spp, "seed": seed}
+        truth_gate(truth, candidates or (), command, layer, out, suffix=suffix,
+                   seconds=time_limit, **numbers)  # fmt: skip
     driving: dict[str, Any] = {"replicates": replicates, "seed": seed, "suffix": suffix}
     driving |= {"time-limit": time_limit, "fixed": fixed or None}
     given = [name for name, value in driving.items() if value is not None]

@@ -14,13 +14,14 @@ from comparisons.commands.report import report
 from comparisons.commands.selftest import selftest
 from comparisons.commands.stability import stability
 from comparisons.commands.suite import suite
+from comparisons.commands.truth import truth
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands; called through the entry-point group `reference_rt.commands`."""
     commands = (
         *(compare, suite, gate, accept, report, selftest),
-        *(converge, methods, bench, stability, convert, fuzz),
+        *(converge, methods, bench, stability, convert, fuzz, truth),
     )
     for command in commands:
         app.command()(command)

@@ -17,7 +17,7 @@ FLOORS = {
     ),
     "comparisons": (
         *("results", "geometry", "statistics", "mitsuba", "runs", "rungs", "report", "compare"),
-        *("gate", "suites", "experiments", "commands"),
+        *("gate", "truth", "suites", "experiments", "commands"),
     ),
 }
 """The folders of each package from the lowest to the highest: a file may import files of its own
