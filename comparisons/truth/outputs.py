@@ -172,10 +172,12 @@ def markdown(rows: Sequence[Row], provenance: Mapping[str, Any]) -> str:
     """The tables of docs/truth.md: a line for each case, with a cell for each renderer."""
     renderers = list(dict.fromkeys(row.renderer for row in rows))
     text = ["| area | " + " | ".join(renderers) + " |", "|---" * (len(renderers) + 1) + "|"]
-    for area in AREAS:
-        cells = [f"{n} of {m}" for a, _, n, m in scores(rows) if a == area]
+    right = {(a, r): f"{n} of {m}" for a, r, n, m in scores(rows)}
+    areas = [area for area in AREAS if any(row.case.area == area for row in rows)]
+    for area in areas:
+        cells = [right.get((area, renderer), "") for renderer in renderers]
         text.append(f"| {AREAS[area]} | {' | '.join(cells)} |")
-    for area in AREAS:
+    for area in areas:
         text += ["", f"### {AREAS[area].capitalize()}", ""]
         text += ["| case | formula | what it tests | " + " | ".join(renderers) + " |"]
         text += ["|---" * (len(renderers) + 3) + "|"]
