@@ -166,10 +166,11 @@ def facing_mirrors() -> Expected:
     a + ...  The path is cut after 12 edges."""
     a, b, rho = np.array([1.0, 0.5, 0.2]), np.array([0.1, 0.4, 1.0]), np.array([0.9, 0.7, 0.5])
     terms = [rho**k * (a, b)[k % 2] for k in range(12)], [rho**k * (b, a)[k % 2] for k in range(12)]
-    # The camera looks along the mirrors, which meet at infinity, in the middle of the picture.
+    # The mirrors meet at infinity, in the middle of the picture.
     pixels = np.empty((32, 32, 3))
     pixels[:, :16], pixels[:, 16:] = (np.sum(t, axis=0) for t in terms)
-    return Expected(pixels)
+    # The mirrors end at 1e6 times their distance: 12 edges reach that far in 1e-3 of a column.
+    return Expected(pixels, 1e-4)
 
 
 @case("rho^3 L, area of the triangle turned by 180 degrees", "three mirrors send light back")
@@ -204,7 +205,8 @@ def _lit_ball(f: Callable[[FloatArray, FloatArray, int], FloatArray]) -> Expecte
         other = np.cross(n, across)
         wi = np.stack([across @ to, other @ to, n @ to], axis=-1)
         values = np.stack([f(wi, wo, k) for k in range(3)], axis=-1)
-        return np.asarray(np.where(inside[..., None], values * 4.0, np.nan))
+        # At the terminator the light has a kink.
+        return np.asarray(np.where((inside & (n @ to > 0.1))[..., None], values * 4.0, np.nan))
 
     return Expected(seen_from_above(radiance, 2.0, 32, 12), 1e-7)
 
@@ -335,3 +337,26 @@ def two_sides() -> Expected:
     pixels = np.empty((32, 32, 3))
     pixels[:, :16], pixels[:, 16:] = RHO * SKY, np.array([0.1, 0.3, 0.6]) * SKY
     return Expected(pixels)
+
+
+@case("A + T rho (1 - R_out) / (1 - rho R_in), times sky", "a rough clear coat", MICROFACETS)
+def rough_plastic_furnace() -> Expected:
+    """As `plastic_furnace` with a rough boundary: A is its albedo, T what it lets pass (of one
+    microfacet each), (1 - R_out) the mean of T over a matte light from outside, over the index
+    squared, R_in that of the albedo from within.  The means are Gauss's with 24 cosines."""
+    alpha, eta = 0.3, 1.5
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    c, w = (nodes + 1.0) / 2.0, (nodes + 1.0) / 2.0 * weights
+
+    def through(x: FloatArray, eta: float) -> FloatArray:
+        return half_vector_mean(x, alpha, lambda m: (0.0 * m, 1.0 - fresnel(m, eta)), "ggx", eta)
+
+    def mirrored(x: FloatArray, eta: float) -> FloatArray:
+        return half_vector_mean(x, alpha, lambda m: (fresnel(m, eta), 0.0 * m), "ggx", eta)
+
+    base = RHO * (through(c, eta) @ w / eta**2) / (1.0 - RHO * (mirrored(c, 1.0 / eta) @ w))
+
+    def albedo(x: FloatArray) -> FloatArray:
+        return np.asarray(mirrored(x, eta)[..., None] + through(x, eta)[..., None] * base)
+
+    return _ball(albedo, 5e-5)

@@ -75,6 +75,7 @@ FAULTS = (
     ("rough_boundary", "alpha: 0.3", "alpha: 0.32"),
     ("plastic_furnace", "nonlinear: true", "nonlinear: false"),
     ("plastic_dense_furnace", "interior_ior: 2.4", "interior_ior: 2.42"),
+    ("rough_plastic_furnace", "alpha: 0.3", "alpha: 0.32"),
     ("blend_furnace", "weight: 0.3", "weight: 0.302"),
     ("mask_furnace", "opacity: 0.4", "opacity: 0.402"),
     ("mask_in_light", "opacity: 0.5", "opacity: 0.501"),
