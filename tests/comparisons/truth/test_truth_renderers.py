@@ -142,16 +142,17 @@ def test_a_planted_fault_is_seen(name, right, wrong):
 
 
 def test_mitsuba():
-    """Right where it is exact; its path tracer takes the opacity of a mask twice (docs/verdict.md);
-    it has no solids."""
+    """Right where it is exact; its own plugins and integrators are judged, whose path tracer takes
+    the opacity of a mask twice, and whose blends lose light of mirrors; it has no solids."""
     found = {
         name: judge(CASES[name].compute(), by_mitsuba(load(SCENES / f"{name}.yaml", 64)))
-        for name in ("perspective", "point_over_floor", "mask_in_light")
+        for name in ("perspective", "point_over_floor", "mask_in_light", "blend_furnace")
     }
     assert {name: one.verdict for name, one in found.items()} == {
         "perspective": "right",
         "point_over_floor": "right",
         "mask_in_light": "off",
+        "blend_furnace": "off",
     }
     assert -51.0 < found["mask_in_light"].percent < -49.0
     with pytest.raises(NoCounterpartError, match="solids"):
