@@ -148,14 +148,6 @@ def gate(
 
     if (command is None) == (not candidates):
         raise UsageError("expected either candidates or --command")
-    if truth is not None:
-        others = {"scene": scene, "reference": reference, "variance": variance}
-        for name, value in {**others, "baseline": baseline, "size": size}.items():
-            if value is not None:
-                raise UsageError(f"--{name}: does not apply to --truth; expected one of them")
-        numbers = {"replicates": replicates, "spp": spp, "seed": seed}
-        truth_gate(truth, candidates or (), command, layer, out, suffix=suffix,
-                   seconds=time_limit, **numbers)  # fmt: skip
     driving: dict[str, Any] = {"replicates": replicates, "seed": seed, "suffix": suffix}
     driving |= {"time-limit": time_limit, "fixed": fixed or None}
     given = [name for name, value in driving.items() if value is not None]
@@ -165,6 +157,20 @@ def gate(
         raise UsageError("--size: only applies to --scene; expected that too")
     if scene is None and command is None and spp is not None:
         raise UsageError("--spp: only applies to --scene or --command; expected one of them")
+    if truth is not None:
+        others: dict[str, Any] = {
+            "scene": scene,
+            "reference": reference,
+            "variance": variance,
+            "size": size,
+        }
+        others |= {"baseline": baseline, "fixed": fixed, "noise-free": noise_free, "rim": rim}
+        for name, value in {**others, "junit": junit, "github": github, "define": define}.items():
+            if value:
+                raise UsageError(f"--{name}: does not apply to --truth; expected one of them")
+        numbers = {"replicates": replicates, "spp": spp, "seed": seed}
+        truth_gate(truth, candidates or (), command, layer, out, suffix=suffix,
+                   seconds=time_limit, **numbers)  # fmt: skip
     described = None if scene is None else adjusted(Scene.load(scene, by_name(define)), spp, size)
     run, rounds = None, Rounds()
     if command is not None:

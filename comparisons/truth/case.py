@@ -32,13 +32,11 @@ class Expected:
 
     pixels: (height, width, 3), the mean over each pixel's footprint (with the scene's filter), NaN
     where the formula states nothing;  bound: relative error of the formula itself, of the mean of
-    any region;  condition: relative change of a pixel for a relative change of the scene's numbers,
-    by which the renderer's rounding is multiplied.
+    any region.
     """
 
     pixels: FloatArray
     bound: float = QUADRATURE
-    condition: float = 1.0
 
     def __post_init__(self) -> None:
         if self.pixels.ndim == 2:

@@ -37,8 +37,8 @@ TILES = 4
 """Tiles along each side of a picture."""
 
 ROUNDINGS = 256
-"""Roundings of the candidate's numbers, of its unit roundoff each, that a pixel may be off, times
-the condition of the case: a path has some tens of operations for each of a few vertices."""
+"""Roundings of the candidate's numbers, of its unit roundoff each, that a pixel may be off: a path
+has some tens of operations for each of a few vertices."""
 
 POWER = 0.01
 """The standard error of the whole picture, relatively, from which the noise is too high."""
@@ -75,7 +75,7 @@ def unit_roundoff(pictures: FloatArray) -> float:
 
 
 def rounding(pictures: FloatArray) -> float:
-    """Relative error that the candidate's numbers explain, for a condition of 1.
+    """Relative error that the candidate's numbers explain.
 
     What is stored as half has been computed in single precision.
     """
@@ -111,7 +111,7 @@ def judge(
     count, sums, variance, squares, scale = (
         a[used] for a in (count, sums, variance, squares, scale)
     )
-    relative = expected.bound + expected.condition * rounding(found)
+    relative = expected.bound + rounding(found)
     allowed = relative * (scale / count + scale[-1] / count[-1])
     mean, error = sums / count, np.sqrt(variance) / count
     beyond = np.maximum(np.abs(mean) - allowed, 0.0)

@@ -88,8 +88,11 @@ def scores(rows: Sequence[Row]) -> list[Score]:
 
 
 def prepare(out: Path) -> None:
-    """Check that `write` can write.  Raises ImageError."""
-    check_writable(*(out / name for name in ("results.json", "report.html")))
+    """Check that `write` can write, and remove what an earlier run wrote.  Raises ImageError."""
+    files = out / "results.json", out / "report.html"
+    check_writable(*files)
+    for file in files:
+        file.unlink(missing_ok=True)
 
 
 def write(out: Path, rows: Sequence[Row], provenance: Mapping[str, Any]) -> None:

@@ -94,6 +94,7 @@ def test_the_page_in_a_browser(run, check_page):
             ["gate", "--truth", "slab", "a.npy", "--scene", "x.yaml"],
             "--scene: does not apply to --truth",
         ),
+        (["gate", "--truth", "slab", "a.npy", "--rim", 2], "--rim: does not apply to --truth"),
         (["gate", "--truth", "slab", "--command", "prog"], "--command: has no {output}"),
     ],
 )
