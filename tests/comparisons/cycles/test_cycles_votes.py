@@ -26,7 +26,7 @@ VOTERS = (
     *("far_origin", "filter_catmull_rom", "filter_gaussian", "filter_lanczos"),
     *("filter_mitchell", "filter_tent", "index_matched", "light_directional", "light_shapes"),
     *("material_blend", "material_conductor", "material_two_sided", "mesh_knot", "near_delta"),
-    *("soft_shadows", "tilted_lamps", "tiny", "veach_mis"),
+    *("soft_shadows", "tilted_lamps", "tiny"),
 )
 
 
@@ -72,7 +72,7 @@ FAULTS = {
     "aperture": ("camera_thin_lens", "camera.aperture_radius", 0.3),
     "focus": ("camera_thin_lens", "camera.focus_distance", 3.0),
     "a lamp that moved": ("soft_shadows", "shapes.4.center", (-3.0, 2.9, -1.0)),
-    "roughness": ("near_delta", "materials.r2.alpha", (0.1, 0.1)),
+    "a second lamp": ("near_delta", "materials.cool.radiance", (9.0, 9.0, 9.0)),
     "a ring": ("caustic_glass", "materials.gold.eta", (1.5, 1.5, 1.5)),
     "a blend's weight": ("material_blend", "materials.worn.weight", 0.5),
     "a sphere's radius": ("caustic_glass", "shapes.0.radius", 0.66),
