@@ -18,6 +18,7 @@ from comparisons.commands.options import (
     Threads,
     compare_extra,
 )
+from comparisons.commands.truth import truth_gate
 from reference_rt.cli.adjusted import Defaults, adjusted, by_name
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import ReferenceRtError, SceneError, UsageError, printable
@@ -54,6 +55,14 @@ def gate(
         typer.Option(metavar="NAME", help="Compare with a baseline written by `accept` instead."),
     ] = None,
     baselines: Baselines = Path("baselines"),
+    truth: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Compare with the formula of this case of `truth` instead; with --command also an "
+            "area, a pattern, or all.",
+        ),
+    ] = None,
     command: Annotated[
         str | None,
         typer.Option(
@@ -152,6 +161,20 @@ def gate(
         raise UsageError("--size: only applies to --scene; expected that too")
     if scene is None and command is None and spp is not None:
         raise UsageError("--spp: only applies to --scene or --command; expected one of them")
+    if truth is not None:
+        others: dict[str, Any] = {
+            "scene": scene,
+            "reference": reference,
+            "variance": variance,
+            "size": size,
+        }
+        others |= {"baseline": baseline, "fixed": fixed, "noise-free": noise_free, "rim": rim}
+        for name, value in {**others, "junit": junit, "github": github, "define": define}.items():
+            if value:
+                raise UsageError(f"--{name}: does not apply to --truth; expected one of them")
+        numbers = {"replicates": replicates, "spp": spp, "seed": seed}
+        truth_gate(truth, candidates or (), command, layer, out, suffix=suffix,
+                   seconds=time_limit, **numbers)  # fmt: skip
     described = None if scene is None else adjusted(Scene.load(scene, by_name(define)), spp, size)
     run, rounds = None, Rounds()
     if command is not None:

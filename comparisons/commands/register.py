@@ -6,13 +6,14 @@ from comparisons.commands.compare import compare, convert, report, suite
 from comparisons.commands.gate import accept, gate
 from comparisons.commands.speed import bench, converge, methods
 from comparisons.commands.trials import fuzz, selftest, stability
+from comparisons.commands.truth import truth
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands; called through the entry-point group `reference_rt.commands`."""
     commands = (
         *(compare, suite, gate, accept, report, selftest),
-        *(converge, methods, bench, stability, convert, fuzz),
+        *(converge, methods, bench, stability, convert, fuzz, truth),
     )
     for command in commands:
         app.command()(command)

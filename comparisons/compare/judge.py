@@ -106,8 +106,8 @@ def judge(evidence: Evidence, limit: float) -> Case:
     verdict, reason = decide(rungs, metrics)
     if verdict != "agree" and any("alone" in rung.numbers for rung in rungs):
         # A difference of two says that one is wrong; the third says which.
-        (heard,) = (rung.reason for rung in rungs if rung.name == "witness")
-        reason = f"{reason}; {heard}" if heard not in reason else reason
+        (said,) = (rung.reason for rung in rungs if rung.name == "witness")
+        reason = f"{reason}; {said}" if said not in reason else reason
     cause: Cause | None = None
     worst: tuple[ImageRegion, ...] = ()
     if verdict == "differ":

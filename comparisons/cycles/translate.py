@@ -26,6 +26,7 @@ from comparisons.mitsuba.second import described_image
 from comparisons.mitsuba.translate.cameras import focus_of
 from comparisons.mitsuba.translate.moved import frame_of, moved
 from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
+from reference_rt.cameras.film import BoxFilter
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import Direct
 from reference_rt.integrators import Path as PathTracing
@@ -134,6 +135,8 @@ def camera_of(camera: Any, film: Any) -> Data:
     pixel."""
     if not isinstance(camera, Perspective | ThinLens | Pinhole | Orthographic):
         raise IneligibleError(f"the camera {camera.type}")
+    if not isinstance(film.filter, BoxFilter):
+        raise IneligibleError(f"the filter {film.filter.type}")
     eye, target = np.array(camera.eye), np.array(camera.target)
     back = eye - target
     right = np.cross(camera.up, back)

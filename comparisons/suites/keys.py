@@ -16,7 +16,7 @@ from comparisons.runs.engine import key_of
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.files import read_input, read_text
 
-_APART = ("report", "commands", "gate", "experiments")
+_APART = ("report", "commands", "gate", "truth", "experiments")
 """Folders of `comparisons` that do not affect the verdicts of a suite."""
 
 

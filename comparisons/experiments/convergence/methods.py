@@ -9,6 +9,8 @@ from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
+from comparisons.cycles.backend import Cycles
+from comparisons.cycles.surfaces import IneligibleError
 from comparisons.experiments.convergence.estimates import Accumulator, against
 from comparisons.experiments.convergence.store import (
     FIRST,
@@ -28,7 +30,7 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.render import Progress, render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Independent, Sobol
-from reference_rt.util.errors import UsageError
+from reference_rt.util.errors import ReferenceUnavailableError, UsageError
 
 
 class Shot(NamedTuple):
@@ -56,8 +58,8 @@ BEST = "best"
 
 @dataclass(frozen=True)
 class Method:
-    """name: for files and options;  title: for people;  sampler: its name, or BEST;  side: "ours"
-    or the Mitsuba variant, methods of which share what is loaded."""
+    """name: for files and options;  title: for people;  sampler: its name, or BEST;  side: "ours",
+    CYCLES, or the Mitsuba variant, methods of which share what is loaded."""
 
     name: str
     title: str
@@ -85,6 +87,8 @@ def with_sampler(method: Method, sampler: str) -> Method:
     return replace(method, sampler=sampler, title=f"{title}, {sampler} (best)")
 
 
+CYCLES = "cycles"
+
 METHODS = (
     Method("ours", "ours, Sobol' (default and best)", "sobol", "ours"),
     Method("ours_independent", "ours, independent", "independent", "ours"),
@@ -92,6 +96,7 @@ METHODS = (
     Method("mitsuba_llvm_best", "Mitsuba llvm, its best sampler", BEST, LLVM),
     Method("mitsuba_scalar", "Mitsuba scalar, independent (default)", "independent", SCALAR),
     Method("mitsuba_scalar_best", "Mitsuba scalar, its best sampler", BEST, SCALAR),
+    Method("cycles", "Cycles, Sobol' (default)", "sobol", CYCLES),
 )
 
 NAMES = tuple(method.name for method in METHODS)
@@ -131,17 +136,18 @@ def remarks(scene: Scene) -> list[str]:
 
 class Stable:
     """Prepares methods and keeps what they share.  A context manager: it restores Mitsuba's variant
-    at its end."""
+    at its end, and ends the process of Cycles."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._entered = ExitStack()
+        self._entered, self._others = ExitStack(), ExitStack()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *error: object) -> None:
         self._entered.close()
+        self._others.close()
 
     def _in(self, side: str) -> Any:
         """Mitsuba in this variant, until another is needed: a switch defines its plugins again."""
@@ -156,6 +162,11 @@ class Stable:
         """Load and compile.  Raises SceneError, ReferenceUnavailableError, AbsentError."""
         if method.side == "ours":
             return self._ours(method, progress)
+        if method.side == CYCLES:
+            try:
+                return self._cycles()
+            except (ReferenceUnavailableError, IneligibleError) as error:
+                raise AbsentError(str(error)) from None
         if method.side == LLVM and backend().variant != LLVM:
             raise AbsentError(f"Mitsuba's variant {LLVM} does not run here: {backend().reason}")
         copies = copies_of(self._scene)
@@ -184,6 +195,19 @@ class Stable:
         small = scene.changed(sampler=make(spp=1, seed=first))
         # From now on the specialised kernels are in the cache, and `shot` uses them.
         render(small, tables=tables, progress=progress, specialised=True)
+        return shot
+
+    def _cycles(self) -> Renderer:
+        cycles = self._others.enter_context(Cycles(self._scene))
+
+        def shot(spp: int, replicate: int) -> Shot:
+            cool_down()
+            try:
+                (picture,) = cycles.render(1, spp, seed_of(replicate))
+            except ReferenceUnavailableError as error:
+                raise AbsentError(str(error)) from None
+            return Shot(picture, spp, cycles.seconds[-1])
+
         return shot
 
     def _mitsubas(self, method: Method) -> Renderer:

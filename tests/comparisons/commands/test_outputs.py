@@ -44,6 +44,7 @@ ARGUMENTS = {
     "convert": [SCENE],
     "preview": [SCENE],
     "fuzz": ["--count", "1"],
+    "truth": ["perspective", "--scenes", str(Path(SCENE).parent / "truth")],
     "doctor": [],
     "schema": [],
     "warm-up": [],
@@ -87,6 +88,8 @@ FILES = {
         "results.json", "results.csv", "stability.html", "settings/x", "pictures/x"
     ],
     ("stability", "markdown"): [""],
+    ("truth", "out"): ["results.json", "report.html"],
+    ("truth", "markdown"): [""],
 }  # fmt: skip
 """What is written below the path that an option names; "": the path itself."""
 

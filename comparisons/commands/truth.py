@@ -1,0 +1,141 @@
+"""`reference-rt truth`, and `reference-rt gate --truth`."""
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from comparisons.commands.options import Threads, compare_extra, out_folder, table_in
+from reference_rt.cli.guarded import guarded, say
+from reference_rt.util.errors import UsageError
+
+if TYPE_CHECKING:
+    from comparisons.truth.case import Case
+    from comparisons.truth.outputs import Row
+
+SCENES = Path("scenes/truth")
+
+
+@guarded
+def truth(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[NAME]...",
+            help="Cases, areas such as materials, or patterns such as 'glass_*'. (default: all)",
+        ),
+    ] = None,
+    out: Annotated[Path, out_folder("results, the page and the badge", "DIR")] = Path("out/truth"),
+    renderer: Annotated[str, typer.Option(metavar="NAME", help="ours, mitsuba or both.")] = "both",
+    scenes: Annotated[
+        Path, typer.Option(metavar="DIR", help="The folder of the scene files.")
+    ] = SCENES,
+    replicates: Annotated[
+        int | None, typer.Option(min=1, help="Pictures of each case. (default: 4)")
+    ] = None,
+    spp: Annotated[
+        int | None, typer.Option(min=1, help="Samples per pixel. (default: the scene's)")
+    ] = None,
+    threads: Threads = None,
+    markdown: Annotated[Path | None, table_in("truth")] = None,
+) -> None:
+    """Render scenes whose pixels are known by formula, by ours and by Mitsuba.
+
+    Mitsuba's faults do not fail the run unless it is the only renderer.
+
+    Exit codes: 0: all are right; 1: one is off, or too noisy; 2: wrong usage; 3: a scene is
+    invalid; 4: Mitsuba is missing.
+    """
+    with compare_extra("truth"):
+        from comparisons.report import templates, terminal
+        from comparisons.runs.provenance import ours, provenance
+        from comparisons.truth import outputs
+        from comparisons.truth.renderers import RENDERERS, REPLICATES, load
+        from comparisons.truth.renderers import row_of as rendered
+    from reference_rt.util.console import ProgressLine
+
+    if renderer not in (*RENDERERS, "both"):
+        raise UsageError(f"--renderer: expected ours, mitsuba or both, got '{renderer}'")
+    picked = _chosen(names or ())
+    who = [each for each in RENDERERS if renderer in (each, "both")]
+    outputs.prepare(out)
+    if markdown is not None:
+        templates.check(markdown, "truth")
+    begun = time.perf_counter()
+    facts = provenance() if "mitsuba" in who else ours()
+    rows: list[Row] = []
+    with ProgressLine() as progress:
+        for k, case in enumerate(picked):
+            progress("cases", k / len(picked))
+            progress.note(case.name)
+            scene = load(scenes / f"{case.name}.yaml", spp)
+            rows += rendered(case, scene, who, replicates or REPLICATES, threads)
+        progress("cases", 1.0)
+    facts |= {"seconds": round(time.perf_counter() - begun, 1)}
+    _finish(out, rows, facts)
+    console = terminal.console()
+    console.print(outputs.table(rows, console.width))
+    console.print(outputs.score_card(rows, console.width))
+    if markdown is not None:
+        templates.rewrite(markdown, "truth", outputs.markdown(rows, facts))
+    counted = [row for row in rows if row.renderer == who[0]]
+    raise typer.Exit(outputs.exit_code(counted))
+
+
+def truth_gate(
+    name: str,
+    candidates: Sequence[Path],
+    command: str | None,
+    layer: str,
+    out: Path,
+    **driving: Any,
+) -> None:
+    """`gate --truth NAME`: pictures, or those that `command` makes, against the formula.
+
+    driving: fields of `comparisons.truth.gate.Driven`, None for its own.
+    """
+    with compare_extra("truth"):
+        from comparisons.gate.pictures_in import read_candidates
+        from comparisons.report import terminal
+        from comparisons.runs.provenance import ours
+        from comparisons.truth import outputs
+        from comparisons.truth.gate import Driven, judged
+
+    picked = _chosen([name], "--truth: ")
+    if command is None and len(picked) > 1:
+        raise UsageError(f"--truth: '{name}' is {len(picked)} cases; expected one, or --command")
+    outputs.prepare(out)
+    facts: dict[str, Any] = ours()
+    if command is None:
+        facts["candidates"] = [str(path) for path in candidates]
+        pictures = [p for path in candidates for p in read_candidates(path, layer)]
+        rows = [judged(picked[0], pictures)]
+    else:
+        facts["command"] = command
+        given = {key: value for key, value in driving.items() if value is not None}
+        driven = Driven(command, SCENES, out / "candidates", **given)
+        rows = [driven.row(case, lambda line: say(line, err=True)) for case in picked]
+    _finish(out, rows, facts)
+    console = terminal.console()
+    console.print(outputs.table(rows, console.width))
+    if len(rows) > 1:
+        console.print(outputs.score_card(rows, console.width))
+    raise typer.Exit(outputs.exit_code(rows))
+
+
+def _chosen(names: Sequence[str], option: str = "") -> "list[Case]":
+    from comparisons.truth.case import chosen
+
+    try:
+        return chosen(names)
+    except ValueError as error:
+        raise UsageError(f"{option}{error}") from None
+
+
+def _finish(out: Path, rows: "list[Row]", facts: dict[str, Any]) -> None:
+    from comparisons.truth import outputs
+
+    outputs.write(out, rows, facts)
+    say(f"{out / 'results.json'}, {out / 'report.html'}", err=True)

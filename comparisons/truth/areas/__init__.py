@@ -1,0 +1,1 @@
+"""The formulas of truth, by area.  No module here imports a renderer."""

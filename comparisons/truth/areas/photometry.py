@@ -1,0 +1,266 @@
+"""Photometry: point lights, lamps and skies over a matte floor.
+
+The floor is z = 0; it sends back rho E / pi.  The usual view looks down the z axis."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from comparisons.truth.case import Expected, FloatArray, case
+from comparisons.truth.film import drawn_from_above, mix, seen_from_above
+from comparisons.truth.optics import floor_irradiance
+
+RHO = np.array([0.8, 0.5, 0.2])
+INTENSITY = np.array([10.0, 6.0, 2.0])
+RADIANCE = np.array([3.0, 2.0, 1.0])
+
+
+def _floor(
+    irradiance: Callable[[FloatArray, FloatArray], FloatArray],
+    colour: FloatArray = RADIANCE,
+    width: float = 4.0,
+    pixels: int = 32,
+    order: int = 6,
+    bound: float = 1e-10,
+) -> Expected:
+    """The floor's picture; irradiance: of a lamp whose radiance or intensity is 1."""
+    share = seen_from_above(irradiance, width, pixels, order)
+    return Expected(share[..., None] * colour * RHO / np.pi, bound)
+
+
+def _point(
+    x: FloatArray, y: FloatArray, at: tuple[float, float, float], normal: tuple[float, ...]
+) -> FloatArray:
+    """cos / d² of a point light at points (x, y, z) of a plane through the origin."""
+    n = np.array(normal)
+    z = -(n[0] * x + n[1] * y) / n[2]
+    to = np.stack([at[0] - x, at[1] - y, at[2] - z], axis=-1)
+    return np.asarray(to @ n / (to**2).sum(axis=-1) ** 1.5)
+
+
+@case("rho I h / (pi d^3)", "the inverse square, and the cosine")
+def point_over_floor() -> Expected:
+    """Irradiance is I cos / d^2, and the cosine h / d."""
+    return _floor(lambda x, y: _point(x, y, (0.5, 0.3, 1.0), (0, 0, 1)), INTENSITY)
+
+
+@case("rho I (n . l) / (pi d^3)", "the cosine at a tilted surface")
+def point_over_slope() -> Expected:
+    """As `point_over_floor`, on a plane that is tilted by 40 degrees about the x axis."""
+    a = np.radians(40.0)
+    normal = (0.0, -np.sin(a), np.cos(a))
+    return _floor(lambda x, y: _point(x, y, (0.5, -1.0, 1.5), normal), INTENSITY)
+
+
+@case("sum of rho I h / (pi d^3)", "lights add up, whatever the odds of their choice")
+def three_points() -> Expected:
+    """Light is linear: three lights of different colour, one 50 times as bright as the others."""
+    parts = [
+        _floor(lambda x, y, at=at: _point(x, y, at, (0, 0, 1)), np.array(colour)).pixels  # type: ignore[misc]
+        for at, colour in (
+            ((-1.0, 1.0, 1.0), (0.2, 0.2, 0.0)),
+            ((1.0, 1.0, 1.5), (0.0, 0.2, 0.2)),
+            ((0.0, -1.0, 3.0), (10.0, 0.0, 10.0)),
+        )
+    ]
+    return Expected(np.sum(parts, axis=0))
+
+
+@case("rho I s(angle) cos / (pi d^2)", "a spot's beam, fall-off and cut-off")
+def spot_falloff() -> Expected:
+    """s is 1 within the beam (10 degrees), 0 beyond the cut-off (25), and linear in the angle
+    between.  Pixels that the two circles may cross are not stated: s has kinks there."""
+    axis = np.array([0.3, 0.2, -2.0]) / np.linalg.norm([0.3, 0.2, -2.0])
+    half_pixel = 4.0 / 32 / 2
+
+    def irradiance(x: FloatArray, y: FloatArray) -> FloatArray:
+        to = np.stack([x, y, np.full_like(x, -2.0)], axis=-1)
+        d = np.linalg.norm(to, axis=-1)
+        angle = np.degrees(np.arccos(to @ axis / d))
+        s = np.clip((25.0 - angle) / 15.0, 0.0, 1.0)
+        close = np.minimum(abs(angle - 10.0), abs(angle - 25.0)) < np.degrees(half_pixel / 2.0)
+        return np.where(close, np.nan, s * 2.0 / d**3)
+
+    return _floor(irradiance, INTENSITY)
+
+
+@case("rho E / (pi d^2), times the area of the image in the pixel", "a projector's even image")
+def projector() -> Expected:
+    """A white image lights a plane across the axis evenly, with E / d^2 at the distance d.  45
+    degrees span its width, which is 1.5 times its height."""
+    a = 2.0 * np.tan(np.radians(22.5))
+    b = a / 1.5
+    corners = np.array([[-a, -b], [a, -b], [a, b], [-a, b]]) + np.array([0.2, 0.1])
+    return Expected(mix(drawn_from_above(corners, 4.0, 32), RHO * INTENSITY / 4.0 / np.pi))
+
+
+@case("rho E cos / pi", "a directional light on two slopes")
+def directional_on_roof() -> Expected:
+    """The slopes of a roof, tilted by 30 degrees about y, have normals (-1/2, 0, sqrt 3 / 2) and
+    (1/2, 0, sqrt 3 / 2).  The light comes from (0.5, 0.2, 1)."""
+    to = np.array([0.5, 0.2, 1.0]) / np.linalg.norm([0.5, 0.2, 1.0])
+    left, right = (np.array([s * 0.5, 0.0, np.sqrt(0.75)]) @ to for s in (-1.0, 1.0))
+    share = np.zeros((32, 32))
+    share[:, :16], share[:, 16:] = left, right
+    return Expected(share[..., None] * RHO * INTENSITY / np.pi)
+
+
+def disk(r2: FloatArray, height: float, radius: float) -> FloatArray:
+    """The irradiance of a level disk of radiance 1 at the distance sqrt(r2) from its axis."""
+    z = r2 + height**2 + radius**2
+    return np.asarray(
+        np.pi / 2.0 * (1.0 - (z - 2.0 * radius**2) / np.sqrt(z * z - 4.0 * r2 * radius**2))
+    )
+
+
+@case(
+    "rho L / 2 (1 - (h^2 + r^2 - a^2) / sqrt((h^2 + r^2 + a^2)^2 - 4 a^2 r^2))",
+    "a disk lamp",
+    "Howell & Mengüç, A Catalog of Radiation Transfer Configuration Factors, B-13",
+)
+def disk_lamp() -> Expected:
+    """The factor from a level element to a level disk, whose axis is at the distance r."""
+    return _floor(lambda x, y: disk((x - 0.7) ** 2 + y**2, 1.5, 0.9))
+
+
+LAMBERT = "rho L / (2 pi) sum over edges of angle times cosine"
+
+
+@case(LAMBERT, "a rectangle lamp, tilted", "Lambert 1760")
+def rectangle_lamp() -> Expected:
+    """Stokes' theorem turns the solid angle's cosine integral into one along the outline."""
+    a = np.radians(30.0)
+    corners = np.array([[x, y * np.cos(a), y * np.sin(a)] for x, y in _SQUARE]) * 0.8
+    return _floor(lambda x, y: floor_irradiance(corners + np.array([0.4, 0.3, 1.5]), x, y))
+
+
+_SQUARE = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
+TRIANGLE = np.array([[1.0, 2.0, 0.5], [1.5, 1.0, 1.5], [-1.0, 1.5, 1.0]])
+
+
+@case(LAMBERT, "a triangle lamp", "Lambert 1760")
+def triangle_lamp() -> Expected:
+    """As `rectangle_lamp`."""
+    return _floor(lambda x, y: floor_irradiance(TRIANGLE, x, y), width=3.0)
+
+
+@case(LAMBERT, "a box lamp: only the faces that a point sees", "Lambert 1760")
+def box_lamp() -> Expected:
+    """From below the middle of a level box only its lower face is seen; beside it, one or two of
+    its sides as well: each by Lambert's formula.  Edges of the box lie over borders of pixels."""
+
+    def irradiance(x: FloatArray, y: FloatArray) -> FloatArray:
+        low = [[a / 2, b / 2, 1.0] for a, b in _SQUARE]
+        total = floor_irradiance(low, x, y)
+        for axis in (0, 1):
+            for side in (-0.5, 0.5):
+                face = np.array([[side, a / 2, 1.5 + b / 2] for a, b in _SQUARE])
+                face = face if axis == 0 else face[:, [1, 0, 2]]
+                seen = (x, y)[axis] * np.sign(side) > 0.5
+                total = total + np.where(seen, floor_irradiance(face, x, y), 0.0)
+        return total
+
+    return _floor(irradiance)
+
+
+@case("rho L (r / d)^2 cos", "a sphere lamp", "Howell & Mengüç, B-42")
+def sphere_lamp() -> Expected:
+    """A sphere wholly above the horizon: its projected solid angle is pi (r / d)^2 cos."""
+
+    def irradiance(x: FloatArray, y: FloatArray) -> FloatArray:
+        d2 = (x - 0.5) ** 2 + (y + 0.4) ** 2 + 2.25
+        return np.asarray(np.pi * 0.64 * 1.5 / d2**1.5)
+
+    return _floor(irradiance)
+
+
+@case(
+    "rho L / pi (pi / 2 - asin(q / (h sin)) + (cos acos(-q cot) - q sqrt(1 - h^2 cos^2)) / h^2)",
+    "a sphere lamp that the floor cuts",
+    "Howell & Mengüç, B-43",
+)
+def setting_sphere() -> Expected:
+    """The horizon leaves a part of the sphere; h is the distance of its centre in radii, q the root
+    of h^2 - 1."""
+
+    def irradiance(x: FloatArray, y: FloatArray) -> FloatArray:
+        d = np.sqrt((x + 2.6) ** 2 + y**2 + 0.09)
+        h, cosine = d / 1.0, 0.3 / d
+        sine, q = np.sqrt(1.0 - cosine**2), np.sqrt(h * h - 1.0)
+        lune = cosine * np.arccos(-q * cosine / sine) - q * np.sqrt(1.0 - (h * cosine) ** 2)
+        return np.asarray(np.pi / 2.0 - np.arcsin(q / (h * sine)) + lune / h**2)
+
+    return _floor(irradiance, width=3.0)
+
+
+@case("rho L / pi times the integral of cos cos' / d^2 over the side that is seen", "a tube lamp")
+def tube_lamp() -> Expected:
+    """A level tube, seen from points below it and between its ends, shows the part of its side
+    whose normals point at them, and no cap.  Gauss's rule in angle and length, 32 x 32."""
+    nodes, weights = np.polynomial.legendre.leggauss(32)
+    radius, height, half = 0.2, 1.0, 2.5
+
+    def irradiance(x: FloatArray, y: FloatArray) -> FloatArray:
+        d = np.hypot(y, height)
+        middle, reach = np.arctan2(y, -height), np.arccos(radius / d)
+        angle = middle[..., None] + reach[..., None] * nodes
+        dy = radius * np.sin(angle) - y[..., None]
+        dz = height + radius * np.cos(angle)
+        # n . (p - q), the same all along the tube
+        facing = radius + (height * np.cos(angle) - y[..., None] * np.sin(angle))
+        dx = half * nodes - x[..., None]
+        d2 = (dy**2 + dz**2)[..., None] + dx[..., None, :] ** 2
+        inner = (1.0 / d2**2) @ (weights * half)
+        return np.asarray((dz * -facing * inner) @ (weights) * radius * reach)
+
+    return _floor(irradiance, pixels=16, order=5, width=3.0, bound=1e-9)
+
+
+@case(LAMBERT, "a lamp with a texture", "Lambert 1760")
+def checkered_lamp() -> Expected:
+    """Each quarter of a level square lamp by itself: first and third of one colour."""
+    total = np.zeros((32, 32, 3))
+    for x0 in (-0.5, 0.5):
+        for y0 in (-0.5, 0.5):
+            part = np.array([[x0 + a / 2, y0 + b / 2, 1.0] for a, b in _SQUARE])
+            # The lamp faces down: turned about x, its v axis runs along -y.
+            colour = np.array((0.5, 1.0, 2.0) if x0 * y0 > 0 else (3.0, 2.0, 1.0))
+            total += _floor(lambda x, y, p=part: floor_irradiance(p, x, y), colour).pixels  # type: ignore[misc]
+    return Expected(total)
+
+
+@case("sum of the formulas of a sphere, a disk and a triangle", "lamps of different kinds add up")
+def three_lamps() -> Expected:
+    """As `sphere_lamp`, `disk_lamp` and `triangle_lamp`, none of which hides another."""
+
+    def sphere(x: FloatArray, y: FloatArray) -> FloatArray:
+        d2 = (x + 2.0) ** 2 + (y + 2.0) ** 2 + 4.0
+        return np.asarray(np.pi * 0.64 * 2.0 / d2**1.5)
+
+    parts = (
+        (sphere, (2.0, 0.1, 0.1)),
+        (lambda x, y: disk((x - 1.5) ** 2 + (y + 1.5) ** 2, 1.0, 0.4), (0.1, 2.0, 0.1)),
+        (lambda x, y: floor_irradiance(TRIANGLE, x, y), (0.1, 0.1, 2.0)),
+    )
+    total = [_floor(f, np.array(colour), width=2.0).pixels for f, colour in parts]
+    return Expected(np.sum(total, axis=0))
+
+
+@case(LAMBERT, "a lamp shines from its front alone", "Lambert 1760")
+def lamp_back() -> Expected:
+    """Two level lamps side by side; the front of the second one points up."""
+    corners = np.array([[-0.75 + a / 2, b / 2, 1.0] for a, b in _SQUARE])
+    return _floor(lambda x, y: floor_irradiance(corners, x, y))
+
+
+@case("rho (a + b n_y 2/3)", "an environment map over slopes", "Ramamoorthi & Hanrahan 2001")
+def harmonic_sky() -> Expected:
+    """A sky of radiance a + b y sends pi a + b n_y 2 pi / 3 to the normal n: the clamped cosine
+    scales harmonics of order 1 by 2/3.  Seen on a sphere: n_y = y.  The map's 64 rows are linear
+    between their middles, which moves no mean of it by more than 3e-4."""
+
+    def irradiance(x: FloatArray, y: FloatArray) -> FloatArray:
+        return np.where(x * x + y * y < 0.9, 1.0 + 0.8 * y * 2.0 / 3.0, np.nan)
+
+    share = seen_from_above(irradiance, 2.0, 32)
+    return Expected(share[..., None] * RHO * np.array([1.0, 0.7, 0.4]), 3e-4)

@@ -1,0 +1,229 @@
+"""Rays and cameras: silhouettes, positions, depth and normals, the lens's blur."""
+
+import numpy as np
+
+from comparisons.truth.case import Expected, FloatArray, case
+from comparisons.truth.film import (
+    View,
+    coverage,
+    drawn_from_above,
+    level,
+    mix,
+    pixel_means,
+    seen_from_above,
+    turn,
+)
+
+FIRST = np.array([[-1.0, -0.6, 0.2], [0.8, -0.9, -0.5], [0.1, 0.7, 0.3]])
+SECOND = np.array([[0.9, 0.2, -1.0], [1.6, 0.1, -0.4], [1.3, 1.0, -0.8]])
+WARM, COLD = np.array([1.0, 0.5, 0.2]), np.array([0.2, 0.8, 1.5])
+RHO = np.array([0.8, 0.5, 0.2])
+
+AREA = "area of the projected outline in the pixel"
+
+
+def _triangles(view: View) -> Expected:
+    """Two triangles that shine, over black."""
+    first, second = view.drawn(FIRST), view.drawn(SECOND)
+    return Expected(mix(first, WARM) + mix(second, COLD))
+
+
+@case(AREA, "the pinhole projection, and its axes")
+def perspective() -> Expected:
+    """A pinhole camera maps polygons to polygons: their corners are projected, and the area of the
+    outline in each pixel is the share that shines."""
+    half = np.tan(np.radians(20.0))
+    return _triangles(View((0.3, 0.4, 4), (0.1, 0, 0), (0, 1, 0), (half, half), (32, 32)))
+
+
+@case(AREA, "the side of the picture that the angle of view spans; pictures that are not square")
+def perspective_fov_y() -> Expected:
+    """As `perspective`; 30 degrees span the 24 rows, so that the 48 columns span twice the
+    tangent."""
+    half = np.tan(np.radians(15.0))
+    return _triangles(View((0, 0, 5), (0.1, 0, 0), (0, 1, 0), (2 * half, half), (48, 24)))
+
+
+@case(AREA, "the frame of an oblique view with a tilted up")
+def perspective_rolled() -> Expected:
+    """As `perspective`, from aside: right is forward x up, and the true up right x forward."""
+    half = np.tan(np.radians(25.0))
+    return _triangles(View((1.5, -1, 3), (0.2, 0.1, -0.2), (1, 2, 0.5), (half, half), (32, 32)))
+
+
+@case(AREA, "a view rectangle off the axis")
+def perspective_sheared() -> Expected:
+    """As `perspective`; the view rectangle [-0.3, 0.5] x [-0.45, 0.35] at distance 1."""
+    view = View((0, 0, 4), (0, 0, 0), (0, 1, 0), (0.4, 0.4), (32, 32), (0.1, -0.05))
+    return _triangles(view)
+
+
+@case(AREA, "a real pinhole's film: upside down and mirrored")
+def pinhole_film() -> Expected:
+    """The picture of `perspective` with half a film over its distance as tangent, turned by 180
+    degrees."""
+    view = View((0, 0, 4), (0.1, 0, 0), (0, 1, 0), (0.36, 0.36), (32, 32))
+    return Expected(_triangles(view).pixels[::-1, ::-1])
+
+
+@case(AREA, "parallel rays, and the scale of their picture")
+def orthographic() -> Expected:
+    """Corners lose their z."""
+    first, second = (drawn_from_above(p[:, :2], 3.4, 32) for p in (FIRST, SECOND))
+    return Expected(mix(first, WARM) + mix(second, COLD))
+
+
+@case("area of the outline between the clipping planes", "the near and the far clipping plane")
+def clipped() -> Expected:
+    """The plane z = x, seen from z = 4 along -z: depth 4 - x.  Near 3.4 and far 4.75 leave -0.75 <
+    x < 0.6, whose images are lines of equal depth."""
+    near, far = 4.0 - np.array([3.4, 4.75])
+    view = View((0, 0, 4), (0, 0, 0), (0, 1, 0), (0.3, 0.3), (32, 32))
+    strip = [[far, -5, far], [near, -5, near], [near, 5, near], [far, 5, far]]
+    return Expected(mix(view.drawn(strip), WARM))
+
+
+@case("area of the ellipse in which the tangents' cone meets the film", "spheres: every pixel")
+def sphere_outline() -> Expected:
+    """Rays that touch a sphere make a cone with the sine r / d.  Off the axis the film cuts it in
+    an ellipse."""
+    half = np.tan(np.radians(30.0))
+    view = View((0, 0, 3), (0, 0, 0), (0, 1, 0), (half, half), (32, 32))
+    return Expected(mix(view.sphere((0.8, 0.5, 0), 0.7), WARM, (0.05, 0.1, 0.2)), 1e-9)
+
+
+@case("area of the convex hull of eight projected corners", "boxes under rotation")
+def box_outline() -> Expected:
+    """The silhouette of a convex solid is the hull of its corners' images."""
+    from scipy.spatial import ConvexHull
+
+    a, b = np.radians(35.0), np.radians(25.0)
+    about_y = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
+    about_x = np.array([[1, 0, 0], [0, np.cos(b), -np.sin(b)], [0, np.sin(b), np.cos(b)]])
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    corners = corners * [0.7, 0.5, 0.4] @ about_y.T @ about_x.T
+    half = np.tan(np.radians(20.0))
+    view = View((0, 0, 4), (0, 0, 0), (0, 1, 0), (half, half), (32, 32))
+    film = view.project(corners)
+    share = coverage(film[ConvexHull(film).vertices], 32, 32)
+    return Expected(mix(share, WARM, (0.05, 0.1, 0.2)))
+
+
+@case("rho I cos^3 / (pi h^2)", "depth: the inverse square of the distance, at every pixel")
+def depth_of_plane() -> Expected:
+    """A point light of intensity I at the eye, a plane across the view at distance h: a ray at the
+    angle t meets it at h / cos t, at the angle t."""
+    half = np.tan(np.radians(35.0))
+    view = View((0, 0, 2), (0, 0, 0), (0, 1, 0), (half, half), (32, 32))
+
+    def radiance(x: FloatArray, y: FloatArray) -> FloatArray:
+        return np.asarray((-view.rays(x, y)[..., 2:]) ** 3 / 4.0 * RHO * 5.0 / np.pi)
+
+    return Expected(pixel_means(radiance, 32, 32))
+
+
+@case("rho I cos / (pi d^2)", "depth and normal of a sphere")
+def depth_of_sphere() -> Expected:
+    """A point light at the eye.  The first hit is the smaller root of the quadratic; the normal is
+    radial.  All pixels lie within the outline."""
+    half = np.tan(np.radians(8.0))
+    view = View((0, 0, 4), (0, 0, 0), (0, 1, 0), (half, half), (32, 32))
+
+    def radiance(x: FloatArray, y: FloatArray) -> FloatArray:
+        d = view.rays(x, y)
+        b = 4.0 * d[..., 2]  # eye . d
+        t = -b - np.sqrt(b * b - 15.0)
+        p = view.eye + t[..., None] * d
+        cosine = -(p * d).sum(axis=-1)
+        return np.asarray((cosine / t**2)[..., None] * RHO * 20.0 / np.pi)
+
+    return Expected(pixel_means(radiance, 32, 32))
+
+
+def _lit(normal_z: FloatArray) -> FloatArray:
+    """Light along the view, of irradiance 4: rho 4 n_z / pi."""
+    return np.asarray(normal_z[..., None] * RHO * 4.0 / np.pi)
+
+
+LIT = "rho E n_z / pi"
+
+
+@case("rho E sqrt(1 - r^2) / pi", "normals of a sphere")
+def sphere_normals() -> Expected:
+    """Parallel light along the view: the cosine is that of the sphere's normal.  Pixels within 0.9
+    of the radius, where the root is smooth."""
+
+    def radiance(x: FloatArray, y: FloatArray) -> FloatArray:
+        r2 = x * x + y * y
+        return _lit(np.where(r2 < 0.81, np.sqrt(1.0 - np.minimum(r2, 0.81)), np.nan))
+
+    return Expected(seen_from_above(radiance, 2.0, 32, 10), 1e-9)
+
+
+@case("rho E sqrt(1 - ((r - R) / a)^2) / pi", "roots and normals of a torus")
+def torus_normals() -> Expected:
+    """A torus seen along its axis: at the distance r from it, the tube's circle has this normal.
+    Pixels whose distance from the tube's middle is below 0.8 of its radius."""
+
+    def radiance(x: FloatArray, y: FloatArray) -> FloatArray:
+        s = (np.hypot(x, y) - 1.0) / 0.5
+        return _lit(np.where(np.abs(s) < 0.8, np.sqrt(1.0 - np.minimum(s * s, 0.64)), np.nan))
+
+    return Expected(seen_from_above(radiance, 3.2, 32, 10), 1e-8)
+
+
+@case("rho E / (pi sqrt(1 + (h/R)^-2))", "a cone's slope, and its outline")
+def cone_normals() -> Expected:
+    """A cone seen along its axis has one cosine, R / sqrt(R^2 + h^2), over the disk of its base."""
+    c, s = turn()
+    share = drawn_from_above(np.stack([c, s], axis=1) * 0.9, 2.2, 32)
+    return Expected(mix(share, RHO * 4.0 / np.pi * 0.9 / np.hypot(0.9, 1.2)), 1e-9)
+
+
+@case("rho E sqrt(1 - (y / R)^2) / pi", "a cylinder across the view")
+def cylinder_normals() -> Expected:
+    """The cosine depends on the distance from the axis alone.  Rows within 0.9 of the radius."""
+
+    def radiance(x: FloatArray, y: FloatArray) -> FloatArray:
+        s = y / 0.8
+        return _lit(np.where(np.abs(s) < 0.9, np.sqrt(1.0 - np.minimum(s * s, 0.81)), np.nan))
+
+    return Expected(seen_from_above(radiance, 2.0, 32, 10), 1e-9)
+
+
+@case("rho E / (pi sqrt(1 + 4 a^2 r^2))", "a quadric's gradient")
+def paraboloid_normals() -> Expected:
+    """z = -a r^2 has the slope 2 a r."""
+
+    def radiance(x: FloatArray, y: FloatArray) -> FloatArray:
+        return _lit(1.0 / np.sqrt(1.0 + 4.0 * 0.49 * (x * x + y * y)))
+
+    return Expected(seen_from_above(radiance, 2.0, 32))
+
+
+@case(
+    "1/2 + (u sqrt(1 - u^2) + asin u) / pi",
+    "the circle of confusion",
+    "Potmesil & Chakravarty 1981",
+)
+def lens_blur() -> Expected:
+    """A lens of radius A in focus at f blurs points at depth z over a disk of radius A |1 - z / f|
+    in their plane.  Of it an edge leaves the segment beyond, at u radii from its middle."""
+    radius = 0.2 * abs(1.0 - 6.0 / 4.0)
+    place = level(2 * 6.0 * np.tan(np.radians(15.0)), 32)
+
+    def shining(x: FloatArray, y: FloatArray) -> FloatArray:
+        u = np.clip((place(x, y)[0] - 0.07) / radius, -1.0, 1.0)
+        return 0.5 + (u * np.sqrt(1.0 - u * u) + np.arcsin(u)) / np.pi
+
+    # Order 24: where the disk ends within a pixel, the segment grows as the power 1.5.
+    return Expected(mix(pixel_means(shining, 32, 32, 24), WARM), 1e-6)
+
+
+@case(AREA, "the plane in focus is sharp")
+def lens_focus() -> Expected:
+    """Whatever the point on the lens, its ray meets the plane in focus where that through the
+    middle does: the triangle's outline is the pinhole's."""
+    half = np.tan(np.radians(15.0))
+    view = View((0, 0, 6), (0, 0, 0), (0, 1, 0), (half, half), (32, 32))
+    return Expected(mix(view.drawn(FIRST * [1, 1, 0]), WARM))

@@ -1,0 +1,86 @@
+"""Transport: light that is scattered more than once."""
+
+import numpy as np
+
+from comparisons.truth.case import Expected, FloatArray, case
+from comparisons.truth.film import View, mix, seen_from_above
+from comparisons.truth.optics import floor_irradiance, fresnel
+
+RHO = np.array([0.8, 0.5, 0.2])
+LAMP = np.array([3.0, 2.0, 1.0])
+SHINE = np.array([0.3, 0.5, 1.0])
+
+
+@case("L / (1 - rho)", "a closed room that shines and scatters")
+def closed_room() -> Expected:
+    """Every point sees the same radiance B from everywhere: B = L + rho B."""
+    return Expected(np.broadcast_to(SHINE / (1.0 - RHO), (32, 32, 3)).copy())
+
+
+@case("L (1 + rho + rho^2 + rho^3)", "paths by their length")
+def path_lengths() -> Expected:
+    """As `closed_room`, cut after 4 edges."""
+    total = sum(RHO**k for k in range(4))
+    return Expected(np.broadcast_to(SHINE * total, (32, 32, 3)).copy())
+
+
+@case("L1 = L + rho1 L2; L2 = rho2 (F L1 + (1 - F) L2), F = (r / R)^2", "a sphere in a sphere")
+def sphere_in_sphere() -> Expected:
+    """The inner sphere sees the outer one alone; of the light that leaves the outer one, the share
+    F meets the inner one, by reciprocity of the areas."""
+    rho1, rho2, f = np.array([0.1, 0.4, 0.7]), RHO, 1.0 / 9.0
+    outer = rho2 * f * LAMP / (1.0 - rho2 * (1.0 - f) - rho2 * f * rho1)
+    half = np.tan(np.radians(35.0))
+    view = View((0, 0, 2.5), (0.5, 0.3, 0), (0, 1, 0), (half, half), (32, 32))
+    return Expected(mix(view.sphere((0, 0, 0), 1.0), LAMP + rho1 * outer, outer), 1e-9)
+
+
+@case("L1 = L + rho1 L2; L2 = rho2 L1", "an infinite canyon")
+def canyon() -> Expected:
+    """All light that leaves a wall meets the other one, but for 1e-10: the walls are 2e5 times as
+    wide as their distance.  The middle of the picture sees past their ends, by 1e-4 of a column."""
+    rho1, rho2 = np.array([0.7, 0.5, 0.3]), RHO
+    left = LAMP / (1.0 - rho1 * rho2)
+    pixels = np.empty((32, 32, 3))
+    pixels[:, :16], pixels[:, 16:] = left, rho2 * left
+    return Expected(pixels, 5e-5)
+
+
+@case("rho rho_w E / pi times the wall's form factor", "light of a wall on a floor")
+def wall_to_floor() -> Expected:
+    """Parallel light along the floor meets a wall alone, which then is a lamp of one radiance,
+    rho_w E / pi.  Paths of three edges."""
+    wall = np.array([[-1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, 1.0, 2.0], [-1.0, -1.0, 2.0]])
+    share = seen_from_above(lambda x, y: floor_irradiance(wall, x, y), 1.0, 32)
+    return Expected(share[..., None] * RHO * np.array([0.4, 0.6, 0.9]) * LAMP / np.pi**2)
+
+
+@case("rho L / pi (F(lamp) + rho_m F(image))", "the image of a lamp in a mirror")
+def mirror_image() -> Expected:
+    """A mirror at x = -1 makes of the lamp at x = 0.5 one at x = -2.5, dimmer by its reflectance:
+    the caustic of a flat mirror."""
+    lamp = np.array([[-0.8, -0.8, 1.5], [0.8, -0.8, 1.5], [0.8, 0.8, 1.5], [-0.8, 0.8, 1.5]])
+
+    def share(x: FloatArray, y: FloatArray) -> FloatArray:
+        direct = floor_irradiance(lamp + np.array([0.5, 0.0, 0.0]), x, y)[..., None]
+        image = floor_irradiance(lamp - np.array([2.5, 0.0, 0.0]), x, y)[..., None]
+        return np.asarray(direct + image * [0.9, 0.8, 0.7])
+
+    return Expected(seen_from_above(share, 1.8, 32) * RHO * LAMP / np.pi)
+
+
+@case("rho L h^2 / pi times the integral of (1 - F) / (1 + F) / d^4 over the lamp", "a window")
+def window() -> Expected:
+    """A level lamp through a level pane.  Gauss's rule over the lamp, 16 x 16."""
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+
+    def irradiance(x: FloatArray, y: FloatArray) -> FloatArray:
+        total = np.zeros_like(x)
+        for u, wu in zip(1.5 * nodes, 1.5 * weights, strict=True):
+            for v, wv in zip(1.5 * nodes, 1.5 * weights, strict=True):
+                d2 = (x - u) ** 2 + (y - v) ** 2 + 2.25
+                f = fresnel(1.5 / np.sqrt(d2), 1.5)
+                total += wu * wv * (1.0 - f) / (1.0 + f) * 2.25 / d2**2
+        return total
+
+    return Expected(seen_from_above(irradiance, 4.0, 16, 3)[..., None] * RHO * LAMP / np.pi, 1e-8)

@@ -1,0 +1,230 @@
+"""The results of truth for people and machines: a table, `results.json`, a page, a badge."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from rich.console import RenderableType
+
+from comparisons.report.templates import template
+from comparisons.report.templates import write as write_text
+from comparisons.report.terminal import fitted
+from comparisons.report.thumbnails import BLUE, RED, WHITE, png_url
+from comparisons.results.files import plain, write_json
+from comparisons.statistics.metrics import encode, white_level
+from comparisons.truth.case import AREAS, Case, Expected, FloatArray
+from comparisons.truth.judge import LEVEL, Judged
+from reference_rt.util.files import check_writable, replacing
+
+SCHEMA = 1
+"""Increased whenever a reader of the former layout would misread the new one."""
+
+Status = Literal["right", "off", "noisy", "invalid", "not run", "not comparable"]
+
+SIGNS: dict[Status, str] = {
+    "right": "✓",
+    "off": "✗",
+    "noisy": "?",
+    "invalid": "!",
+    "not run": "!",
+    "not comparable": "–",
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One case by one renderer.  judged: None where there are no pictures;  seconds: of them all;
+    pictures: data: URLs of formula, picture and difference, by their titles."""
+
+    case: Case
+    renderer: str
+    status: Status
+    reason: str
+    judged: Judged | None = None
+    seconds: float | None = None
+    pictures: tuple[tuple[str, str], ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        case: Case,
+        renderer: str,
+        judged: Judged,
+        expected: Expected,
+        pictures: FloatArray,
+        seconds: float | None = None,
+    ) -> "Row":
+        """The row of pictures (replicates, height, width, 3) that were judged."""
+        shown = () if judged.verdict == "invalid" else _shown(expected, pictures.mean(axis=0))
+        return cls(case, renderer, judged.verdict, judged.reason, judged, seconds, shown)
+
+
+def exit_code(rows: Sequence[Row]) -> int:
+    """As that of a suite: 4 if a case could not be run, or there is none; 3 for invalid pictures; 1
+    for one that is off or noisy; else 0."""
+    found = {row.status for row in rows}
+    if not rows or "not run" in found:
+        return 4
+    return 3 if "invalid" in found else int(bool(found & {"off", "noisy"}))
+
+
+Score = tuple[str, str, int, int]
+"""(area, renderer, cases that are right, cases that could be judged)."""
+
+
+def scores(rows: Sequence[Row]) -> list[Score]:
+    """By area and renderer."""
+    found: list[Score] = []
+    for renderer in dict.fromkeys(row.renderer for row in rows):
+        for area in AREAS:
+            some = [r for r in rows if (r.renderer, r.case.area) == (renderer, area)]
+            judged = [r for r in some if r.status != "not comparable"]
+            if judged:
+                right = sum(r.status == "right" for r in judged)
+                found.append((area, renderer, right, len(judged)))
+    return found
+
+
+def prepare(out: Path) -> None:
+    """Check that `write` can write, and remove what an earlier run wrote.  Raises ImageError."""
+    files = out / "results.json", out / "report.html"
+    check_writable(*files)
+    for file in files:
+        file.unlink(missing_ok=True)
+
+
+def write(out: Path, rows: Sequence[Row], provenance: Mapping[str, Any]) -> None:
+    """`results.json`, `report.html`, and a badge `truth-RENDERER.svg` for each renderer; each whole
+    or not at all.
+
+    {"schema": 1, "provenance": {...}, "false_alarm": of a case, "areas": [[area, renderer, right,
+     judged]], "rows": [{"case", "area", "renderer", "status", "reason", "value", "expected",
+     "errors", "threshold", "percent", "power", "worst", "seconds"}]}
+    """
+    document = {
+        "schema": SCHEMA,
+        "provenance": dict(provenance),
+        "false_alarm": LEVEL,
+        "areas": scores(rows),
+        "rows": [_flat(row) for row in rows],
+    }
+    write_json(out / "results.json", plain(document))
+    page = template("truth.html.jinja", "truth").render(
+        provenance=provenance,
+        level=LEVEL,
+        scores=[(AREAS[a], r, n, m) for a, r, n, m in scores(rows)],
+        areas=[(AREAS[a], [r for r in rows if r.case.area == a]) for a in AREAS],
+        signs=SIGNS,
+        triple=_triple,
+        number=_number,
+    )
+    write_text(out / "report.html", page)
+    for renderer in dict.fromkeys(row.renderer for row in rows):
+        total = [score for score in scores(rows) if score[1] == renderer]
+        with replacing(out / f"truth-{renderer}.svg") as temporary:
+            right, judged = sum(s[2] for s in total), sum(s[3] for s in total)
+            temporary.write_text(_badge(right, judged), encoding="utf-8")
+
+
+def _flat(row: Row) -> dict[str, Any]:
+    found: dict[str, Any] = {"case": row.case.name, "area": row.case.area, "renderer": row.renderer}
+    found |= {"status": row.status, "reason": row.reason, "seconds": row.seconds}
+    if row.judged is not None and row.judged.value:
+        names = ("value", "expected", "errors", "threshold", "percent", "power", "worst")
+        found |= {name: getattr(row.judged, name) for name in names}
+    return found
+
+
+def _badge(right: int, judged: int) -> str:
+    """An SVG of 110 x 20, in the usual look of badges."""
+    colour = "#1a6b35" if right == judged else "#a81b1b"
+    text = 'fill="#fff" font-family="Verdana,sans-serif" font-size="11" text-anchor="middle"'
+    return (
+        '<svg xmlns="http://www.w3.org/2000/svg" width="110" height="20" role="img">'
+        f"<title>truth: {right} of {judged}</title>"
+        '<rect width="45" height="20" fill="#555"/>'
+        f'<rect x="45" width="65" height="20" fill="{colour}"/>'
+        f'<g {text}><text x="22" y="14">truth</text>'
+        f'<text x="77" y="14">{right} / {judged}</text></g></svg>\n'
+    )
+
+
+def table(rows: Sequence[Row], width: int) -> RenderableType:
+    """For a terminal: a line for each case and renderer."""
+    lines = []
+    for row in rows:
+        j = row.judged
+        numbers = ("", "", "") if j is None or not j.value else (
+            f"{_number(j.errors)} of {j.threshold:.2g}", f"{j.percent:+.3f}", f"{j.power:.2g}"
+        )  # fmt: skip
+        reason = "" if row.status == "right" else row.reason
+        lines.append([row.case.name, row.renderer, row.status, *numbers, reason])
+    names = ["case", "renderer", "", "standard errors", "percent", "± percent", "reason"]
+    return fitted(width, names, lines, right=names[3:6])
+
+
+def score_card(rows: Sequence[Row], width: int) -> RenderableType:
+    """For a terminal: right cases by area."""
+    lines = [[AREAS[a], r, f"{n} of {m}"] for a, r, n, m in scores(rows)]
+    return fitted(width, ["area", "renderer", "right"], lines, right=["right"])
+
+
+def markdown(rows: Sequence[Row], provenance: Mapping[str, Any]) -> str:
+    """The tables of docs/truth.md: a line for each case, with a cell for each renderer."""
+    renderers = list(dict.fromkeys(row.renderer for row in rows))
+    text = ["| area | " + " | ".join(renderers) + " |", "|---" * (len(renderers) + 1) + "|"]
+    right = {(a, r): f"{n} of {m}" for a, r, n, m in scores(rows)}
+    areas = [area for area in AREAS if any(row.case.area == area for row in rows)]
+    for area in areas:
+        cells = [right.get((area, renderer), "") for renderer in renderers]
+        text.append(f"| {AREAS[area]} | {' | '.join(cells)} |")
+    for area in areas:
+        text += ["", f"### {AREAS[area].capitalize()}", ""]
+        text += ["| case | formula | what it tests | " + " | ".join(renderers) + " |"]
+        text += ["|---" * (len(renderers) + 3) + "|"]
+        for name in dict.fromkeys(row.case.name for row in rows if row.case.area == area):
+            some = {row.renderer: row for row in rows if row.case.name == name}
+            case = next(iter(some.values())).case
+            formula = case.formula.replace("|", "\\|").replace("*", "\\*")
+            cells = [_cell(some[r]) if r in some else "" for r in renderers]
+            text.append(f"| `{name}` | {formula} | {case.tests} | {' | '.join(cells)} |")
+    where = f"{provenance['machine']}, {provenance['cores']} cores, {provenance['date'][:10]}"
+    return "\n".join([*text, "", f"`reference-rt truth`; {where}.", ""])
+
+
+def _cell(row: Row) -> str:
+    j = row.judged
+    if j is None or not j.value:
+        return row.status
+    sign = "" if row.status == "right" else f"**{row.status}** "
+    return f"{sign}{j.percent:+.3f} ± {j.power:.2g} %"
+
+
+def _number(x: float) -> str:
+    return f"{x:.3g}" if np.isfinite(x) else "∞"
+
+
+def _triple(values: Sequence[float]) -> str:
+    """Three channels, or one number where they are equal."""
+    shown = [f"{x:.6g}" for x in values]
+    return shown[0] if len(set(shown)) == 1 else ", ".join(shown)
+
+
+def _shown(expected: Expected, mean: FloatArray) -> tuple[tuple[str, str], ...]:
+    """Formula, picture and difference; what the formula does not state is grey."""
+    stated = expected.stated[..., None]
+    truth = np.where(stated, expected.pixels, 0.0)
+    white = white_level(truth)
+    grey = np.full_like(truth, 128.0)
+    difference = np.where(stated, mean - truth, 0.0)
+    worst = np.take_along_axis(difference, np.abs(difference).argmax(axis=-1)[..., None], axis=-1)
+    span = float(np.abs(difference).max()) or 1.0
+    end = np.where(worst > 0.0, RED, BLUE)
+    red_blue = WHITE + np.abs(worst) / span * (end - np.array(WHITE))
+    return (
+        ("formula", png_url(np.where(stated, 255.0 * encode(truth, white), grey))),
+        ("picture", png_url(255.0 * encode(np.maximum(mean, 0.0), white))),
+        (f"difference, up to {span:.2g}", png_url(np.where(stated, red_blue, grey))),
+    )
