@@ -53,6 +53,23 @@ def stored(path: Path, key: str) -> Any:
     return None
 
 
+def known(
+    requests: Sequence[R], read: Callable[[R], T | None], fresh: bool = False
+) -> tuple[list[tuple[R, T]], list[R]]:
+    """Those whose results are stored, with these; and the others, which are all if `fresh`.
+
+    read: the stored result of a request, None where there is none.
+    """
+    done, left = [], []
+    for request in requests:
+        found = None if fresh else read(request)
+        if found is None:
+            left.append(request)
+        else:
+            done.append((request, found))
+    return done, left
+
+
 def measured(
     requests: Sequence[R],
     read: Callable[[R], T | None],
@@ -60,24 +77,14 @@ def measured(
     seconds: float,
     module: Sequence[str],
     *,
-    fresh: bool = False,
     kin: Callable[[R], Hashable] = lambda request: None,
     doing: Callable[[R, str], None] = lambda request, step: None,
-) -> Generator[tuple[R, T | None, Ended | None], None, None]:
-    """(request, result, how its process ended): of those that are stored first, with None for the
-    last; then of the others as they are measured, with None for the result of one that failed.
+) -> Generator[tuple[R, T | None, Ended], None, None]:
+    """(request, result, how its process ended) as they end; None for the result of one that failed.
 
-    read: the stored result of a request, None where there is none;  fresh: measure all;  the others
-    as `processes.run` has them.
+    read: see `known`;  the others as `processes.run` has them.
     """
-    left = []
-    for request in requests:
-        found = None if fresh else read(request)
-        if found is None:
-            left.append(request)
-        else:
-            yield request, found, None
-    with closing(processes.run(left, workers, seconds, doing, module, kin)) as running:
+    with closing(processes.run(requests, workers, seconds, doing, module, kin)) as running:
         for ended in running:
             yield ended.request, None if ended.failure else read(ended.request), ended
 

@@ -351,29 +351,24 @@ def run(
 
 
 class _Turns(Generic[R]):
-    """Hands out requests such that as few of one kin as possible run at the same time: two
-    processes would both compile the kernels that the first one stores for the others.  A kin that
-    has begun comes before others, so that it goes on in the process that has its kernels."""
+    """Hands out the first of those requests of whose kin the fewest run: two processes would both
+    compile the kernels that the first one stores for the others."""
 
     def __init__(self, requests: Sequence[R], kin: Callable[[R], Hashable]) -> None:
         self._kin, self._left = kin, list(requests)
         self._running: Counter[Hashable] = Counter()
-        self._begun: set[Hashable] = set()
 
     def __iter__(self) -> Iterator[tuple[R]]:
+        def running(number: int) -> int:
+            return self._running[self._kin(self._left[number])]
+
         while self._left:
-            request = self._left.pop(min(range(len(self._left)), key=self._rank))
-            kin = self._kin(request)
-            self._running[kin] += 1
-            self._begun.add(kin)
+            request = self._left.pop(min(range(len(self._left)), key=running))
+            self._running[self._kin(request)] += 1
             yield (request,)
 
     def ended(self, request: R) -> None:
         self._running[self._kin(request)] -= 1
-
-    def _rank(self, number: int) -> tuple[int, bool]:
-        kin = self._kin(self._left[number])
-        return self._running[kin], kin not in self._begun
 
 
 def _run_here(

@@ -308,14 +308,11 @@ def run_cases(
                     add(done.case, done.wall)
                     display.done(done.case, done.remark)
             write()
-            running = engine.measured(
-                requests, _stored, options.workers, seconds, options.worker,
-                fresh=True, doing=display.doing,
-            )  # fmt: skip
+            some = (requests, _stored, options.workers, seconds, options.worker)
+            running = engine.measured(*some, doing=display.doing)
             # If this is interrupted, they are closed at once: no worker outlives this process.
             with contextlib.closing(running):
                 for request, stored, ended in running:
-                    assert ended is not None
                     case = _case(request, stored, ended)
                     add(case, ended.wall)
                     display.done(case, f"{ended.wall:.1f} s")

@@ -2,11 +2,10 @@
 
 import time
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
 
 from comparisons.experiments.fuzz import assets
 from comparisons.experiments.fuzz import finding as stored
@@ -27,8 +26,6 @@ from comparisons.runs import engine
 from comparisons.runs.processes import Ended
 from reference_rt.util.errors import UsageError
 from reference_rt.util.workers import Threads, Workers
-
-T = TypeVar("T")
 
 SECONDS = 600.0
 """Time limit of a scene, wall clock.  One takes 1 to 10 s of CPU time, and a process on a shared
@@ -161,7 +158,8 @@ def _checked(plan: Plan, done: dict[int, Checked], start: float) -> Iterator[Che
         requests = [_request(plan, number) for number in batch]
         for tries_left in (1, 0):
             late: list[Request] = []
-            with closing(_measured(plan, requests, _stored, plan.limit)) as running:
+            some = (requests, _stored, plan.workers, plan.limit, WORKER)
+            with closing(engine.measured(*some)) as running:  # its processes end with it
                 for request, found, ended in running:
                     if tries_left and LATE in (ended.failure or ""):
                         late.append(request)
@@ -178,16 +176,6 @@ def _checked(plan: Plan, done: dict[int, Checked], start: float) -> Iterator[Che
 
 LATE = "took longer than"
 """In the failure of a request whose time was up."""
-
-
-def _measured(
-    plan: Plan, requests: list[Request], read: Callable[[Request], T | None], limit: float
-) -> Generator[tuple[Request, T | None, Ended], None, None]:
-    measured = engine.measured(requests, read, plan.workers, limit, WORKER, fresh=True)
-    with closing(measured) as running:  # its processes end with it
-        for request, found, ended in running:
-            assert ended is not None
-            yield request, found, ended
 
 
 def _dead(request: Request, ended: Ended) -> Checked:
@@ -234,7 +222,8 @@ def _reduce_all(plan: Plan, found: Run, say: Callable[[str], None]) -> None:
         for number, finding in chosen
     ]
     inside = [r for r in requests if not _died(r)]
-    for request, _, ended in _measured(plan, inside, _nothing, 3.0 * plan.shrink + plan.limit):
+    limit = 3.0 * plan.shrink + plan.limit
+    for request, _, ended in engine.measured(inside, _nothing, plan.workers, limit, WORKER):
         if ended.failure is not None:
             stored.add(plan.out, _unreduced(plan, request))
         say(f"scene {request.number}: reduced ({ended.wall:.0f} s)")
@@ -283,7 +272,7 @@ def _outside(plan: Plan, request: Request) -> Reduced:
         one = one.model_copy(update={"out": plan.out / "tried"})
         one.out.mkdir(exist_ok=True)
         limit = min(plan.limit, 30.0) if LATE not in wanted.cause else plan.limit / 2.0
-        ((_, _, ended),) = _measured(plan, [one], _nothing, limit)
+        ((_, _, ended),) = engine.measured([one], _nothing, plan.workers, limit, WORKER)
         return ended.failure is not None and without_numbers(ended.failure) == wanted.cause
 
     try:

@@ -122,20 +122,20 @@ def run(
 ) -> list[Found]:
     """Measure what is not stored yet; each result is stored in `out`/settings at once."""
     requests = [choice.request(one.id, s.name, x, out) for one, s, x in choice.settings()]
-    known: dict[Path, Found] = {}
-    limit = SECONDS[choice.effort]
+    done, left = engine.known(requests, _found, fresh)
+    results = {request.out: found for request, found in done}
+    for found in results.values():
+        report(found, "measured before")
     # From the last family on: what the first ones compile takes little, and they have many points,
     # which all processes share at the end.
-    for request, found, ended in engine.measured(
-        requests[::-1], _found, workers, limit, WORKER, fresh=fresh, kin=_family
-    ):
-        if found is None:
-            assert ended is not None
+    some = (left[::-1], _found, workers, SECONDS[choice.effort], WORKER)
+    for request, result, ended in engine.measured(*some, kin=_family):
+        if result is None:
             why = ended.failure or "its file cannot be read"
-            found = Found(request.family, request.series, request.x, {}, ended.wall, why)
-        known[request.out] = found
-        report(found, f"{found.seconds:.1f} s" if ended else "measured before")
-    return [known[request.out] for request in requests]
+            result = Found(request.family, request.series, request.x, {}, ended.wall, why)
+        results[request.out] = result
+        report(result, f"{result.seconds:.1f} s")
+    return [results[request.out] for request in requests]
 
 
 def _found(request: Request) -> Found | None:
@@ -159,8 +159,10 @@ def shoot(choice: Choice, found: Sequence[Found], out: Path, workers: Workers) -
             for x in places[some]
         }
         wanted = [request for pair in pairs.values() for request in pair]
-        made = engine.measured(wanted, _caption, workers, SECONDS["full"], WORKER, kin=_family)
-        captions = {request.out: caption for request, caption, _ in made}
+        done, left = engine.known(wanted, _caption)
+        made = engine.measured(left, _caption, workers, SECONDS["full"], WORKER, kin=_family)
+        captions: dict[Path, str | None] = {request.out: caption for request, caption in done}
+        captions |= {request.out: caption for request, caption, _ in made}
         for (place, x), pair in pairs.items():
             told = [captions[request.out] for request in pair]
             if place in seen or None in told or not _differ(*(request.out for request in pair)):
