@@ -49,6 +49,7 @@ def truth(
     invalid; 4: Mitsuba is missing.
     """
     with compare_extra("truth"):
+        from comparisons.mitsuba.backend import SCALAR
         from comparisons.report import templates, terminal
         from comparisons.runs.provenance import ours, provenance
         from comparisons.truth import outputs
@@ -73,6 +74,7 @@ def truth(
             scene = load(scenes / f"{case.name}.yaml", spp)
             rows += rendered(case, scene, who, replicates or REPLICATES, threads)
         progress("cases", 1.0)
+    facts |= {"variant": SCALAR} if "mitsuba" in who else {}
     facts |= {"seconds": round(time.perf_counter() - begun, 1)}
     _finish(out, rows, facts)
     console = terminal.console()

@@ -115,3 +115,12 @@ def hole_in_screen() -> Expected:
         return 1.0 - closed / np.pi
 
     return Expected(seen_from_above(seen, 2.0, 32)[..., None] * RHO * SKY)
+
+
+@case("rho E / pi, and 0 below the screen", "a shadow across a gap of 5e-5")
+def narrow_gap() -> Expected:
+    """A screen x > 0 hovers 5e-5 above the floor, and the camera is in the gap.  Rays that start a
+    fixed distance off their surface to avoid hitting it start beyond the screen."""
+    pixels = np.zeros((32, 32, 3))
+    pixels[:, :16] = RHO * LIGHT / np.pi
+    return Expected(pixels)
