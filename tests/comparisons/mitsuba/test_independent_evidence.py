@@ -1,4 +1,4 @@
-"""What Mitsuba and Cycles render is made of descriptions and other readers than ours, not of our tables."""
+"""What Mitsuba and Cycles render is made of descriptions and other readers than ours."""
 
 import ast
 import dataclasses
