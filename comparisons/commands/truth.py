@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 SCENES = Path("scenes/truth")
 
+BOTH = (("both", "ours"), ("both", "mitsuba"))
+
 
 @guarded
 def truth(
@@ -28,7 +30,9 @@ def truth(
         ),
     ] = None,
     out: Annotated[Path, out_folder("results, the page and the badge", "DIR")] = Path("out/truth"),
-    renderer: Annotated[str, typer.Option(metavar="NAME", help="ours, mitsuba or both.")] = "both",
+    renderer: Annotated[
+        str, typer.Option(metavar="NAME", help="ours, mitsuba, both or cycles.")
+    ] = "both",
     scenes: Annotated[
         Path, typer.Option(metavar="DIR", help="The folder of the scene files.")
     ] = SCENES,
@@ -58,9 +62,9 @@ def truth(
     from reference_rt.util.console import ProgressLine
 
     if renderer not in (*RENDERERS, "both"):
-        raise UsageError(f"--renderer: expected ours, mitsuba or both, got '{renderer}'")
+        raise UsageError(f"--renderer: expected ours, mitsuba, both or cycles, got '{renderer}'")
     picked = _chosen(names or ())
-    who = [each for each in RENDERERS if renderer in (each, "both")]
+    who = [each for each in RENDERERS if renderer == each or (renderer, each) in BOTH]
     outputs.prepare(out)
     if markdown is not None:
         templates.check(markdown, "truth")

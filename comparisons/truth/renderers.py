@@ -1,4 +1,4 @@
-"""The pictures of a case by ours and by Mitsuba."""
+"""The pictures of a case by ours, by Mitsuba and by Cycles."""
 
 import time
 from collections.abc import Sequence
@@ -7,6 +7,8 @@ from typing import Literal
 
 import numpy as np
 
+from comparisons.cycles.backend import Cycles
+from comparisons.cycles.surfaces import IneligibleError
 from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.translate import UntranslatableError, to_mitsuba
@@ -18,9 +20,9 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
 from reference_rt.shapes.shape import Solid
 
-Renderer = Literal["ours", "mitsuba"]
+Renderer = Literal["ours", "mitsuba", "cycles"]
 
-RENDERERS: tuple[Renderer, ...] = ("ours", "mitsuba")
+RENDERERS: tuple[Renderer, ...] = ("ours", "mitsuba", "cycles")
 
 REPLICATES = 4
 """Pictures of each renderer: the fewest whose spread tells the noise of tiles (48 degrees of
@@ -28,7 +30,7 @@ freedom)."""
 
 
 class NoCounterpartError(Exception):
-    """Mitsuba cannot show the scene."""
+    """Another renderer cannot show the scene, or is not judged by it."""
 
 
 def load(path: Path, spp: int | None = None) -> Scene:
@@ -73,6 +75,16 @@ def by_mitsuba(scene: Scene, replicates: int = REPLICATES) -> FloatArray:
     return np.stack(pictures)
 
 
+def by_cycles(scene: Scene, replicates: int = REPLICATES) -> FloatArray:
+    """The same by Cycles, where it computes what we do.  Raises NoCounterpartError,
+    ReferenceUnavailableError."""
+    try:
+        with Cycles(scene) as cycles:
+            return cycles.render(replicates, scene.resolved_sampler.spp, _seed(scene))
+    except IneligibleError as error:
+        raise NoCounterpartError(f"Cycles has no equal of {error}") from None
+
+
 def row_of(
     case: Case,
     scene: Scene,
@@ -86,11 +98,13 @@ def row_of(
     for renderer in who:
         start = time.perf_counter()
         try:
-            pictures = (
-                ours(scene, replicates, threads)
-                if renderer == "ours"
-                else by_mitsuba(scene, replicates)
-            )
+            match renderer:
+                case "ours":
+                    pictures = ours(scene, replicates, threads)
+                case "mitsuba":
+                    pictures = by_mitsuba(scene, replicates)
+                case "cycles":
+                    pictures = by_cycles(scene, replicates)
         except NoCounterpartError as error:
             rows.append(Row(case, renderer, "not comparable", str(error)))
             continue

@@ -14,6 +14,7 @@ from comparisons.commands.gate import gate
 from comparisons.commands.truth import truth
 from comparisons.truth.case import AREAS, cases
 from comparisons.truth.outputs import Row, exit_code, markdown, scores
+from comparisons.truth.renderers import load, ours
 
 SCENES = Path(__file__).parents[3] / "scenes" / "truth"
 CASE = cases()["perspective"]
@@ -79,14 +80,14 @@ def test_truth_writes_its_outputs(run):
 def test_the_page_in_a_browser(run, check_page):
     np.save("a.npy", CASE.compute().pixels / 2.0)
     run("gate", "--truth", "perspective", "a.npy")
-    check_page(Path("out/report.html"))
+    check_page(Path("out/report.html").absolute())
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["truth", "nothing"], "there is no case 'nothing'; expected all, a pattern"),
-        (["truth", "--renderer", "pbrt"], "--renderer: expected ours, mitsuba or both"),
+        (["truth", "--renderer", "pbrt"], "--renderer: expected ours, mitsuba, both or cycles"),
         (["gate", "--truth", "nothing", "a.npy"], "--truth: there is no case 'nothing'"),
         (["gate", "--truth", "all", "a.npy"], "is 96 cases; expected one, or --command"),
         (["gate", "--truth", "slab"], "expected either candidates or --command"),
@@ -162,3 +163,18 @@ def test_exit_codes_and_scores():
     assert scores(rows) == [("rays", "ours", 1, 1), ("rays", "mitsuba", 0, 1)]
     text = markdown(rows, {"machine": "m", "cores": 2, "date": "2026-11-25T00:00"})
     assert f"| {AREAS['rays']} | 1 of 1 | 0 of 1 |  |" in text
+
+
+def test_the_fixture_of_pytest(truth_gate, tmp_path):
+    """Right pictures pass, as arrays and as files; others fail with the reason."""
+    scene = load(SCENES / "point_over_floor.yaml", 16)
+    pictures = ours(scene)
+    truth_gate("point_over_floor", pictures)
+    paths = [tmp_path / f"{k}.npy" for k in range(len(pictures))]
+    for path, picture in zip(paths, pictures, strict=True):
+        np.save(path, picture)
+    truth_gate("point_over_floor", paths)
+    for wrong in (0.9 * pictures, [*paths[:2], tmp_path / "dim.npy"]):
+        np.save(tmp_path / "dim.npy", 0.5 * pictures[0])
+        with pytest.raises(pytest.fail.Exception, match=r"point_over_floor: (off|noisy)"):
+            truth_gate("point_over_floor", wrong)

@@ -1,0 +1,42 @@
+"""pytest plugin: the fixture `truth_gate`, which checks a picture against a formula.
+
+    def test_disk_lamp(truth_gate):
+        truth_gate("disk_lamp", [my_renderer("disk_lamp", seed) for seed in range(4)])
+
+It imports nothing but pytest until it is used.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+
+@pytest.fixture
+def truth_gate() -> Callable[[str, Any], None]:
+    """truth_gate(name, pictures) fails the test unless pictures are right for the case `name`.
+
+    pictures: linear radiance, (height, width, 3) or (replicates, height, width, 3): arrays, or a
+    list of files (EXR, PFM, NPY).
+    """
+
+    def check(name: str, pictures: Any) -> None:
+        import numpy as np
+
+        from comparisons.gate.pictures_in import read_candidates
+        from comparisons.gate.reference import stacked
+        from comparisons.truth.case import cases
+        from comparisons.truth.judge import judge
+
+        __tracebackhide__ = True
+        case = cases()[name]
+        listed = isinstance(pictures, list | tuple)
+        if listed and all(hasattr(p, "__fspath__") or isinstance(p, str) for p in pictures):
+            pictures = stacked([p for path in pictures for p in read_candidates(Path(path))])
+        array = np.asarray(pictures, np.float64)
+        found = judge(case.compute(), array if array.ndim == 4 else array[None])
+        if found.verdict != "right":
+            pytest.fail(f"{name}: {found.verdict}: {found.reason}")
+
+    return check
