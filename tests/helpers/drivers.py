@@ -18,6 +18,7 @@ class Probe:
     """What `probe` finds for n rays; t and again are inf for a miss."""
 
     def __init__(self, out: FloatArray) -> None:
+        self.out = out
         self.t, self.again, self.error = out[:, 0], out[:, 1], out[:, 2]
         self.p, self.n = out[:, 3:6], out[:, 6:9]
         self.start = out[:, 9:12]
@@ -31,24 +32,29 @@ def meet(shapes, kind, i, ray):
     return Hit(t, kind if t < math.inf else -1, i, u, v, -1)
 
 
+@kernel
+def probe_one(shapes, kind, i, ray, w, out):
+    """A ray that meets a primitive, and leaves it towards w."""
+    hit = meet(shapes, kind, i, ray)
+    out[0] = hit.t
+    out[1] = math.inf
+    if hit.kind < 0:
+        return
+    point = any_shape.surface(shapes, ray, hit)
+    u, v = any_shape.uv(shapes, ray, hit)
+    leaving = ray_from(point, w)
+    again = meet(shapes, kind, i, leaving)
+    out[1], out[2] = again.t, point.error
+    out[3], out[4], out[5] = point.p
+    out[6], out[7], out[8] = point.n
+    out[9], out[10], out[11] = leaving.o
+    out[12], out[13], out[14] = u, v, any_shape.face(shapes, hit)
+
+
 @entry_kernel
 def _probe(shapes, kind, rows, o, d, w, out):
     for i in range(len(o)):
-        ray = Ray(row(o, i), row(d, i), math.inf)
-        hit = meet(shapes, kind, rows[i], ray)
-        out[i, 0] = hit.t
-        out[i, 1] = math.inf
-        if hit.kind < 0:
-            continue
-        point = any_shape.surface(shapes, ray, hit)
-        u, v = any_shape.uv(shapes, ray, hit)
-        leaving = ray_from(point, row(w, i))
-        again = meet(shapes, kind, rows[i], leaving)
-        out[i, 1], out[i, 2] = again.t, point.error
-        out[i, 3], out[i, 4], out[i, 5] = point.p
-        out[i, 6], out[i, 7], out[i, 8] = point.n
-        out[i, 9], out[i, 10], out[i, 11] = leaving.o
-        out[i, 12], out[i, 13], out[i, 14] = u, v, any_shape.face(shapes, hit)
+        probe_one(shapes, kind, rows[i], Ray(row(o, i), row(d, i), math.inf), row(w, i), out[i])
 
 
 @entry_kernel

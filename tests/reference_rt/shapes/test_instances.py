@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from builders import icosphere, placed, unit_vectors, write_obj
-from drivers import leave_scene
+from builders import icosphere, placed, write_obj
 
 import reference_rt as rt
 from reference_rt.core import transform
@@ -171,28 +170,6 @@ def test_more_copies_than_fit_are_refused(tmp_path, monkeypatch):
     scene._folder = tmp_path
     with pytest.raises(rt.SceneError, match="over 20 copies"):
         _ = scene.tables
-
-
-@pytest.mark.slow
-def test_no_copy_hits_itself_when_left(tmp_path):
-    """Unequal scales up to 1 : 1e6, far from the origin."""
-    rng = np.random.default_rng(6)
-    for scale in ((1.0, 1.0, 1.0), (1e3, 1.0, 1e-3), (1e-8, 1e-8, 1e-8)):
-        steps = (transform.Scale(scale=scale), *placed(rng, 1.0, 100.0))
-        scene = rt.Scene(
-            camera=rt.Perspective(),
-            groups={"g": (rt.Box(), rt.Sphere(radius=0.5, center=(0, 0, 3.0)))},
-            shapes=(rt.Instance(group="g", transform=steps),),
-        )
-        m = transform.affine(steps)
-        inner = rng.uniform(-1.0, 1.0, (N, 3)) + [0.0, 0.0, 3.0] * rng.integers(0, 2, (N, 1))
-        target = transform.apply_points(m, inner)
-        o = target + 10.0 * np.abs(m[:, :3]).max() * unit_vectors(rng, N)
-        again, hit = leave_scene(scene, o, target - o, unit_vectors(rng, N))
-        assert hit.sum() > N // 20
-        # Convex shapes: a ray that leaves outwards meets at most the other one, which is as far as
-        # the two are apart.
-        assert (again[hit] > 1e-3 * min(scale)).all()
 
 
 def test_refusals():

@@ -1,21 +1,12 @@
 """Planes: rational arithmetic, parallel rays, far away; the half space below as a solid."""
 
 import math
-from fractions import Fraction as Q
 
 import numpy as np
 import pytest
 from builders import U, shapes_in_order, unit_vectors
 from drivers import probe
-from flat_checks import (
-    ExactHits,
-    check_distances,
-    check_normal,
-    lattice_hits,
-    random_map,
-    rays_at_plane,
-)
-from rational import q
+from placed_shapes import random_map
 
 import reference_rt as rt
 from reference_rt.core import transform
@@ -23,59 +14,6 @@ from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.shapes import PLANE
 from reference_rt.shapes.flat import base, plane
-
-
-def random_planes(rng, n, stretch, offset):
-    shapes = [rt.Plane(transform=(random_map(rng, stretch, offset),)) for _ in range(n)]
-    return shapes, *shapes_in_order(shapes)
-
-
-@pytest.mark.parametrize(("stretch", "offset", "reach"), [(0, 3, 3), (3, 3, 1), (1, 3, 1e6)])
-def test_against_rational_arithmetic(stretch, offset, reach):
-    """t, normal and uv; sheared, mirrored, scaled by 1e-3 to 1e3; met far from the origin, from
-    above, below and pointing away."""
-    rng = np.random.default_rng(1)
-    n = 400
-    shapes, tables, rows = random_planes(rng, n, stretch, offset)
-    table = tables.planes
-    x, y = reach * rng.uniform(-1, 1, (2, n))
-    o, d = rays_at_plane(rng, table, rows, x, y, reach * rng.uniform(0.1, 3, n))
-    d *= rng.choice([-1, 1, 1], (n, 1))
-    found, right = probe(tables, PLANE, rows, o, d), ExactHits(table, rows, o, d)
-    for i in range(n):
-        t = right.t[i]
-        assert np.isfinite(found.t[i]) == (t > 0)
-        if t < 0:
-            continue
-        assert abs(float(Q(found.t[i]) - t)) <= right.t_error[i]
-        assert abs(float(Q(found.u[i]) - right.x[i])) <= right.x_error[i]
-        assert abs(float(Q(found.v[i]) - right.y[i])) <= right.y_error[i]
-        normal = check_normal(found.n[i], shapes[i], table, rows[i])
-        # The point lies in the plane of x_edge and y_edge, to within its error.
-        off = [p - c for p, c in zip(q(found.p[i]), q(table.center[rows[i]]), strict=True)]
-        assert abs(sum(float(a) * b for a, b in zip(off, normal, strict=True))) <= found.error[i]
-    assert 0.5 * n < np.isfinite(found.t).sum() < 0.8 * n
-
-
-def test_distances_are_within_16_ulp_of_size():
-    """Met at a cosine of 0.1 and more, at an ordinary scale."""
-    rng = np.random.default_rng(2)
-    _, tables, rows = random_planes(rng, 600, 0.5, 3.0)
-    x, y = rng.uniform(-1, 1, (2, 600))
-    o, d = rays_at_plane(rng, tables.planes, rows, x, y, rng.uniform(0.1, 10, 600))
-    check_distances(tables, PLANE, rows, o, d)
-
-
-def test_on_a_lattice():
-    """Both faces are hit; parallel rays miss, in the plane too, for either zero."""
-    o, d, found = lattice_hits(rt.Plane(), PLANE)
-    for i in range(len(o)):
-        t = -o[i, 2] / d[i, 2] if d[i, 2] != 0 else math.inf
-        t = t if t > 0 else math.inf
-        assert found.t[i] == t, (o[i], d[i])
-        if t < math.inf:
-            assert found.p[i].tolist() == (o[i] + t * d[i]).tolist()
-            assert [found.u[i], found.v[i]] == found.p[i, :2].tolist()
 
 
 def test_signed_distance():

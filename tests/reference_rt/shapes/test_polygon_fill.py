@@ -5,9 +5,7 @@ import math
 import numpy as np
 import pytest
 from builders import U
-from flat_checks import (
-    random_map,
-)
+from placed_shapes import random_map
 from polygon_checks import EIGHT, PENTAGRAM, regular, seen_from_above, square
 
 import reference_rt as rt
@@ -215,9 +213,3 @@ def test_points_off_the_plane_by_their_rounding():
         points[7] += 64_000 * U * np.abs(points).max() * rotation[:, 2]
         with pytest.raises(ValueError, match=r"ring 0: point \d+ is .* off the plane"):
             rt.Polygon(rings=(points.tolist(),)).tabulate(TabulationContext())
-
-
-def test_no_solid():
-    shape = rt.Polygon(rings=(square(0, 1),))
-    with pytest.raises(rt.SceneError, match="it encloses no space; expected a solid"):
-        rt.build_tables(rt.Scene(shapes=(rt.Sphere() - shape,)))
