@@ -12,7 +12,7 @@ from quadric_kinds import KINDS as QUADRICS
 
 import reference_rt as rt
 from comparisons.geometry.exact import all_hits
-from comparisons.geometry.exact.dyadic import nearest
+from comparisons.geometry.exact.dyadic import NEVER, nearest
 from reference_rt.core import transform
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3
@@ -44,8 +44,9 @@ def seeded(name, *more):
 
 def check_hits(name, placed, o, d, bend=256.0):
     """Hit or miss and the face are the exact ones; t, point and normal to roundings, as seen head
-    on; the point is in the bounds, and on the surface to within the error that it names.  A shift
-    along the surface turns the normal by shift / radius of curvature, size / `bend` at least."""
+    on; the normal is on the side that the ray enters from; the point is in the bounds, and on the
+    surface to within the error that it names.  A shift along the surface turns the normal by shift
+    / radius of curvature, size / `bend` at least."""
     # Where two planes meet, f is flat: the cosine alone does not say how well t is known.
     ulps = 512.0 if name == "pair of planes" else 16.0
     found, true = placed.probe(o, d), placed.first(o, d)
@@ -64,7 +65,11 @@ def check_hits(name, placed, o, d, bend=256.0):
     assert (np.abs(np.sum(off * n, axis=1)) <= error + rounding).all()
     largest = placed.reach + np.abs(p).max(axis=1)
     assert (error <= 512.0 * U * largest / np.minimum(1.0, cosine * 1e6)).all()
-    turned = found.n[i] * np.sign(np.sum(found.n[i] * n, axis=1, keepdims=True)) - n
+    crossings = all_hits(placed.field, placed.row, o, d)
+    first = np.where(crossings.t > 0, crossings.t, NEVER).argmin(axis=1)
+    enters = crossings.enters[np.arange(len(o)), first]
+    n *= np.where(enters, -1.0, 1.0)[:, None] * np.sign(np.sum(n * d, axis=1, keepdims=True))
+    turned = found.n[i] - n
     limit = bend / 16.0 * shift / placed.size * (name not in FLAT) + 16.0 * U / cosine
     assert (np.linalg.norm(turned, axis=1) <= limit).all()
     assert (placed.lower <= p).all()
