@@ -33,7 +33,7 @@ LONGEST_FIRST = (
     "test_rungs",
     "test_stability_metamorphic",
     "test_film_layers",
-    "test_properties_of_rays",
+    "test_crossings",
     "test_gate",
     "test_stability_leaving",
     "test_invariances",

@@ -5,10 +5,9 @@ import math
 import numpy as np
 
 from reference_rt import shapes as any_shape
-from reference_rt.accel.geometry import closest_hit, surface
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import Hit, Ray, ray_from
-from reference_rt.core.vec3 import dot, row
+from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel, kernel
 from reference_rt.shapes import TABLES
 from reference_rt.shapes.meshes.watertight import shear_of
@@ -55,30 +54,6 @@ def probe_one(shapes, kind, i, ray, w, out):
 def _probe(shapes, kind, rows, o, d, w, out):
     for i in range(len(o)):
         probe_one(shapes, kind, rows[i], Ray(row(o, i), row(d, i), math.inf), row(w, i), out[i])
-
-
-@entry_kernel
-def _leave(geometry, o, d, w, out):
-    for i in range(len(o)):
-        ray = Ray(row(o, i), row(d, i), math.inf)
-        hit = closest_hit(geometry, ray)
-        out[i] = -1.0
-        if hit.kind >= 0:
-            point = surface(geometry, ray, hit)
-            away = row(w, i)
-            if dot(away, point.n) < 0.0:
-                away = -away
-            out[i] = closest_hit(geometry, ray_from(point, away)).t
-
-
-def leave_scene(scene, o, d, w):
-    """Ray i meets the scene, then leaves what it hit towards w[i] or -w[i], whichever is on the
-    normal's side: (t of what it meets next, whether there was a hit)."""
-    out = np.zeros(len(o))
-    arrays = (np.ascontiguousarray(a, float) for a in (o, d, w))
-    with np.errstate(all="ignore"):
-        _leave(scene.tables.geometry, *arrays, out)
-    return out, out >= 0.0
 
 
 def probe(shapes, kind, rows, o, d, w=None) -> Probe:

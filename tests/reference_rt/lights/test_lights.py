@@ -86,22 +86,6 @@ def test_a_rectangle_shines_with_its_front_alone():
     assert not estimate(lit(rt.Rectangle(transform=away, material="lamp")))[0].any()
 
 
-@pytest.mark.parametrize("position", [(0, 2, 0), (3, 4, 0), (1e3, 1e3, 1e3)])
-@pytest.mark.parametrize("parts", [{}, WHITTED], ids=["path", "whitted"])
-def test_point_light_by_the_inverse_square(position, parts):
-    film = rt.Film(width=2, height=2)
-
-    def picture(position):
-        light = rt.Point(position=position, intensity=(7, 8, 9))
-        return rt.render(scene_of(FLOOR, lights=(light,), film=film, **parts)).colour
-
-    r2 = float(np.dot(position, position))
-    expected = RHO / math.pi * [7, 8, 9] * (position[1] / math.sqrt(r2)) / r2
-    # No noise; the view is 1e-9 wide around the origin and the light some units away.
-    assert np.allclose(picture(position), expected, rtol=1e-8)
-    assert not picture((0.0, -2.0, 0.0)).any()
-
-
 def test_something_in_the_way():
     """A wall between a point light and the floor."""
     wall = rt.Sphere(center=(0, 1, 0), radius=0.1)

@@ -112,6 +112,26 @@ def test_crossings_are_what_repeated_first_hits_beyond_the_last_find(forms, rays
         assert getattr(part, name).tobytes() == getattr(found, name)[inside].tobytes(), name
 
 
+def test_the_way_back_is_free(forms, rays):
+    """From just before what was hit, back to the origin, nothing is in the way."""
+    scene, (o, d) = forms[0], rays
+    t = scene.intersect(o, d).t
+    hit = np.isfinite(t)
+    # A millionth short: points are off by 1e-14, which at a cosine of 1e-8 is that along the ray.
+    short = t[hit] * (1.0 - 1e-6)
+    p = o[hit] + d[hit] * short[:, None]
+    # And a millionth short of the origin, which may lie on a surface itself.
+    assert not scene.occluded(p, -d[hit], t_max=short * (1.0 - 1e-6)).any()
+
+
+def test_rays_do_not_depend_on_each_other(forms, rays):
+    scene, (o, d) = forms[0], rays
+    order = np.random.default_rng(8).permutation(len(o))
+    one, two = scene.intersect(o, d), scene.intersect(o[order], d[order])
+    for name in FIELDS:
+        assert getattr(one, name)[order].tobytes() == getattr(two, name).tobytes(), name
+
+
 @pytest.mark.parametrize("hierarchy", ["median", "spatial", "none"])
 def test_hierarchies_change_nothing(forms, rays, hierarchy):
     scene, _ = forms

@@ -40,23 +40,6 @@ def test_the_point_is_off_by_no_more_than_its_error_at_the_horizon():
 # ---- among other shapes -------------------------------------------------------------------------
 
 
-def test_outside_of_the_hierarchy():
-    """Among many spheres, with any hierarchy: the same hits as with none."""
-    rng = np.random.default_rng(5)
-    spheres = [rt.Sphere(center=tuple(c), radius=0.3) for c in rng.uniform(-3, 3, (60, 3))]
-    planes = [rt.Plane(transform=(random_map(rng),)) for _ in range(2)]
-    o, d = rng.uniform(-4, 4, (500, 3)), unit_vectors(rng, 500)
-    found = [
-        rt.Scene(shapes=(*planes, *spheres), hierarchy=h).intersect(o, d)
-        for h in ("none", "sah", "median")
-    ]
-    for other in found[1:]:
-        assert np.array_equal(found[0].t, other.t)
-        assert np.array_equal(found[0].shape, other.shape)
-    assert set(found[0].shape) >= {0, 1}
-    assert (found[0].shape >= 2).sum() > 50
-
-
 def test_not_in_a_group():
     scene = rt.Scene(groups={"ground": (rt.Plane(),)}, shapes=(rt.Instance(group="ground"),))
     with pytest.raises(rt.SceneError, match=r"groups\.ground\[0\]: it is infinite; expected"):

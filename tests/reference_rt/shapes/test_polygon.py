@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from builders import U, unit_vectors
+from builders import U
 from placed_shapes import plane_points, random_map, rays_at
 from polygon_checks import count, edges_of, regular, seen_from_above, square, winding
 
@@ -179,25 +179,3 @@ def test_extreme_scales(scale):
         hits = rt.Scene(shapes=(shape,)).intersect(o, [[0, 0, -scale]] * 2)
         assert hits.t.tolist() == [1, math.inf]
         assert hits.uv[0].tolist() == [0.75, 0.625]
-
-
-def test_many_polygons_in_a_hierarchy():
-    """Outlines of any length, in the order of the leaves: the same hits as one by one."""
-    rng = np.random.default_rng(10)
-    shapes = tuple(
-        rt.Polygon(
-            rings=(regular(int(rng.integers(3, 30)), radius=0.5),),
-            transform=(transform.Translate(translate=tuple(rng.uniform(-3, 3, 3))),),
-        )
-        for _ in range(60)
-    )
-    o, d = rng.uniform(-4, 4, (2000, 3)), unit_vectors(rng, 2000)
-    found = [
-        rt.Scene(shapes=shapes, hierarchy=h).intersect(o, d) for h in ("none", "sah", "spatial")
-    ]
-    for other in found[1:]:
-        assert np.array_equal(found[0].t, other.t)
-        assert np.array_equal(found[0].shape, other.shape)
-    assert len(set(found[0].shape)) > 40
-    one_by_one = np.array([rt.Scene(shapes=(s,)).intersect(o, d).t for s in shapes])
-    assert np.array_equal(one_by_one.min(axis=0), found[0].t)
