@@ -9,10 +9,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from builders import U, unit_vectors
-from placed_shapes import Placed, put
+from placed_shapes import Placed, anywhere, put
 from quadric_kinds import KINDS, quadric_of
 
 import reference_rt as rt
+from reference_rt.core import transform
 from reference_rt.util.errors import SceneError
 
 # ---- bounds, coordinates, where f is flat -------------------------------------------------------
@@ -21,6 +22,35 @@ from reference_rt.util.errors import SceneError
 def test_bounds_of_an_ellipsoid_are_tight():
     placed = Placed(put(rt.Sphere(radius=0.7), np.diag([1.0, 2.0, 3.0])))
     assert np.allclose([placed.upper, -placed.lower], [0.7, 1.4, 2.1], rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_hits_are_where_the_description_says(name):
+    """f is 0 on face 0; the other faces are those of the box, by number."""
+    rng = np.random.default_rng(18)
+    for shape in KINDS[name]:
+        if shape.type != "quadric":
+            continue
+        placed = Placed(anywhere(rng, shape))
+        o, d = placed.rays(rng, 400, (-1.0, 1.0))
+        found = placed.probe(o, d)
+        hit = np.isfinite(found.t)
+        assert hit.sum() > 20
+        m = transform.affine(placed.shape.transform)
+        q = (found.p[hit] - m[:, 3]) @ np.linalg.inv(m[:, :3]).T
+        x, y, z = q.T
+        f = shape.coefficients @ np.array(
+            [x * x, y * y, z * z, x * y, y * z, x * z, x, y, z, np.ones(len(x))]
+        )
+        face = found.face[hit].astype(int)
+        assert np.abs(f[face == 0]).max(initial=0.0) < 1e-9
+        ends, cap = np.array([*shape.lower, *shape.upper]), face > 0
+        assert np.allclose(q[cap, (face[cap] - 1) % 3], ends[face[cap] - 1], atol=1e-9)
+        assert (f[cap] <= 1e-9).all()
+        assert (
+            np.abs(2.0 * q - np.add(shape.lower, shape.upper))
+            <= np.subtract(shape.upper, shape.lower) + 1e-9
+        ).all()
 
 
 def test_coordinates():
