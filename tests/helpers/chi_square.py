@@ -167,12 +167,7 @@ def _start(chart: Chart) -> FloatArray:
 
 
 def _cells(
-    density: Density,
-    chart: Chart,
-    share: float,
-    tolerance: float,
-    samples: FloatArray,
-    pilots: int,
+    density: Density, chart: Chart, share: float, tolerance: float, samples: FloatArray, pilots: int
 ) -> tuple[FloatArray, IntArray]:
     """Cells with at most about `share` of the density and of the pilots, the first of the samples,
     each: their integrals, and how many of the other samples are in each.

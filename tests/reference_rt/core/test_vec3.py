@@ -5,13 +5,7 @@ import math
 import numpy as np
 from builders import U, unit_vectors
 
-from reference_rt.core.vec3 import (
-    Vec3,
-    frame_from_normal,
-    length,
-    normalize,
-    row,
-)
+from reference_rt.core.vec3 import Vec3, frame_from_normal, length, normalize, row
 from reference_rt.jit.kernel import entry_kernel
 
 

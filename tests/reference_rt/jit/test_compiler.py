@@ -26,9 +26,7 @@ def test_pyproject_asks_for_what_is_supported():
 
 
 @pytest.mark.parametrize(
-    ("owner", "name"),
-    compiler.REPLACED,
-    ids=[f"{o.__name__}.{n}" for o, n in compiler.REPLACED],
+    ("owner", "name"), compiler.REPLACED, ids=[f"{o.__name__}.{n}" for o, n in compiler.REPLACED]
 )
 def test_a_method_that_is_gone_is_named_in_one_line(owner, name, monkeypatch):
     for cls in owner.__mro__:

@@ -8,10 +8,7 @@ import reference_rt as rt
 from reference_rt.core import transform
 
 N = 8_000
-TINY = (
-    transform.Scale(scale=(1e-3, 1e-3, 1e-3)),
-    transform.Translate(translate=(0.0, 0.0, -1e6)),
-)
+TINY = (transform.Scale(scale=(1e-3, 1e-3, 1e-3)), transform.Translate(translate=(0.0, 0.0, -1e6)))
 ELSEWHERE = (
     rt.Sphere(transform=TINY),
     rt.Box(transform=TINY),

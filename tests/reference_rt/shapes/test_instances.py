@@ -108,10 +108,7 @@ def test_copies_of_a_file_are_instances(tmp_path, rows):
         every = [rt.Instance(group=group, file="copies.npy", transform=outer)]
         found = rt.Scene(
             groups={"ball": ball, "all": tuple(every if many else one)},
-            shapes=(
-                *(every if many else one),
-                rt.Instance(group="all", transform=outer),
-            ),
+            shapes=(*(every if many else one), rt.Instance(group="all", transform=outer)),
         )
         found._folder = tmp_path
         return found.tables.geometry

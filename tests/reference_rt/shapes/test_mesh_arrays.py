@@ -19,13 +19,7 @@ def ball():
     vertices = vertices * rng.uniform(0.9, 1.1, (len(vertices), 1))
     normals = vertices + rng.normal(size=vertices.shape) * 0.1
     uv, colours = rng.uniform(size=(len(vertices), 2)), rng.uniform(size=vertices.shape)
-    return {
-        "vertices": vertices,
-        "faces": faces,
-        "normals": normals,
-        "uv": uv,
-        "colours": colours,
-    }
+    return {"vertices": vertices, "faces": faces, "normals": normals, "uv": uv, "colours": colours}
 
 
 def as_file(arrays, folder):
