@@ -129,16 +129,3 @@ def test_operands_must_be_solids(tmp_path):
     assert "edge" in message
     with pytest.raises(rt.SceneError, match="shapes"):
         rt.Scene.parse("shapes: [{type: union, of: []}]")
-
-
-def test_yaml_and_python_say_the_same():
-    text = """\
-shapes:
-  - type: intersection
-    of:
-      - {type: sphere}
-      - {type: difference, of: [{type: box}, {type: sphere, radius: 0.5}]}
-"""
-    scene = rt.Scene.parse(text)
-    assert scene.shapes[0] == rt.Sphere() & rt.Box() - rt.Sphere(radius=0.5)
-    assert rt.Scene.parse(scene.to_yaml()) == scene

@@ -70,20 +70,6 @@ def test_tables_are_those_of_the_file(tmp_path, names, more):
         assert column is None or np.array_equal(column, expected), name
 
 
-def test_hits_are_those_of_the_file(tmp_path):
-    arrays = ball()
-    rng = np.random.default_rng(12)
-    o = rng.normal(size=(500, 3)) * 3
-    d = rng.normal(size=(500, 3)) * 0.4 - o
-    found = [
-        rt.Scene(shapes=(mesh,)).intersect(o, d)
-        for mesh in (rt.Mesh(**arrays), rt.Mesh(file=as_file(arrays, tmp_path)))
-    ]
-    assert np.isfinite(found[0].t).mean() > 0.5
-    for name, values in vars(found[0]).items():
-        assert np.array_equal(values, getattr(found[1], name)), name
-
-
 @pytest.mark.parametrize("names", SOME.values(), ids=SOME)
 def test_round_trips(names):
     """Every bit, in JSON and YAML, as lists."""
