@@ -1,4 +1,6 @@
-"""Solids: the laws of sets, volumes, coincident faces, normals and materials on cut faces."""
+"""Solids: coincident faces, normals, parts and materials on cut faces, in groups.
+
+F7 of the stability suites has the laws of sets, volumes and films."""
 
 import numpy as np
 import pytest

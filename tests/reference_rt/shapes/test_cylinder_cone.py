@@ -1,4 +1,4 @@
-"""What is special about cylinders, cones and frustums; the rest is in `test_quadrics`."""
+"""What is special about cylinders, cones and frustums; the rest is in `test_shapes_exact`."""
 
 import math
 import re
@@ -148,29 +148,3 @@ def test_leaving_the_apex():
 def test_refused(shape, fields, message):
     with pytest.raises(rt.SceneError, match=re.escape(message)):
         shape(**fields)
-
-
-def test_solids():
-    """A cylinder cut by boxes is a shorter cylinder; a cone without its tip is a frustum."""
-    rng = np.random.default_rng(9)
-    o, d = Placed(rt.Cylinder(z_min=-1)).rays(rng, 2000, (0.0, 1.0))
-    low = put(rt.Box(), np.diag([4.0, 4.0, 0.5]))
-    high = put(rt.Box(), np.diag([4.0, 4.0, 1.0]), (0.0, 0.0, 1.5))
-    pairs = (
-        (rt.Cylinder(z_min=-3, z_max=5) & low, rt.Cylinder(z_min=-0.5, z_max=0.5)),
-        (rt.Cone(height=1.0) - high, rt.Cone(height=0.5, top_radius=0.5)),
-    )
-    # Elsewhere one of each: all scenes have the same kinds, and share kernels.
-    away = (transform.Translate(translate=(0.0, 0.0, 1e6)),)
-    others = (
-        rt.Cylinder(transform=away),
-        rt.Cone(transform=away),
-        rt.Box(transform=away) - rt.Box(),
-    )
-    for made, expected in pairs:
-        one, two = (rt.Scene(shapes=(s, *others)).intersect(o, d) for s in (made, expected))
-        hit = np.isfinite(two.t)
-        assert hit.sum() > 300
-        assert np.array_equal(hit, np.isfinite(one.t))
-        assert np.allclose(one.t[hit], two.t[hit], rtol=1e-12)
-        assert np.allclose(one.n[hit], two.n[hit], atol=1e-12)

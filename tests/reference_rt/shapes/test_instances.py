@@ -30,40 +30,6 @@ def members(folder):
     )
 
 
-def test_as_if_each_stood_there(tmp_path):
-    """Copies under unequal scales and mirrors, against the same shapes with composed maps."""
-    rng = np.random.default_rng(4)
-    shapes = members(tmp_path)
-    places = [
-        (*placed(rng, 0.7, 4.0), transform.Scale(scale=(1.0, float(sign), 1.0)))
-        for sign in (1, -1, 1, -1, 1)
-    ]
-    drawn = rt.Scene(
-        groups={"g": shapes}, shapes=tuple(rt.Instance(group="g", transform=p) for p in places)
-    )
-    baked = rt.Scene(
-        shapes=tuple(
-            s.model_copy(update={"transform": (*s.transform, *p)}) for p in places for s in shapes
-        )
-    )
-    o, d = rays(rng, 4.0)
-    one, two = drawn.intersect(o, d), baked.intersect(o, d)
-    same = np.isfinite(one.t) == np.isfinite(two.t)
-    assert (~same).sum() <= 1  # an edge
-    hit = same & np.isfinite(one.t)
-    assert hit.sum() > N // 10
-    assert np.array_equal(one.shape[hit] * len(shapes) + one.part[hit], two.shape[hit])
-    assert np.array_equal(one.primitive[hit], two.primitive[hit])
-    assert (one.instance[hit] == 0).all()
-    assert (two.instance == -1).all()
-    # Maps of condition below 16: some hundred roundings of numbers up to 20.
-    limit = 16 * 100 * 20 * 2.0**-53
-    np.testing.assert_allclose(one.p[hit], two.p[hit], rtol=0, atol=limit)
-    cosine = np.sum(one.n[hit] * two.n[hit], axis=1)
-    np.testing.assert_allclose(cosine, 1.0, atol=1e-12)
-    np.testing.assert_allclose(one.uv[hit], two.uv[hit], atol=1e-9)
-
-
 def test_groups_of_groups():
     """Three levels of ten: a thousand copies, numbered, where they belong."""
     ten = {

@@ -1,4 +1,4 @@
-"""Polygons: rational arithmetic, ties, tilings."""
+"""Polygons: their plane, ties on edges and corners, tilings."""
 
 import itertools
 import math

@@ -158,14 +158,3 @@ def test_a_box_far_away_that_a_map_brings_back():
     found = Placed(here).probe(o, np.tile([0.0, 0.0, -1.0], (50, 1)))
     sag = (x**2 + 0.09 * x**2) / (r + np.sqrt(r * r - x**2 - 0.09 * x**2))
     assert np.allclose(found.t, 2.0 + sag, rtol=8 * U)
-
-
-def test_a_half_space_of_a_box():
-    rng = np.random.default_rng(14)
-    o, d = Placed(rt.Sphere()).rays(rng, 500, (0.0, 1.0))
-    plane = (0, 0, 0, 0, 0, 0, 1, 2, 3, 0.25)
-    below, above = (quadric_of(*(s * x for x in plane), capped=True) for s in (1.0, -1.0))
-    one = rt.Scene(shapes=(rt.Box() - above,)).intersect(o, d)
-    two = rt.Scene(shapes=(below,)).intersect(o, d)
-    assert np.allclose(one.t, two.t, rtol=1e-12)
-    assert np.allclose(one.n, two.n, atol=1e-12)

@@ -1,4 +1,4 @@
-"""The torus against exact roots of its quartic; rays that leave it."""
+"""The torus: normals, texture coordinates, what is refused."""
 
 import numpy as np
 import pytest
