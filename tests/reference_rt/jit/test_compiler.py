@@ -14,8 +14,6 @@ from reference_rt.jit.compiler import SUPPORTED
 
 ROOT = Path(__file__).parents[3]
 
-needs_jit = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
-
 
 def test_pyproject_asks_for_what_is_supported():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]

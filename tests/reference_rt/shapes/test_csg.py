@@ -9,7 +9,6 @@ from builders import cube, write_obj
 import reference_rt as rt
 from reference_rt.core import transform
 
-N = 8_000
 TINY = (transform.Scale(scale=(1e-3, 1e-3, 1e-3)), transform.Translate(translate=(0.0, 0.0, -1e6)))
 ELSEWHERE = (
     rt.Sphere(transform=TINY),
@@ -22,14 +21,6 @@ ELSEWHERE = (
 
 def solid_of(shape, **more):
     return rt.Scene(shapes=(shape, *ELSEWHERE), **more)
-
-
-def rays(seed, n=N, reach=2.5):
-    """Through the middle of things, from around and from inside."""
-    rng = np.random.default_rng(seed)
-    o = rng.uniform(-reach, reach, (n, 3))
-    d = rng.uniform(-1.0, 1.0, (n, 3)) - o
-    return o, d * 10.0 ** rng.uniform(-2, 2, (n, 1))
 
 
 def moved(*offset):

@@ -66,9 +66,6 @@ def samples(scene, u):
     )
 
 
-FACING_DOWN = transform.Rotate(rotate=transform.Turn(axis=(1, 0, 0), degrees=180))
-
-
 def test_points_are_uniform():
     """Over 10 x 20 cells of equal area of the local disk, under a map with shear."""
     step = random_map(np.random.default_rng(5), 0.5, 3.0)

@@ -2,32 +2,14 @@
 
 import numpy as np
 import pytest
-from builders import icosphere, placed, write_obj
+from builders import placed
 
 import reference_rt as rt
 from reference_rt.core import transform
 
-N = 20_000
-
 
 def moved(*offset):
     return (transform.Translate(translate=offset),)
-
-
-def rays(rng, reach):
-    o = rng.uniform(-2 * reach, 2 * reach, (N, 3))
-    return o, rng.uniform(-reach, reach, (N, 3)) - o
-
-
-def members(folder):
-    file = write_obj(folder / "ball.obj", *icosphere(1))
-    turned = placed(np.random.default_rng(3), 0.5, 1.0)
-    return (
-        rt.Mesh(file=str(file), transform=moved(0.0, 0.0, 1.5)),
-        rt.Box(transform=turned),
-        rt.Rectangle(transform=moved(0.0, 1.5, 0.0)),
-        rt.Triangle(v0=(0, 0, 0), v1=(2, 0, 1), v2=(0, 2, 1)),
-    )
 
 
 def test_groups_of_groups():
