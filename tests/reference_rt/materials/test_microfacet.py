@@ -8,6 +8,7 @@ import pytest
 from builders import U, unit_vectors
 from chi_square import chi_square, sidak
 from flint import arb, ctx
+from leaf_checks import vec_towards as towards
 from pydantic import TypeAdapter, ValidationError
 
 from reference_rt.core.vec3 import Vec3, dot
@@ -72,11 +73,6 @@ def densities(m, v, h):
     out = np.empty((len(h), 2))
     _densities(m.kind, np.array(m[1:]), np.array(v), np.ascontiguousarray(h), out)
     return out
-
-
-def towards(cosine, phi):
-    sine = math.sqrt((1 - cosine) * (1 + cosine))
-    return Vec3(sine * math.cos(phi), sine * math.sin(phi), cosine)
 
 
 def random_cases(n, seed):
