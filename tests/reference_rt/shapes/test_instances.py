@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from builders import placed
+from builders import icosphere, placed
+from placed_shapes import random_map
 
 import reference_rt as rt
 from reference_rt.core import transform
@@ -10,6 +11,39 @@ from reference_rt.core import transform
 
 def moved(*offset):
     return (transform.Translate(translate=offset),)
+
+
+def test_as_if_each_stood_there():
+    """Copies under maps that shear, stretch and mirror, against the same shapes with composed
+    maps; normals of vertices and texture coordinates too."""
+    rng = np.random.default_rng(4)
+    vertices, faces = (np.array(a) for a in icosphere(1))
+    # All alike: else their lengths, under a map that stretches, weigh in one of the two.
+    normals = np.tile([0.0, 0.6, 0.8], (len(vertices), 1))
+    arrays = {"vertices": vertices, "faces": faces, "normals": normals, "uv": vertices[:, :2]}
+    shapes = (
+        rt.Mesh(**arrays, transform=moved(0.0, 0.0, 1.5)),
+        rt.Box(transform=placed(rng, 0.5, 1.0)),
+        rt.Rectangle(transform=moved(0.0, 1.5, 0.0)),
+    )
+    maps = [(random_map(rng, 0.3, 4.0),) for _ in range(6)]
+    drawn = rt.Scene(
+        groups={"g": shapes}, shapes=tuple(rt.Instance(group="g", transform=m) for m in maps)
+    )
+    baked = [s.model_copy(update={"transform": (*s.transform, *m)}) for m in maps for s in shapes]
+    o = rng.uniform(-8.0, 8.0, (8000, 3))
+    d = rng.uniform(-4.0, 4.0, (8000, 3)) - o
+    one, two = drawn.intersect(o, d), rt.Scene(shapes=tuple(baked)).intersect(o, d)
+    hit = one.hit & two.hit
+    assert (one.hit != two.hit).sum() <= 1  # an edge
+    assert hit.sum() > 800
+    assert np.array_equal(one.shape[hit] * len(shapes) + one.part[hit], two.shape[hit])
+    assert np.array_equal(one.primitive[hit], two.primitive[hit])
+    assert (one.instance[hit] == 0).all()
+    # Maps of condition below 16: some hundred roundings of numbers up to 20.
+    for name in ("p", "n", "ns", "uv"):
+        a, b = getattr(one, name)[hit], getattr(two, name)[hit]
+        np.testing.assert_allclose(a, b, rtol=0, atol=16 * 100 * 20 * 2.0**-53, err_msg=name)
 
 
 def test_groups_of_groups():
