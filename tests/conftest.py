@@ -26,18 +26,18 @@ sys.path[:] = [path for path in sys.path if Path(path) != Path(__file__).parent]
 from reference_rt.jit import kernel_cache, parallel_compile  # noqa: E402
 
 LONGEST_FIRST = (
-    "test_extremes",  # compiles the kernels of all tests that use `worlds`
+    "test_furnaces",  # compiles the kernels of all tests that use `worlds`
     "test_counterpart_light",
     "test_plain_python",
     "test_reading_plugins",
     "test_rungs",
     "test_stability_metamorphic",
     "test_film_layers",
-    "test_properties_of_rays",
+    "test_crossings",
     "test_gate",
     "test_stability_leaving",
     "test_invariances",
-    "test_furnaces",
+    "test_stability_explained",
     "test_stability_furnace",
     "test_convergence_run",
     "test_csg_methods",

@@ -67,8 +67,7 @@ Why all ways find the same bits:
    and accepts only a smaller t.
 4. Any-hit queries return only whether there is a hit.
 
-Tests, all bit for bit: `test_ways` (every way, every kind of BVH and none) and
-`test_properties_of_rays`.
+Tests, all bit for bit: `test_ways` (every way, every kind of BVH and none) and `test_crossings`.
 
 To add a way: a branch in `block_query` or `array_query`, leaves by `leaf.nearest_of_leaf`, and a
 line in the table of `test_ways`.

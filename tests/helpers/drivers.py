@@ -5,10 +5,9 @@ import math
 import numpy as np
 
 from reference_rt import shapes as any_shape
-from reference_rt.accel.geometry import closest_hit, surface
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import Hit, Ray, ray_from
-from reference_rt.core.vec3 import dot, row
+from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel, kernel
 from reference_rt.shapes import TABLES
 from reference_rt.shapes.meshes.watertight import shear_of
@@ -18,6 +17,7 @@ class Probe:
     """What `probe` finds for n rays; t and again are inf for a miss."""
 
     def __init__(self, out: FloatArray) -> None:
+        self.out = out
         self.t, self.again, self.error = out[:, 0], out[:, 1], out[:, 2]
         self.p, self.n = out[:, 3:6], out[:, 6:9]
         self.start = out[:, 9:12]
@@ -31,48 +31,29 @@ def meet(shapes, kind, i, ray):
     return Hit(t, kind if t < math.inf else -1, i, u, v, -1)
 
 
+@kernel
+def probe_one(shapes, kind, i, ray, w, out):
+    """A ray that meets a primitive, and leaves it towards w."""
+    hit = meet(shapes, kind, i, ray)
+    out[0] = hit.t
+    out[1] = math.inf
+    if hit.kind < 0:
+        return
+    point = any_shape.surface(shapes, ray, hit)
+    u, v = any_shape.uv(shapes, ray, hit)
+    leaving = ray_from(point, w)
+    again = meet(shapes, kind, i, leaving)
+    out[1], out[2] = again.t, point.error
+    out[3], out[4], out[5] = point.p
+    out[6], out[7], out[8] = point.n
+    out[9], out[10], out[11] = leaving.o
+    out[12], out[13], out[14] = u, v, any_shape.face(shapes, hit)
+
+
 @entry_kernel
 def _probe(shapes, kind, rows, o, d, w, out):
     for i in range(len(o)):
-        ray = Ray(row(o, i), row(d, i), math.inf)
-        hit = meet(shapes, kind, rows[i], ray)
-        out[i, 0] = hit.t
-        out[i, 1] = math.inf
-        if hit.kind < 0:
-            continue
-        point = any_shape.surface(shapes, ray, hit)
-        u, v = any_shape.uv(shapes, ray, hit)
-        leaving = ray_from(point, row(w, i))
-        again = meet(shapes, kind, rows[i], leaving)
-        out[i, 1], out[i, 2] = again.t, point.error
-        out[i, 3], out[i, 4], out[i, 5] = point.p
-        out[i, 6], out[i, 7], out[i, 8] = point.n
-        out[i, 9], out[i, 10], out[i, 11] = leaving.o
-        out[i, 12], out[i, 13], out[i, 14] = u, v, any_shape.face(shapes, hit)
-
-
-@entry_kernel
-def _leave(geometry, o, d, w, out):
-    for i in range(len(o)):
-        ray = Ray(row(o, i), row(d, i), math.inf)
-        hit = closest_hit(geometry, ray)
-        out[i] = -1.0
-        if hit.kind >= 0:
-            point = surface(geometry, ray, hit)
-            away = row(w, i)
-            if dot(away, point.n) < 0.0:
-                away = -away
-            out[i] = closest_hit(geometry, ray_from(point, away)).t
-
-
-def leave_scene(scene, o, d, w):
-    """Ray i meets the scene, then leaves what it hit towards w[i] or -w[i], whichever is on the
-    normal's side: (t of what it meets next, whether there was a hit)."""
-    out = np.zeros(len(o))
-    arrays = (np.ascontiguousarray(a, float) for a in (o, d, w))
-    with np.errstate(all="ignore"):
-        _leave(scene.tables.geometry, *arrays, out)
-    return out, out >= 0.0
+        probe_one(shapes, kind, rows[i], Ray(row(o, i), row(d, i), math.inf), row(w, i), out[i])
 
 
 def probe(shapes, kind, rows, o, d, w=None) -> Probe:

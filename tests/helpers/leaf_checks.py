@@ -75,6 +75,10 @@ def towards(cosine, phi):
     return np.array([sine * math.cos(phi), sine * math.sin(phi), cosine])
 
 
+def vec_towards(cosine, phi):
+    return Vec3(*towards(cosine, phi).tolist())
+
+
 def random_direction(rng, k, front=True):
     """A third of them grazing, a quarter from behind unless `front`."""
     cosine = 10.0 ** rng.uniform(-4, -1) if k % 3 == 0 else rng.uniform(0.05, 1)

@@ -60,11 +60,7 @@ def theirs_along(
 
 
 def deviations(
-    scene: dict[str, Any],
-    o: FloatArray,
-    d: FloatArray,
-    samples: int,
-    bound: float = 0.0,
+    scene: dict[str, Any], o: FloatArray, d: FloatArray, samples: int, bound: float = 0.0
 ) -> FloatArray:
     """How far the two radiances are apart, beyond the relative `bound`, in standard errors of the
     difference (n, 3).

@@ -12,9 +12,9 @@ from reference_rt.jit.kernel import entry_kernel
 from reference_rt.shapes.flat import polygon
 
 
-def regular(n, step=1, radius=1.0):
-    """Every step-th corner of a regular n-gon: a star for step > 1."""
-    phi = 2 * math.pi * step * np.arange(n) / n
+def regular(n, radius=1.0):
+    """The corners of a regular n-gon."""
+    phi = 2 * math.pi * np.arange(n) / n
     return tuple(zip((radius * np.cos(phi)).tolist(), (radius * np.sin(phi)).tolist(), strict=True))
 
 
@@ -23,7 +23,6 @@ def square(low, high, clockwise=False):
     return ring[::-1] if clockwise else ring
 
 
-PENTAGRAM = regular(5, 2)
 EIGHT = ((0, 0), (2, 2), (2, 0), (0, 2))
 
 

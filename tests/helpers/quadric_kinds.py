@@ -1,8 +1,5 @@
 """Quadrics of every kind: by coefficients, ellipsoids, cylinders, cones and frustums."""
 
-import numpy as np
-import pytest
-
 import reference_rt as rt
 
 BOX = {"lower": (-1.0, -1.0, -1.0), "upper": (1.0, 1.0, 1.0)}
@@ -34,12 +31,12 @@ KINDS = {
         lower=(-1.3, -0.8, -0.2),
         upper=(0.8, 2.1, 1.0),
     ),
-    "plane": open_and_capped(0, 0, 0, 0, 0, 0, 1, 2, 3, 0.25),
+    "plane by coefficients": open_and_capped(0, 0, 0, 0, 0, 0, 1, 2, 3, 0.25),
     "pair of planes": [
         *open_and_capped(1, -1, 0, 0, 0, 0, 0, 0, 0, 0),
         *open_and_capped(1, 0, 0, 0, 0, 0, 0, 0, 0, -0.25),
     ],
-    "box": [quadric_of(0, 0, 0, 0, 0, 0, 0, 0, 0, -1, capped=True)],
+    "box by coefficients": [quadric_of(0, 0, 0, 0, 0, 0, 0, 0, 0, -1, capped=True)],
     "cylinder": [rt.Cylinder(), rt.Cylinder(radius=0.3, z_min=-2.0, z_max=0.7)],
     "tube": [rt.Cylinder(capped=False), rt.Cylinder(radius=3, z_min=-2, z_max=0.7, capped=False)],
     "cone": [rt.Cone(), rt.Cone(radius=0.7, height=2.1), rt.Cone(radius=3, height=0.1)],
@@ -53,13 +50,3 @@ KINDS = {
     "open frustum": [rt.Cone(top_radius=0.3, capped=False)],
 }
 TURNED = ("cylinder", "tube", "cone", "open cone", "frustum", "open frustum")
-CONVEX = {
-    **{name: KINDS[name] for name in ("ellipsoid", "cylinder", "cone", "frustum", "box")},
-    "paraboloid": KINDS["paraboloid"][1:],
-}
-"""The capped ones."""
-BY_NAME = pytest.mark.parametrize("name", KINDS)
-
-
-def seeded(name, *more):
-    return np.random.default_rng([list(KINDS).index(name), *more])

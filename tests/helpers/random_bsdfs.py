@@ -66,14 +66,7 @@ def random_principled(n, seed, least=0.2):
         yield Principled(base_colour=rng.uniform(0, 1, 3).tolist(), **fields), wo
 
 
-THIN_NUMBERS = (
-    "anisotropic",
-    "spec_trans",
-    "spec_tint",
-    "sheen",
-    "sheen_tint",
-    "flatness",
-)
+THIN_NUMBERS = ("anisotropic", "spec_trans", "spec_tint", "sheen", "sheen_tint", "flatness")
 
 
 def random_thin(n, seed, least=0.2):

@@ -21,19 +21,6 @@ def cross(a, b):
     return [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]
 
 
-def solve(columns, right):
-    """The three coefficients of `columns` that sum to `right` (Cramer); None where singular."""
-    a, b, c = columns
-    determinant = dot(a, cross(b, c))
-    if determinant == 0:
-        return None
-    return [
-        dot(right, cross(b, c)) / determinant,
-        dot(a, cross(right, c)) / determinant,
-        dot(a, cross(b, right)) / determinant,
-    ]
-
-
 def root(x):
     """sqrt of a rational to 200 binary places."""
     return Q(math.isqrt((x.numerator << 400) // x.denominator), 1 << 200)

@@ -98,8 +98,7 @@ def write_sky(path: Path) -> FloatArray:
 
 
 FLOOR = rt.Rectangle(
-    material="floor",
-    transform=(transform.Scale(scale=(30.0, 30.0, 30.0)), *facing((1, 0, 0), -90)),
+    material="floor", transform=(transform.Scale(scale=(30.0, 30.0, 30.0)), *facing((1, 0, 0), -90))
 )
 # Looks down at the origin from just above it: every pixel sees the same point.
 ORIGIN = rt.Orthographic(eye=(0, 1e-3, 0), target=(0, 0, 0), up=(0, 0, -1), width=1e-12)

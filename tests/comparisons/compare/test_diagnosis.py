@@ -98,11 +98,7 @@ PLANTED = {
 @pytest.mark.cases(3)
 @pytest.mark.parametrize(
     "name",
-    [
-        "cornell_box",
-        "spheres_whitted",
-        pytest.param("textured_room", marks=pytest.mark.slow),
-    ],
+    ["cornell_box", "spheres_whitted", pytest.param("textured_room", marks=pytest.mark.slow)],
 )
 @pytest.mark.parametrize("cause", PLANTED)
 def test_planted(name: str, cause: str) -> None:

@@ -113,10 +113,7 @@ def test_names_of_rows_are_distinguished_and_choose_their_groups() -> None:
     names = [row for group in GROUPS for row in group.rows]
     assert len(set(names)) == len(names)
     assert chosen(()) == GROUPS
-    assert [group.name for group in chosen(("cornell_llvm", "cold_*"))] == [
-        "equal_samples",
-        "cold",
-    ]
+    assert [group.name for group in chosen(("cornell_llvm", "cold_*"))] == ["equal_samples", "cold"]
     with pytest.raises(UsageError, match="no row has the name 'speed'"):
         chosen(("threads", "speed"))
 

@@ -52,11 +52,7 @@ if not any(command.name == "converge" for command in app.registered_commands):
 
 @pytest.fixture
 def own_cache(tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        convergence.store,
-        "cache_folder",
-        lambda: tmp_path / "references",
-    )
+    monkeypatch.setattr(convergence.store, "cache_folder", lambda: tmp_path / "references")
 
 
 def test_reference_is_kept_and_added_to(own_cache):

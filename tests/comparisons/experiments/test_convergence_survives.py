@@ -33,7 +33,9 @@ def pictures(out):
     return found
 
 
-def check_killed(times, tmp_path):
+@pytest.mark.slow
+@pytest.mark.parametrize("times", [3, 50])
+def test_killed_at_any_moment(times, tmp_path):
     """Kill it some time after it has stored the pictures of a sweep, or at its start."""
     out, whole, choose = tmp_path / "out", tmp_path / "whole", random.Random(24)
     first = out / "rungs" / "cornell_box" / "ours-4.npz"
@@ -56,13 +58,3 @@ def check_killed(times, tmp_path):
     subprocess.run(command(whole), capture_output=True, check=True)
     assert len(pictures(out)) >= 5 * 7
     assert pictures(out) == pictures(whole)
-
-
-@pytest.mark.slow
-def test_killed_at_three_moments(tmp_path):
-    check_killed(3, tmp_path)
-
-
-@pytest.mark.slow
-def test_killed_at_fifty_moments(tmp_path):
-    check_killed(50, tmp_path)

@@ -20,10 +20,6 @@ from comparisons.experiments.selftest.specificity import (
 SCENES = Path(__file__).parents[3] / "scenes"
 
 
-def silent(line: str) -> None:
-    pass
-
-
 def of(cases) -> list:
     return [pytest.param(case, id=f"{case.kind}: {case.name}") for case in cases]
 

@@ -1,4 +1,4 @@
-"""F14: the same bits, and a renderer that lacks them is seen."""
+"""F14 sees a renderer that lacks the same bits."""
 
 import numpy as np
 import pytest
@@ -11,12 +11,6 @@ from comparisons.experiments.stability.harness.core import OURS, Outcome
 
 def measured(series, x, folder):
     return stability_runs.measured("F14", series, x, folder)[OURS]
-
-
-@pytest.mark.parametrize(("series", "x"), [("threads", 4.0), ("wide filter, scalar", 3.0)])
-def test_the_same_bits(series, x, tmp_path):
-    found = measured(series, x, tmp_path)
-    assert found.failures == 0, found.examples
 
 
 @pytest.mark.slow

@@ -173,11 +173,7 @@ def test_missing_triangles_are_seen_by_rays(series, x, tmp_path, monkeypatch):
     assert measured(series, x, tmp_path, cases=600)[OURS].failures > 0
 
 
-LIGHT_SERIES = [
-    ("shrunk light", 1e3),
-    slow("translated light", 1e3),
-    slow("grown light", 1e9),
-]
+LIGHT_SERIES = [("shrunk light", 1e3), slow("translated light", 1e3), slow("grown light", 1e9)]
 
 
 def _transformed_alone(monkeypatch, change):

@@ -250,12 +250,7 @@ lights: [{type: point, position: [5, 3, 2], intensity: 9}]
     ],
 )
 def test_bumps_that_mitsuba_gets_wrong(
-    image: str,
-    uv: str,
-    alpha: str,
-    law: str,
-    image_folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    image: str, uv: str, alpha: str, law: str, image_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Over a grain; by a rotated image that is not square; and where it is flat and u runs along
     the z axis, whose tangent is 0 / 0: with our plugin they agree, with Mitsuba's own they

@@ -101,10 +101,7 @@ REQUIRED = {
 }
 """Other fields that a material must have, by type."""
 
-REFUSED = {
-    ("normal_map", "vertex_colours"),
-    ("normal_map", "checker"),
-}
+REFUSED = {("normal_map", "vertex_colours"), ("normal_map", "checker")}
 """What Mitsuba lacks (docs/verdict.md)."""
 
 

@@ -6,7 +6,6 @@ import pytest
 import reference_rt as rt
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.translate.cameras import translate_filter
-from comparisons.rungs import film
 from reference_rt.cameras.film import AnyFilter
 
 FILTERS: tuple[AnyFilter, ...] = (
@@ -37,17 +36,3 @@ def test_values(film_filter: AnyFilter) -> None:
     tolerance = 5e-4 if isinstance(film_filter, rt.GaussianFilter) else 64 * 2.0**-24
     assert np.abs(there - scale * ours).max() < tolerance
     assert not ours[np.abs(x) > radius * 1.001].any()
-
-
-@pytest.mark.cases(2)
-@pytest.mark.parametrize("film_filter", FILTERS, ids=str)
-def test_the_rung_of_the_film(film_filter: AnyFilter) -> None:
-    rung = film(film_filter, film_filter)
-    assert (rung.name, rung.status) == ("film", "agree"), rung.reason
-
-
-def test_another_filter_is_distinguished() -> None:
-    third = 1.0 / 3.0
-    reference = rt.MitchellFilter(b=third, c=third)
-    assert film(reference, reference).status == "agree"
-    assert film(rt.MitchellFilter(b=0.3334, c=third), reference).status == "differ"

@@ -6,16 +6,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from page_in_browser import (
-    case,
-    display,
-    drawn,
-    grey,
-    pixel,
-    point,
-    read,
-    shown,
-)
+from page_in_browser import case, display, drawn, grey, pixel, point, read, shown
 from PIL import Image
 
 from comparisons.report.pictures_data import as_json, pack, unpack

@@ -20,11 +20,7 @@ def rungs(**statuses):
         ({"geometry": "reference-limited", "statistics": "differ"}, "differ", "statistics"),
         ({"geometry": "not-comparable", "direct": "inconclusive"}, "inconclusive", "direct"),
         ({"geometry": "agree", "direct": "not-comparable"}, "not-comparable", "direct"),
-        (
-            {"geometry": "reference-limited", "direct": "inconclusive"},
-            "inconclusive",
-            "direct",
-        ),
+        ({"geometry": "reference-limited", "direct": "inconclusive"}, "inconclusive", "direct"),
         ({"geometry": "reference-limited", "direct": "agree"}, "reference-limited", "geometry"),
     ],
 )

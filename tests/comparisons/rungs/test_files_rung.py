@@ -123,11 +123,7 @@ PLANTED: dict[str, tuple[str, Callable[[Patch], None], str]] = {
         _result(environment_map, "orthogonal", lambda m: m @ transform.rotate((0, 1, 0), 2)[:, :3]),
         "turns directions",
     ),
-    ".hdr half a mantissa brighter": (
-        "hdr",
-        _half_a_mantissa,
-        "the pixel at",
-    ),
+    ".hdr half a mantissa brighter": ("hdr", _half_a_mantissa, "the pixel at"),
     "sRGB decoded twice": (
         "texture_filters",
         _result(image_file, "linear", lambda x: np.power(x, 2.2)),

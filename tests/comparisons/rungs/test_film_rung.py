@@ -99,5 +99,6 @@ def test_gratings_show_faults_of_pictures(
     assert "grating" in found.reason
 
 
-def test_another_width_differs() -> None:
+def test_another_filter_differs() -> None:
     assert "of their peak" in film(TentFilter(radius=1.1), TentFilter()).reason
+    assert film(MitchellFilter(b=0.3334), MitchellFilter()).status == "differ"

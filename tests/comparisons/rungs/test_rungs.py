@@ -142,8 +142,7 @@ def test_a_faint_scene_is_held_to_the_same_relative_bound(scene: Scene) -> None:
 
 def test_rungs_that_a_scene_does_not_have(scene: Scene) -> None:
     dark = scene.changed(
-        lights=(),
-        shapes=tuple(s for s in scene.shapes if s.material not in ("lamp", "glow")),
+        lights=(), shapes=tuple(s for s in scene.shapes if s.material not in ("lamp", "glow"))
     )
     mi_dark = load(dark)
     for rung in (direct, whitted):

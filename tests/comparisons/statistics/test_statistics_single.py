@@ -5,13 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from planted import (
-    FAULTS,
-    MARGINS,
-    STILL,
-    replicates,
-    scene,
-)
+from planted import FAULTS, MARGINS, STILL, replicates, scene
 
 from comparisons.statistics import Known, compare, standard_error
 from comparisons.statistics.decide import findings
@@ -76,8 +70,7 @@ def test_a_firefly_leaves_a_single_picture_few_degrees_of_freedom():
 
 
 @pytest.mark.parametrize(
-    "fault",
-    ["gain", "one tile", "firefly tile", "lamp", "hue", "tile that keeps the mean"],
+    "fault", ["gain", "one tile", "firefly tile", "lamp", "hue", "tile that keeps the mean"]
 )
 def test_faults_of_a_single_picture_of_little_noise(fault):
     rng = np.random.default_rng(0)

@@ -61,7 +61,10 @@ def ran_in(folder):
     return log.read_text().split() if log.exists() else []
 
 
-def check_killed(times, cases, most, tmp_path):
+@pytest.mark.slow
+@pytest.mark.usefixtures("fake_runners")
+@pytest.mark.parametrize(("times", "cases"), [(3, 60), (50, 700)])
+def test_killed_at_any_moment(times, cases, tmp_path):
     """Kill a suite some time after it has run a first case, or at its start."""
     folder = scenes(tmp_path / "scenes", *(f"case{k:03}" for k in range(cases)))
     out, choose = tmp_path / "out", random.Random(24)
@@ -71,7 +74,7 @@ def check_killed(times, cases, most, tmp_path):
         with subprocess.Popen(command, stderr=subprocess.DEVNULL) as process:
             while k % 5 and len(ran_in(folder)) == before and process.poll() is None:
                 time.sleep(0.02)
-            time.sleep(choose.uniform(0.0, most))
+            time.sleep(choose.uniform(0.0, 1.5))
             process.send_signal(signal.SIGKILL)
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -86,18 +89,6 @@ def check_killed(times, cases, most, tmp_path):
     assert subprocess.run(command, capture_output=True, check=False).returncode == 0
     assert not list(out.glob("**/.*"))
     assert len(results(out)[1]) == cases
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("fake_runners")
-def test_killed_at_three_moments(tmp_path):
-    check_killed(3, 60, 1.5, tmp_path)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("fake_runners")
-def test_killed_at_fifty_moments(tmp_path):
-    check_killed(50, 700, 1.5, tmp_path)
 
 
 # ---- clusters -----------------------------------------------------------------------------------

@@ -156,8 +156,7 @@ def test_the_circle_of_confusion(edge, depth, side):
     c = radius * abs(depth / focus - 1)
     far = 50.0
     lamp = rt.Rectangle(
-        material="lamp",
-        transform=[{"scale": far}, {"translate": [far + edge * c, 0, -depth]}],
+        material="lamp", transform=[{"scale": far}, {"translate": [far + edge * c, 0, -depth]}]
     )
     scene = rt.Scene(
         camera=ThinLens(**STRAIGHT, fov=1e-9, aperture_radius=radius, focus_distance=focus),

@@ -54,7 +54,9 @@ def killed(times, tmp_path, arguments, most):
     return begun
 
 
-def check_killed(times, size, most, tmp_path):
+@pytest.mark.slow
+@pytest.mark.parametrize(("times", "size", "most"), [(3, "256x256", 40), (50, "512x512", 25)])
+def test_killed_at_any_moment(times, size, most, tmp_path):
     out, expected = tmp_path / "out.exr", tmp_path / "expected.exr"
     options = ("--size", size, "--spp", 48)
     assert run("render", BOX, "-o", expected, *options, "--no-checkpoint").exit_code == 0
@@ -66,16 +68,6 @@ def check_killed(times, size, most, tmp_path):
     _, errors = process.communicate(timeout=600)
     assert process.returncode == 0, errors
     assert out.read_bytes() == expected.read_bytes()
-
-
-@pytest.mark.slow
-def test_killed_at_three_moments(tmp_path):
-    check_killed(3, "256x256", 40, tmp_path)
-
-
-@pytest.mark.slow
-def test_killed_at_fifty_moments(tmp_path):
-    check_killed(50, "512x512", 25, tmp_path)
 
 
 @pytest.mark.slow

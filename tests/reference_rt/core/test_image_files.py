@@ -203,18 +203,6 @@ def test_wrong_scenes(tmp_path, refused, text, said):
     assert str(scene) in line
 
 
-def test_a_texture_that_would_create_energy(tmp_path, refused):
-    """A reflectance is at most 1; a radiance may be more."""
-    scene = tmp_path / "scene.yaml"
-    scene.write_text(
-        "textures: {bright: {type: checker, first: 1.5}}\n"
-        "materials: {m: {type: diffuse, reflectance: bright}}\n"
-        "shapes: [{type: sphere, material: m}]\n"
-    )
-    line = refused(3, "render", str(scene), "-o", str(tmp_path / "out.exr"))
-    assert "the texture 'bright' has values up to 1.5; expected at most 1" in line
-
-
 def test_bitmaps_are_read_beside_the_scene(tmp_path):
     """A file name is relative to the scene's folder."""
     (tmp_path / "deep").mkdir()

@@ -10,13 +10,7 @@ from builders import SCENES
 
 PROGRAM = [sys.executable, "-c", "from reference_rt.cli.main import main; main()"]
 EXPLAIN = ["explain", str(SCENES / "spheres_whitted.yaml")]
-PRINTING = (
-    EXPLAIN,
-    ["schema"],
-    ["--help"],
-    ["gate", "--help"],
-    [],
-)
+PRINTING = (EXPLAIN, ["schema"], ["--help"], ["gate", "--help"], [])
 
 pytestmark = pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a full device")  # noqa: PTH110
 

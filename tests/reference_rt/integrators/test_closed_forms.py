@@ -4,18 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from worlds import (
-    FLOOR,
-    RADIANCE,
-    RHO,
-    assert_mean,
-    at,
-    budgets,
-    facing,
-    lambert,
-    world,
-    write_sky,
-)
+from worlds import FLOOR, RADIANCE, RHO, assert_mean, at, budgets, facing, lambert, world, write_sky
 
 import reference_rt as rt
 from reference_rt.core import transform
@@ -84,10 +73,7 @@ def lambert_of_a_box(m):
 LAMPS = {
     "triangle": (triangle(), lambert(CORNERS)),
     "rectangle": (rt.Rectangle(transform=PLACE, material="lamp"), lambert(SQUARE)),
-    "box": (
-        rt.Box(transform=PLACE, material="lamp"),
-        lambert_of_a_box(transform.affine(PLACE)),
-    ),
+    "box": (rt.Box(transform=PLACE, material="lamp"), lambert_of_a_box(transform.affine(PLACE))),
     "sphere": (
         rt.Sphere(center=(0.5, 2, -1), radius=0.8, material="lamp"),
         whole_sphere((0.5, 2, -1), 0.8),

@@ -14,8 +14,6 @@ from reference_rt.jit.compiler import SUPPORTED
 
 ROOT = Path(__file__).parents[3]
 
-needs_jit = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
-
 
 def test_pyproject_asks_for_what_is_supported():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -26,9 +24,7 @@ def test_pyproject_asks_for_what_is_supported():
 
 
 @pytest.mark.parametrize(
-    ("owner", "name"),
-    compiler.REPLACED,
-    ids=[f"{o.__name__}.{n}" for o, n in compiler.REPLACED],
+    ("owner", "name"), compiler.REPLACED, ids=[f"{o.__name__}.{n}" for o, n in compiler.REPLACED]
 )
 def test_a_method_that_is_gone_is_named_in_one_line(owner, name, monkeypatch):
     for cls in owner.__mro__:

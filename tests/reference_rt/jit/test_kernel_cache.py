@@ -122,8 +122,7 @@ def _unreadable(kept):
 
 
 @pytest.mark.parametrize(
-    "happens",
-    [_of_another_version, _of_another_kernel, _no_kernel_inside, _a_folder, _unreadable],
+    "happens", [_of_another_version, _of_another_kernel, _no_kernel_inside, _a_folder, _unreadable]
 )
 def test_what_cannot_be_used_is_replaced(happens, kept):
     happens(kept)

@@ -3,7 +3,7 @@
 import os
 import signal
 import time
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -133,8 +133,9 @@ def test_nothing_is_said_or_started_for_what_is_compiled(cold, monkeypatch):
 
 
 @forks
+@pytest.mark.parametrize("ahead", [False, True])
 @pytest.mark.parametrize("fault", ["stands still", "fails", "is killed"])
-def test_what_comes_to_nothing_elsewhere_is_compiled_here(fault, cold, monkeypatch):
+def test_what_comes_to_nothing_elsewhere_is_compiled_here(fault, ahead, cold, monkeypatch):
     def one_that_ends(kernel, signature):
         if os.getpid() == cold.here:
             while cold.compiled(False) == []:  # until the other process has taken one
@@ -150,11 +151,14 @@ def test_what_comes_to_nothing_elsewhere_is_compiled_here(fault, cold, monkeypat
     monkeypatch.setattr(parallel_compile, "precompile", one_that_ends)
     monkeypatch.setattr(parallel_compile, "PATIENCE", 0.5)
     told = []
-    parallel_compile.precompile_all(cold.calls, 2, lambda *now: told.append(now))
+    with Ahead(cold.calls, 2) if ahead else nullcontext() as begun:
+        done = parallel_compile.precompile_all(cold.calls, 2, lambda *now: told.append(now), begun)
+    assert len(done) == 3
     assert len(cold.compiled(False)) == 1
     assert all(is_compiled(*call) for call in cold.calls)
     assert cold.children_have_ended()
-    assert told == [(0, 3), (1, 3), (2, 3)]  # of that at which the child failed nothing is said
+    if not ahead:
+        assert told == [(0, 3), (1, 3), (2, 3)]  # of that at which the child failed nothing is said
 
 
 @forks
@@ -243,27 +247,6 @@ def test_what_is_begun_ahead_is_not_begun_again(noting):
     assert len(noting.children) == 1
     assert noting.children_have_ended()
     assert (told[0], told[-1]) == ((0, 3), (3, 3))
-
-
-@forks
-@pytest.mark.parametrize("fault", ["stands still", "fails", "is killed"])
-def test_what_comes_to_nothing_ahead_is_compiled_here(fault, cold, monkeypatch):
-    def one_that_ends(kernel, signature):
-        if os.getpid() == cold.here:
-            return precompile(kernel, signature)
-        if fault == "stands still":
-            time.sleep(1000.0)
-        if fault == "fails":
-            raise OSError("no space left on device")
-        return os.kill(os.getpid(), 9)
-
-    monkeypatch.setattr(parallel_compile, "precompile", one_that_ends)
-    monkeypatch.setattr(parallel_compile, "PATIENCE", 0.5)
-    with Ahead(cold.calls, 2) as ahead:
-        done = parallel_compile.precompile_all(cold.calls, 2, None, ahead)
-    assert len(done) == 3
-    assert all(is_compiled(*call) for call in cold.calls)
-    assert cold.children_have_ended()
 
 
 @forks

@@ -8,7 +8,7 @@ import pytest
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel, local_floats
-from reference_rt.jit.simd import VECTOR_WIDTH, larger, least, lowest, plain, simd_kernel, smaller
+from reference_rt.jit.simd import VECTOR_WIDTH, larger, plain, simd_kernel, smaller
 from reference_rt.shapes.meshes import watertight
 from reference_rt.shapes.meshes.watertight import shear_of
 
@@ -52,61 +52,6 @@ def test_emitted_code_gives_the_bits_of_numpy(seed):
         assert np.array_equal(np.isnan(there), np.isnan(here))
         numbers = ~np.isnan(here)
         assert there[numbers].tobytes() == here[numbers].tobytes()
-
-
-def test_comparisons_say_which_lane():
-    doubles = np.arange(VECTOR_WIDTH) - 3.0
-    singles = np.zeros(2 * VECTOR_WIDTH + 1, np.float32)
-    out = np.empty(VECTOR_WIDTH)
-    # b = -a, c = 1 - min(a, max(-a, 1/2)) - a².
-    a = doubles
-    c = 1.0 - np.minimum(a, np.maximum(-a, 0.5)) - a * a
-    first = (c <= a) | ((-a > 0.0) & ~(c >= 1.0))
-    expected = sum(int(f) << k for k, f in enumerate(first))
-    assert 0 < expected < 255
-    assert _run(doubles, singles, 0, 1.0, out) == expected
-    assert np.array_equal(out, c)
-
-
-def _several(doubles, out):
-    a = doubles.load(0)
-    out.store(0, least(a))
-    return a <= least(a), a > doubles.everywhere(3), a < 0.0
-
-
-_run_several = simd_kernel(_several)
-
-
-@entry_kernel
-def _both(doubles, out):
-    return _run_several(doubles, out)
-
-
-def test_several_conditions_and_the_least_number():
-    rng = np.random.default_rng(3)
-    for _ in range(200):
-        doubles, out, plainly = (
-            rng.integers(-3, 4, VECTOR_WIDTH).astype(float),
-            *np.empty((2, VECTOR_WIDTH)),
-        )
-        found = _both(doubles, out)
-        assert found == plain(_several)(doubles, plainly)
-        assert out.tobytes() == plainly.tobytes() == np.full(VECTOR_WIDTH, doubles.min()).tobytes()
-        conditions = doubles == doubles.min(), doubles > doubles[3], doubles < 0.0
-        assert found == sum(int(b) << k for k, b in enumerate(np.concatenate(conditions)))
-
-
-@entry_kernel
-def _lowest(bits, out):
-    for k in range(len(bits)):
-        out[k] = lowest(bits[k])
-
-
-def test_lowest_bit():
-    given = np.array([1, 2, 3, 12, 128, 255, 1 << 40], np.int64)
-    out = np.empty(len(given), np.int64)
-    _lowest(given, out)
-    assert out.tolist() == [0, 1, 0, 2, 7, 0, 40]
 
 
 @entry_kernel

@@ -8,6 +8,7 @@ from builders import U
 from flint import arb, ctx
 from hypothesis import given
 from hypothesis import strategies as st
+from leaf_checks import vec_towards as towards
 
 from reference_rt.core.vec3 import Vec3, dot
 from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric, eval_pdf, sample
@@ -27,11 +28,6 @@ indices = st.one_of(
 cosines = st.builds(lambda e, sign: sign * 10.0**e, st.floats(-12.0, 0.0), signs)
 heights = st.floats(-12.0, 0.0).map(lambda e: 10.0**e)
 angles = st.floats(0.0, 6.28)
-
-
-def towards(cosine, phi):
-    sine = math.sqrt((1 - cosine) * (1 + cosine))
-    return Vec3(sine * math.cos(phi), sine * math.sin(phi), cosine)
 
 
 @given(cosines, indices)

@@ -1,11 +1,18 @@
 """What every BSDF with a law of its own must pass: samples have their density, and weights times
-densities are values.  Rough conductors and dielectrics, with bounds of their own: `test_rough`."""
+densities are values.  Those of rough conductors and dielectrics: F11 of the stability suites."""
 
 import numpy as np
 import pytest
 from chi_square import sidak
-from leaf_checks import check_weights, p_values
-from random_bsdfs import random_phong, random_plastic, random_principled, random_thin
+from leaf_checks import check_same_bits, check_weights, p_values
+from random_bsdfs import NUMBERS, random_phong, random_plastic, random_principled, random_thin
+
+from reference_rt.materials.bsdfs.phong import Phong
+from reference_rt.materials.bsdfs.plastic import Plastic
+from reference_rt.materials.bsdfs.principled import Principled
+from reference_rt.materials.bsdfs.rough_conductor import RoughConductor
+from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric
+from reference_rt.materials.bsdfs.rough_plastic import RoughPlastic
 
 FEW_AND_MANY = (
     (random_phong, 65, (10, 200)),
@@ -46,3 +53,44 @@ def test_weight_times_density_is_the_value(materials, seed, condition):
     rng = np.random.default_rng(seed)
     for material, wo in materials:
         check_weights(material, wo, rng, condition, bends=material.type != "principled_thin")
+
+
+ONES = dict.fromkeys(NUMBERS, 1.0) | {"metallic": 0.0}
+ROUGH = [
+    {"distribution": kind, "alpha": alpha}
+    for kind in ("ggx", "beckmann")
+    for alpha in (1e-4, (1e-4, 10.0), 0.2, 10.0)
+]
+EXTREMES = {
+    "phong": (
+        *(material for material, _ in random_phong(4, 74)),
+        Phong(diffuse=0),
+        Phong(diffuse=0.1, specular=1e6, exponent=1e300),
+        Phong(diffuse=0.1, specular=1, exponent=1e-6, half_vector=True),
+    ),
+    "plastic": (
+        *(material for material, _ in random_plastic(3, 52)),
+        Plastic(reflectance=0.0, specular=0.0),
+        Plastic(reflectance=1.0, interior_ior=1e4, nonlinear=True),
+        RoughPlastic(reflectance=1.0, interior_ior=1 + 1e-7, alpha=1e-6),
+        RoughPlastic(reflectance=1.0, interior_ior=0.1, alpha=10.0),
+    ),
+    "principled": (
+        *(material for material, _ in random_principled(8, 92, least=0.0)),
+        Principled(),
+        Principled(base_colour=0.0, metallic=1.0),
+        Principled(base_colour=1.0, **ONES),
+        Principled(base_colour=1.0, **ONES | {"roughness": 0.0, "eta": 1 + 1e-7}),
+        Principled(base_colour=(0, 0, 1e-300), **ONES | {"spec_trans": 0.5, "eta": 1e-3}),
+    ),
+    "thin": tuple(material for material, _ in random_thin(8, 95, least=0.0)),
+    "rough conductor": tuple(RoughConductor(eta=0.2, k=3.9, **rough) for rough in ROUGH),
+    "rough dielectric": tuple(
+        RoughDielectric(interior_ior=eta, **rough) for eta in (0.5, 1.00001, 1.5) for rough in ROUGH
+    ),
+}
+
+
+@pytest.mark.parametrize("name", EXTREMES)
+def test_compiled_is_plain_and_finite(name):
+    check_same_bits(EXTREMES[name], np.random.default_rng(75))

@@ -8,6 +8,7 @@ from builders import U
 from hypothesis import given
 from hypothesis import strategies as st
 from leaf_checks import NOWHERE as AT
+from leaf_checks import vec_towards as towards
 
 import reference_rt as rt
 from reference_rt.core.vec3 import Vec3, dot, length
@@ -23,11 +24,6 @@ INDICES = (1.0003, 1.33, 1.5, 2.4)
 etas = st.floats(0.25, 4.0).filter(lambda eta: abs(eta - 1) > 1e-3)
 cosines = st.floats(1e-3, 1.0)
 azimuths = st.floats(0.0, 2 * math.pi)
-
-
-def towards(cosine, phi):
-    sine = math.sqrt((1 - cosine) * (1 + cosine))
-    return Vec3(sine * math.cos(phi), sine * math.sin(phi), cosine)
 
 
 @pytest.mark.parametrize("n", INDICES)

@@ -6,8 +6,9 @@ import math
 import numpy as np
 import pytest
 from builders import U, unit_vectors
-from chi_square import chi_square, integrate, sidak
+from chi_square import chi_square, sidak
 from flint import arb, ctx
+from leaf_checks import vec_towards as towards
 from pydantic import TypeAdapter, ValidationError
 
 from reference_rt.core.vec3 import Vec3, dot
@@ -34,9 +35,6 @@ from reference_rt.materials.microfacet.ggx_and_smith import (
 from reference_rt.textures import NO_TEXTURES, At, Palette
 
 KINDS = (GGX, BECKMANN)
-
-_NODES = tuple(0.5 * x + (0.5, 0.0)[k] for k, x in enumerate(np.polynomial.legendre.leggauss(200)))
-"""Of Gauss-Legendre's rule on [0, 1], and their weights."""
 
 
 @entry_kernel
@@ -77,11 +75,6 @@ def densities(m, v, h):
     return out
 
 
-def towards(cosine, phi):
-    sine = math.sqrt((1 - cosine) * (1 + cosine))
-    return Vec3(sine * math.cos(phi), sine * math.sin(phi), cosine)
-
-
 def random_cases(n, seed):
     """Distributions of both kinds, alpha from 0.01 to 1, a third isotropic; directions, a third
     of them grazing."""
@@ -109,43 +102,6 @@ def test_visible_normals_have_their_density(cases):
         assert fit.integral == pytest.approx(1.0, abs=5e-4), (m, v)
         p_values.append(fit.p_value)
     assert min(p_values) > sidak(len(p_values))
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("alpha", [(1e-4, 1e-4), (0.01, 0.3), (0.5, 0.5), (1.0, 0.2), (10.0, 2.0)])
-def test_normals_cover_the_surface(kind, alpha):
-    """The microfacets' projected area is the surface's: the integral of D cos is 1."""
-    m = Microfacets(kind, *alpha)
-    up = Vec3(0.0, 0.0, 1.0)
-    hints = draw(m, up, np.random.default_rng(13).uniform(0, 1, (20_000, 2)))
-    area = integrate(lambda h: densities(m, up, h)[:, 0] * np.maximum(0, h[:, 2]), hints)
-    assert area == pytest.approx(1.0, abs=1e-4)
-
-
-def smith_lambda(kind, alpha, cot):
-    """Smith's integral over the slopes along v that hide it: of (xi - cot) P(xi) / cot above cot
-    (Heitz 2014), P the distribution of one slope; xi = cot + s t / (1 - t)."""
-    t, w = _NODES
-    s = max(alpha, cot) if kind == GGX else alpha
-    beyond = s * t / (1 - t)
-    xi = cot + beyond
-    if kind == GGX:
-        p = 0.5 * alpha**2 / (alpha**2 + xi**2) ** 1.5
-    else:
-        p = np.exp(-((xi / alpha) ** 2)) / (alpha * math.sqrt(math.pi))
-    return float(np.sum(w * s / (1 - t) ** 2 * beyond * p)) / cot
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("alpha", [0.01, 0.1, 0.5, 1.0])
-def test_masking_is_smiths(kind, alpha):
-    """Of a roughness 0.3 alpha across, which must not matter."""
-    m = Microfacets(kind, alpha, 0.3 * alpha)
-    for cosine in (1e-3, 0.05, 0.3, 0.7, 0.99, 0.99999):
-        cot = cosine / math.sqrt(1 - cosine**2)
-        expected = 1 / (1 + smith_lambda(kind, alpha, cot))
-        # The quadrature's own error, seen with 100 points in place of 200, is below 1e-11.
-        assert g1(m, towards(cosine, 0.0)) == pytest.approx(expected, rel=1e-10)
 
 
 def test_masking_of_a_direction_and_its_opposite():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from builders import U, unit_vectors
 from chi_square import integrate
-from leaf_checks import NOWHERE, albedo, check_same_bits, evaluate, sample, towards
+from leaf_checks import NOWHERE, albedo, evaluate, sample, towards
 from random_bsdfs import random_plastic
 
 from reference_rt.core.vec3 import Vec3
@@ -195,15 +195,3 @@ def test_nonlinear_is_more_saturated():
         deep = evaluate(material(nonlinear=True, **fields).tabulate(NO_TEXTURES), wo, wi)[0][0]
         assert deep[0] / deep[2] > 1.4 * linear[0] / linear[2]
         assert (deep < linear).all()
-
-
-def test_compiled_is_plain():
-    black = {"reflectance": 0.0, "specular": 0.0}
-    materials = [material for material, _ in random_plastic(3, 52)]
-    extremes = (
-        Plastic(**black),
-        Plastic(reflectance=1.0, interior_ior=1e4, nonlinear=True),
-        RoughPlastic(reflectance=1.0, interior_ior=1 + 1e-7, alpha=1e-6),
-        RoughPlastic(reflectance=1.0, interior_ior=0.1, alpha=10.0),
-    )
-    check_same_bits([*materials, *extremes], np.random.default_rng(53))

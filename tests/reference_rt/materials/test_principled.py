@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from builders import U, unit_vectors
 from chi_square import UNIT_SQUARE, integrate
-from leaf_checks import albedo, check_same_bits, evaluate, random_direction, rows, sample, towards
+from leaf_checks import albedo, evaluate, random_direction, rows, sample, towards
 from random_bsdfs import NUMBERS, random_principled
 
 from reference_rt.core.vec3 import Vec3
@@ -172,18 +172,6 @@ def test_the_law_creates_energy_at_grazing_angles(fields, least, most):
         for cosine in GRID:
             greatest = max(greatest, albedo(table, towards(cosine, 0.0), rng)[0].max())
     assert least < greatest < most
-
-
-def test_compiled_is_plain():
-    materials = [material for material, _ in random_principled(8, 92, least=0.0)]
-    ones = dict.fromkeys(NUMBERS, 1.0) | {"metallic": 0.0}
-    extremes = (
-        Principled(base_colour=0.0, metallic=1.0),
-        Principled(base_colour=1.0, **ones),
-        Principled(base_colour=1.0, **ones | {"roughness": 0.0, "eta": 1 + 1e-7}),
-        Principled(base_colour=(0, 0, 1e-300), **ones | {"spec_trans": 0.5, "eta": 1e-3}),
-    )
-    check_same_bits([*materials, Principled(), *extremes], np.random.default_rng(93))
 
 
 def test_orientation():

@@ -1,17 +1,13 @@
-"""Specialised kernels that take over from linked ones: the same bits, and no child is left; renders
-without a cache."""
+"""Specialised kernels that take over from linked ones: the same bits, and no child is left."""
 
 import os
 import signal
-import subprocess
 import sys
 import time
 from typing import Any
 
 import numba
-import numpy as np
 import pytest
-from builders import HELPERS
 from small_scenes import same, small
 
 from reference_rt.jit import parallel_compile
@@ -162,49 +158,3 @@ def test_a_short_render_starts_no_child(scene, monkeypatch):
     monkeypatch.setattr(kernels, "WORTHWHILE", 1e9)
     render(scene, threads=2)
     assert watched.children == []
-
-
-# ---- without a cache ----------------------------------------------------------------------------
-
-_FULL = """
-import errno
-from reference_rt.jit import kernel_cache
-
-def replacing(path):
-    raise OSError(errno.ENOSPC, "No space left on device")
-
-kernel_cache.replacing = replacing
-"""
-
-_RENDER = """
-import sys
-import numpy as np
-from small_scenes import small
-from reference_rt.rendering.render import render
-picture = render(small("cornell_box"), threads=2)
-np.savez(sys.argv[1], **picture.layers)
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
-@pytest.mark.parametrize("fault", ["unwritable", pytest.param("full", marks=pytest.mark.slow)])
-def test_it_renders_without_a_cache(fault, scene, tmp_path):
-    folder = tmp_path / "cache"
-    if fault == "unwritable":
-        folder.touch()  # a file, in which no folder can be made, even by root
-    subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            (_FULL if fault == "full" else "") + _RENDER,
-            str(tmp_path / "a.npz"),
-        ],
-        env=os.environ | {"PYTHONPATH": str(HELPERS), "REFERENCE_RT_CACHE": str(folder)},
-        check=True,
-    )
-    expected, found = render(scene).layers, np.load(tmp_path / "a.npz")
-    assert set(found.files) == set(expected)
-    assert all(found[name].tobytes() == expected[name].tobytes() for name in expected)
-    if fault == "full":
-        assert [path for path in folder.rglob("*") if path.is_file()] == []

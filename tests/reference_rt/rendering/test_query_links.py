@@ -9,7 +9,7 @@ from unittest import mock
 import numpy as np
 import pytest
 from builders import SCENES, cube, same_in_plain_python, unit_vectors, write_obj
-from crossing_forms import GROUPS, kinds, tilted
+from every_shape import GROUPS, kinds, tilted
 
 import reference_rt as rt
 from reference_rt.rendering.query import bsdf, direct_light, hits, light, tracing
@@ -29,8 +29,8 @@ PLACED = rt.Scene(shapes=(rt.Instance(group="pair"), rt.Sphere(radius=0.2)), gro
 def everything(folder):
     """Every kind of shape, a mesh, a solid and instances."""
     rng = np.random.default_rng(1)
-    made = [make for make, _ in kinds(folder).values()]
-    shapes = [make(transform=tilted(rng, k, k % 2 == 0)) for k, make in enumerate(made)]
+    made = enumerate(kinds(folder))
+    shapes = [make(transform=tilted(rng, k, k % 2 == 0)) for k, make in made]
     mesh = rt.Mesh(file=str(write_obj(folder / "cube.obj", *cube(3))))
     return rt.Scene(shapes=(*shapes, mesh), groups=GROUPS)
 

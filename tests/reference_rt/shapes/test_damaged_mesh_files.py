@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from mesh_writers import (
     FACES,
     FORMS,
@@ -57,28 +55,6 @@ SOUND = [
 ]
 
 
-@st.composite
-def damaged(draw):
-    suffix, content = draw(st.sampled_from(SOUND))
-    data = bytearray(content)
-    for _ in range(draw(st.integers(0, 4))):
-        at = draw(st.integers(0, len(data) - 1))
-        kind = draw(st.sampled_from(["flip", "set", "cut out", "repeat", "cut"]))
-        if kind == "flip":
-            data[at] ^= 1 << draw(st.integers(0, 7))
-        elif kind == "set":
-            data[at] = draw(st.sampled_from(b"\0\xff\x7f\x80 \n0123456789-.einf/\\#"))
-        elif kind == "cut out":
-            del data[at : at + draw(st.integers(1, 9))]
-        elif kind == "repeat":
-            data[at:at] = data[at : at + draw(st.integers(1, 99))]
-        else:
-            del data[at:]
-        if not data:
-            break
-    return suffix, bytes(data)
-
-
 def expect_mesh_or_error(folder, suffix, content):
     path = written(folder, content, f"damaged{suffix}")
     try:
@@ -93,13 +69,6 @@ def test_sound_files(tmp_path, number):
     """What the damaged ones are made of is read."""
     suffix, content = SOUND[number]
     read(tmp_path, content, f"mesh{suffix}")
-
-
-@pytest.mark.slow
-@settings(max_examples=1000)
-@given(file=damaged())
-def test_damaged_files(tmp_path_factory, file):
-    expect_mesh_or_error(tmp_path_factory.getbasetemp(), *file)
 
 
 @pytest.mark.parametrize("number", range(len(SOUND)))

@@ -1,22 +1,12 @@
-"""Disks: rational arithmetic, closed forms, disks as lights."""
+"""Disks: texture coordinates, bounds, disks as lights."""
 
 import itertools
 import math
-from fractions import Fraction as Q
 
 import numpy as np
 import pytest
-from builders import U, shapes_in_order
-from drivers import probe
-from flat_checks import (
-    ExactHits,
-    check_distances,
-    check_normal,
-    lattice_hits,
-    plane_points,
-    random_map,
-    rays_at_plane,
-)
+from builders import U
+from placed_shapes import plane_points, random_map
 
 import reference_rt as rt
 from reference_rt.core import transform
@@ -28,70 +18,6 @@ from reference_rt.shapes.shape import TabulationContext
 
 CHI2_199 = 308.60
 """The quantile 1 - 1e-6 of chi-square with 199 degrees of freedom: scipy.stats.chi2.ppf."""
-
-
-def disks_and_rays(rng, n, stretch, offset, distance):
-    """n disks, a ray at the plane of each: points at up to 1.4 radii, every third at the rim."""
-    shapes = [rt.Disk(transform=(random_map(rng, stretch, offset),)) for _ in range(n)]
-    tables, rows = shapes_in_order(shapes)
-    r, phi = 1.4 * np.sqrt(rng.uniform(0, 1, n)), rng.uniform(0, 2 * math.pi, n)
-    r[::3] = 1 + rng.choice([-1, 1], len(r[::3])) * 10.0 ** rng.uniform(-16, -3, len(r[::3]))
-    x, y = r * np.cos(phi), r * np.sin(phi)
-    return shapes, tables, rows, *rays_at_plane(rng, tables.disks, rows, x, y, distance)
-
-
-@pytest.mark.cases(2)
-@pytest.mark.parametrize(
-    ("stretch", "offset", "distance"), [(0.0, 3.0, 5.0), (3.0, 3.0, 5.0), (1.0, 1e4, 1e6)]
-)
-def test_against_rational_arithmetic(stretch, offset, distance):
-    """Hit or miss, t, uv and normal; sheared, mirrored, scaled by 1e-3 to 1e3, and from afar."""
-    rng = np.random.default_rng(1)
-    n = 400
-    shapes, tables, rows, o, d = disks_and_rays(
-        rng, n, stretch, offset, distance * rng.uniform(0.1, 2, n)
-    )
-    table = tables.disks
-    found, right = probe(tables, DISK, rows, o, d), ExactHits(table, rows, o, d)
-    hits = misses = 0
-    for i in range(n):
-        t, x, y = right.t[i], right.x[i], right.y[i]
-        inside = float(1 - x * x - y * y)
-        band = 2 * (abs(float(x)) * right.x_error[i] + abs(float(y)) * right.y_error[i]) + 4 * U
-        if abs(inside) < band:
-            continue
-        assert np.isfinite(found.t[i]) == (inside > 0)
-        hits, misses = hits + (inside > 0), misses + (inside < 0)
-        if inside < 0:
-            continue
-        assert abs(float(Q(found.t[i]) - t)) <= right.t_error[i]
-        check_normal(found.n[i], shapes[i], table, rows[i])
-        r = math.hypot(x, y)
-        assert abs(found.u[i] - r) <= right.x_error[i] + right.y_error[i] + 4 * U
-        turn = math.atan2(y, x) / (2 * math.pi) - found.v[i]
-        off = abs(turn - round(turn)) * 2 * math.pi * r
-        assert off <= right.x_error[i] + right.y_error[i] + 16 * U
-        assert 0 <= found.v[i] <= 1
-    assert hits > n // 4
-    assert misses > n // 8
-
-
-def test_distances_are_within_16_ulp_of_size():
-    """Met at 0.1 and more, at an ordinary scale."""
-    rng = np.random.default_rng(2)
-    _, tables, rows, o, d = disks_and_rays(rng, 600, 0.5, 3.0, rng.uniform(0.1, 10, 600))
-    check_distances(tables, DISK, rows, o, d)
-
-
-def test_on_a_lattice():
-    """The rim belongs to the disk; rays in the plane miss; either zero."""
-    o, d, found = lattice_hits(rt.Disk(), DISK)
-    for i in range(len(o)):
-        t = math.inf
-        if d[i, 2] != 0 and -o[i, 2] / d[i, 2] > 0:
-            x, y, _ = o[i] - d[i] * (o[i, 2] / d[i, 2])
-            t = -o[i, 2] / d[i, 2] if x * x + y * y <= 1 else t
-        assert found.t[i] == t, (o[i], d[i])
 
 
 def test_uv_along_the_axes():
@@ -140,9 +66,6 @@ def samples(scene, u):
     )
 
 
-FACING_DOWN = transform.Rotate(rotate=transform.Turn(axis=(1, 0, 0), degrees=180))
-
-
 def test_points_are_uniform():
     """Over 10 x 20 cells of equal area of the local disk, under a map with shear."""
     step = random_map(np.random.default_rng(5), 0.5, 3.0)
@@ -160,20 +83,6 @@ def test_points_are_uniform():
 def midpoints(n):
     ticks = (np.arange(n) + 0.5) / n
     return itertools.product(ticks, ticks)
-
-
-def test_light_of_a_disk_overhead():
-    """R at height h: irradiance pi L R² / (R² + h²), solid angle 2 pi (1 - h / √(h² + R²))."""
-    h, r = 2.0, 1.5
-    scene = lamp(
-        transform.Scale(scale=(r, r, 1)), FACING_DOWN, transform.Translate(translate=(0, 0, h))
-    )
-    _, pdf, light = samples(scene, midpoints(30))
-    solid_angle = 2 * math.pi * (1 - h / math.hypot(h, r))
-    # The midpoint rule of second order in cells of 1/30.
-    assert np.mean(1 / pdf) == pytest.approx(solid_angle, rel=1e-3)
-    irradiance = math.pi * 2 * r * r / (r * r + h * h)
-    assert np.mean(light[:, 0] / pdf) == pytest.approx(0.5 / math.pi * irradiance, rel=1e-3)
 
 
 def test_light_of_an_ellipse():
@@ -230,8 +139,3 @@ def test_bad_maps(factors, message):
     scene = rt.Scene(shapes=(rt.Disk(transform=(transform.Scale(scale=factors),)),))
     with pytest.raises(rt.SceneError, match=message):
         rt.build_tables(scene)
-
-
-def test_not_a_solid():
-    with pytest.raises(rt.SceneError, match="it encloses no space; expected a solid"):
-        rt.build_tables(rt.Scene(shapes=(rt.Sphere() - rt.Disk(),)))

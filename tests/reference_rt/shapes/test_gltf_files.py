@@ -88,11 +88,7 @@ def test_gltf_nodes(tmp_path):
     file.root["scene"] = 1
     a, b, c = POINTS[:3].astype(float)
     moved = POINTS[[2, 1, 0]] * [-1.0, 1, 1] + np.array([15.0, 6, 7])
-    expected = [
-        [[10, 0, 1], [10, 2, 1], [8, 0, 1]],
-        moved,
-        [a, b, c],
-    ]
+    expected = [[[10, 0, 1], [10, 2, 1], [8, 0, 1]], moved, [a, b, c]]
     found = corners(read(tmp_path, file.gltf(), "a.gltf"))
     # The quarter turn is as exact as the square root of one half.
     assert np.allclose(found, np.array(expected), rtol=0, atol=1e-14)

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 from builders import cube, write_obj
-from mesh_writers import SQUARE, V, corners, read, square, written
+from mesh_writers import SQUARE, V, corners, read, square
 
 import reference_rt as rt
-from reference_rt.rendering import query
 from reference_rt.shapes.meshes.mesh import read_mesh
 
 
@@ -35,21 +34,6 @@ def test_ways_to_write_a_face(tmp_path, face):
     assert (mesh.normals is None) == ("//" not in face and face.count("/") < 6)
 
 
-def test_triangles_without_area_are_left_out(tmp_path):
-    """They have no normal.  The others keep the numbers of the file."""
-    (tmp_path / "mesh.obj").write_text(V + "v 0.5 0.5 0\nf 1 5 3\nf 1 2 3\nf 2 2 3\nf 1 3 4\n")
-    with pytest.warns(rt.SceneWarning, match="2 of 4 triangles have no area"):
-        scene = rt.build_tables(rt.Scene(shapes=(rt.Mesh(file=str(tmp_path / "mesh.obj")),)))
-    rng = np.random.default_rng(42)
-    o = np.column_stack([rng.uniform(-1, 2, (5000, 2)), np.full(5000, 2.0)])
-    d = rng.uniform(0, 1, (5000, 1)) * [1, 1, 0] - o  # at the diagonal, where it lay
-    found = query.intersect(scene, o, d)
-    hit = np.isfinite(found.t)
-    assert hit.mean() > 0.99
-    assert np.array_equal(found.n[hit], np.tile([0.0, 0, 1], (hit.sum(), 1)))
-    assert set(found.primitive[hit]) == {1, 3}
-
-
 def test_meshes_are_placed_and_turned_like_other_shapes(tmp_path):
     """The cube as a mesh and as a box, under the same transform: the same picture of normals."""
     write_obj(tmp_path / "cube.obj", *cube(2))
@@ -69,30 +53,6 @@ def test_meshes_are_placed_and_turned_like_other_shapes(tmp_path):
     assert (box["id"] == 0).mean() > 0.1
     # Both normals are unit vectors after a few roundings of numbers about 1.
     assert np.allclose(box["normal"], mesh["normal"], rtol=0, atol=1e-14)
-
-
-WRONG = {
-    "index": ("mesh.obj", V + "f 1 2 5\n", "line 5: index 5 of 4 'v' lines is out of range"),
-    "no area": ("mesh.obj", V + "f 1 1 2\n", "no triangle has any area"),
-    "ply: nothing": ("mesh.ply", "", "is malformed: Not a ply file!"),
-    "unknown format": (
-        "mesh.xyzw",
-        "solid",
-        "'.xyzw' is not supported; expected one of .obj, .ply, .stl, .off, .glb, .gltf",
-    ),
-}
-"""What the program says; `test_bad_mesh_files` has all faults."""
-
-
-@pytest.mark.parametrize("name", WRONG)
-def test_wrong_mesh(name, refused, tmp_path):
-    file, content, message = WRONG[name]
-    written(tmp_path, content, file)
-    scene = tmp_path / "scene.yaml"
-    scene.write_text(f"film: {{}}\nshapes:\n  - {{type: mesh, file: {file}}}\n")
-    said = refused(3, "render", str(scene), "-o", str(tmp_path / "out.exr"))
-    assert said.startswith(f"{scene}:3: shapes[0]: mesh {tmp_path / file}")
-    assert message in said
 
 
 def test_missing_mesh(refused, tmp_path):

@@ -221,11 +221,7 @@ def test_ply_attributes(tmp_path, form, names):
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(
     ("kind", "given", "expected"),
-    [
-        ("ushort", 32768, decoded(32768 / 65535)),
-        ("float", 2.5, 2.5),
-        ("double", 0.1, 0.1),
-    ],
+    [("ushort", 32768, decoded(32768 / 65535)), ("float", 2.5, 2.5), ("double", 0.1, 0.1)],
 )
 def test_ply_colours_of_floats_are_linear(tmp_path, form, kind, given, expected):
     properties = [*XYZ, *(f"{kind} {n}" for n in ("red", "green", "blue"))]

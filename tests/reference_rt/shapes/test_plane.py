@@ -1,21 +1,12 @@
-"""Planes: rational arithmetic, parallel rays, far away; the half space below as a solid."""
+"""Planes: signed distances, far away, among instances, and the half space below as a solid."""
 
 import math
-from fractions import Fraction as Q
 
 import numpy as np
 import pytest
-from builders import U, shapes_in_order, unit_vectors
+from builders import U, shapes_in_order
 from drivers import probe
-from flat_checks import (
-    ExactHits,
-    check_distances,
-    check_normal,
-    lattice_hits,
-    random_map,
-    rays_at_plane,
-)
-from rational import q
+from placed_shapes import random_map
 
 import reference_rt as rt
 from reference_rt.core import transform
@@ -23,59 +14,6 @@ from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.shapes import PLANE
 from reference_rt.shapes.flat import base, plane
-
-
-def random_planes(rng, n, stretch, offset):
-    shapes = [rt.Plane(transform=(random_map(rng, stretch, offset),)) for _ in range(n)]
-    return shapes, *shapes_in_order(shapes)
-
-
-@pytest.mark.parametrize(("stretch", "offset", "reach"), [(0, 3, 3), (3, 3, 1), (1, 3, 1e6)])
-def test_against_rational_arithmetic(stretch, offset, reach):
-    """t, normal and uv; sheared, mirrored, scaled by 1e-3 to 1e3; met far from the origin, from
-    above, below and pointing away."""
-    rng = np.random.default_rng(1)
-    n = 400
-    shapes, tables, rows = random_planes(rng, n, stretch, offset)
-    table = tables.planes
-    x, y = reach * rng.uniform(-1, 1, (2, n))
-    o, d = rays_at_plane(rng, table, rows, x, y, reach * rng.uniform(0.1, 3, n))
-    d *= rng.choice([-1, 1, 1], (n, 1))
-    found, right = probe(tables, PLANE, rows, o, d), ExactHits(table, rows, o, d)
-    for i in range(n):
-        t = right.t[i]
-        assert np.isfinite(found.t[i]) == (t > 0)
-        if t < 0:
-            continue
-        assert abs(float(Q(found.t[i]) - t)) <= right.t_error[i]
-        assert abs(float(Q(found.u[i]) - right.x[i])) <= right.x_error[i]
-        assert abs(float(Q(found.v[i]) - right.y[i])) <= right.y_error[i]
-        normal = check_normal(found.n[i], shapes[i], table, rows[i])
-        # The point lies in the plane of x_edge and y_edge, to within its error.
-        off = [p - c for p, c in zip(q(found.p[i]), q(table.center[rows[i]]), strict=True)]
-        assert abs(sum(float(a) * b for a, b in zip(off, normal, strict=True))) <= found.error[i]
-    assert 0.5 * n < np.isfinite(found.t).sum() < 0.8 * n
-
-
-def test_distances_are_within_16_ulp_of_size():
-    """Met at a cosine of 0.1 and more, at an ordinary scale."""
-    rng = np.random.default_rng(2)
-    _, tables, rows = random_planes(rng, 600, 0.5, 3.0)
-    x, y = rng.uniform(-1, 1, (2, 600))
-    o, d = rays_at_plane(rng, tables.planes, rows, x, y, rng.uniform(0.1, 10, 600))
-    check_distances(tables, PLANE, rows, o, d)
-
-
-def test_on_a_lattice():
-    """Both faces are hit; parallel rays miss, in the plane too, for either zero."""
-    o, d, found = lattice_hits(rt.Plane(), PLANE)
-    for i in range(len(o)):
-        t = -o[i, 2] / d[i, 2] if d[i, 2] != 0 else math.inf
-        t = t if t > 0 else math.inf
-        assert found.t[i] == t, (o[i], d[i])
-        if t < math.inf:
-            assert found.p[i].tolist() == (o[i] + t * d[i]).tolist()
-            assert [found.u[i], found.v[i]] == found.p[i, :2].tolist()
 
 
 def test_signed_distance():
@@ -100,23 +38,6 @@ def test_the_point_is_off_by_no_more_than_its_error_at_the_horizon():
 
 
 # ---- among other shapes -------------------------------------------------------------------------
-
-
-def test_outside_of_the_hierarchy():
-    """Among many spheres, with any hierarchy: the same hits as with none."""
-    rng = np.random.default_rng(5)
-    spheres = [rt.Sphere(center=tuple(c), radius=0.3) for c in rng.uniform(-3, 3, (60, 3))]
-    planes = [rt.Plane(transform=(random_map(rng),)) for _ in range(2)]
-    o, d = rng.uniform(-4, 4, (500, 3)), unit_vectors(rng, 500)
-    found = [
-        rt.Scene(shapes=(*planes, *spheres), hierarchy=h).intersect(o, d)
-        for h in ("none", "sah", "median")
-    ]
-    for other in found[1:]:
-        assert np.array_equal(found[0].t, other.t)
-        assert np.array_equal(found[0].shape, other.shape)
-    assert set(found[0].shape) >= {0, 1}
-    assert (found[0].shape >= 2).sum() > 50
 
 
 def test_not_in_a_group():
@@ -146,38 +67,6 @@ def test_spans(o, d, expected):
     spans = plane.spans(tables.planes, 0, ray)
     assert (spans.t0, spans.t1) == expected
     assert spans.t2 == math.inf
-
-
-def test_half_a_ball():
-    """A unit ball below a tilted plane through its middle, against its two surfaces in turn."""
-    rng = np.random.default_rng(6)
-    tilt = (transform.Rotate(rotate=transform.Turn(axis=(1, 2, 0), degrees=50)),)
-    n = transform.affine(tilt)[:, 2]
-    half, rest = (
-        rt.Scene(shapes=(s,))
-        for s in (rt.Sphere() & rt.Plane(transform=tilt), rt.Sphere() - rt.Plane(transform=tilt))
-    )
-    o, d = rng.uniform(-2, 2, (3000, 3)), unit_vectors(rng, 3000)
-    d[::2] = (unit_vectors(rng, 3000) - o)[::2]
-    d /= np.linalg.norm(d, axis=1, keepdims=True)
-    for scene, side in ((half, 1), (rest, -1)):
-        hits = scene.intersect(o, d)
-        b, c = np.sum(o * d, axis=1), np.sum(o * o, axis=1) - 1
-        with np.errstate(invalid="ignore"):
-            root = np.sqrt(b * b - c)
-        candidates = np.stack([-b - root, -b + root, -(o @ n) / (d @ n)])
-        p = o + d * candidates[..., None]
-        on_ball = side * (p @ n) < 0
-        in_ball = np.sum(p * p, axis=-1) < 1
-        shown = np.concatenate([on_ball[:2], in_ball[2:]]) & (candidates > 0)
-        t = np.where(shown, candidates, np.inf).min(axis=0)
-        assert np.array_equal(np.isfinite(hits.t), np.isfinite(t))
-        met = np.isfinite(t)
-        assert np.allclose(hits.t[met], t[met], rtol=1e-10)
-        cut = met & (np.argmin(np.where(shown, candidates, np.inf), axis=0) == 2)
-        assert np.allclose(hits.n[cut], side * n, rtol=0, atol=4 * U)
-        assert cut.sum() > 100
-        assert (met & ~cut).sum() > 300
 
 
 def test_a_solid_without_end():

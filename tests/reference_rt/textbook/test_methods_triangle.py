@@ -121,22 +121,6 @@ def rendered(*triangles):
     )
 
 
-def test_watertight_is_what_renders():
-    """The same hits, and t to eleven roundings: six of barycentrics times depths, and five of edge
-    functions times depths, divided by their sum."""
-    rng = np.random.default_rng(16)
-    for _ in range(20):
-        v = rng.uniform(-1, 1, (3, 3))
-        o = rng.uniform(-3, 3, (500, 3))
-        d = (rng.dirichlet([0.7] * 3, 500) * 1.5 - 0.25) @ v - o
-        t = textbook.intersect("triangle.watertight", textbook.TriangleParameters(*v), o, d)
-        found = rendered(v).intersect(o, d).t
-        hit = np.isfinite(t)
-        assert np.array_equal(np.isfinite(found), hit)
-        assert 50 < hit.sum() < 500
-        assert np.all(np.abs(found[hit] - t[hit]) <= 11.01 * U * t[hit])
-
-
 def test_edges_belong_to_both_here_and_to_one_where_it_renders():
     """Rays through the points of a lattice on the diagonal of a square, ends left out."""
     halves = np.array([[(0, 0, 0), (4, 0, 0), (4, 4, 0)], [(0, 0, 0), (4, 4, 0), (0, 4, 0)]], float)
