@@ -79,7 +79,8 @@ def gate(
         ),
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="First value of {seed}. (default: 1)")
+        int | None,
+        typer.Option(min=0, help="First value of {seed}; the others are far from it. (default: 1)"),
     ] = None,
     time_limit: Annotated[
         float | None,

@@ -16,20 +16,29 @@ from comparisons.gate.request import Request, prepared
 from comparisons.results.case import Case, RungResult
 from reference_rt.rendering.render import Progress
 
+STRIDE = 1_327_217_885
+"""From one seed to the next, modulo SEEDS: their golden section, so that no two seeds of n are
+nearer than about SEEDS / (2.24 n) (the three-gap theorem), and odd, so that none occurs twice.
+Small renderers seed a pixel by the seed plus its number: nearby seeds make copies that are moved.
+"""
+
+SEEDS = 1 << 31
+"""Seeds are below it, for renderers that read a signed number of 32 bits."""
+
 
 @dataclass(frozen=True)
 class Rounds:
-    """seed: of the first replicate, the others follow;  replicates: of the first look, or all if
-    they are fixed;  seconds: time limit, after which no replicates are added; None: `replicates`
-    are fixed."""
+    """seed: of the first replicate; those of the others are far from it;  replicates: of the first
+    look, or all if they are fixed;  seconds: time limit, after which no replicates are added; None:
+    `replicates` are fixed."""
 
     seed: int = 1
     replicates: int = looks.FIRST
     seconds: float | None = looks.SECONDS
 
-    def seeds(self, begin: int, end: int) -> range:
+    def seeds(self, begin: int, end: int) -> list[int]:
         """Of the replicates from `begin` to `end`, counted from 0."""
-        return range(self.seed + begin, self.seed + end)
+        return [(self.seed + k * STRIDE) % SEEDS if k else self.seed for k in range(begin, end)]
 
 
 def gated_renderer(

@@ -37,6 +37,12 @@ ONE_PICTURE = (
     "noise: only replicates show it"
 )
 
+NEGATIVE = (
+    "the sides differ by less than their replicates' spread says, though no picture of one side "
+    "shares noise with one of the other: the replicates of a side make up for each other (negative "
+    "correlation), as jointly stratified ones do, so that the errors are smaller than stated"
+)
+
 TOP = ("relative_bias", "standard_error_of_bias", "detectable_bias", "p_value")
 """Those of the image's numbers that are repeated at the top level."""
 
@@ -179,6 +185,9 @@ def _verdict(
         reason += f"; {unseen_words(found.unseen)}"
     if found.single:
         reason += f"; {ONE_PICTURE}"
+    spread = found.uniformity
+    if spread is not None and spread.narrow and not spread.shared:
+        reason += f"; {NEGATIVE}: {uniformity_words(spread)}"
     of_image = image_numbers(image)
     numbers = {
         "replicates_candidate": len(a),
@@ -218,7 +227,7 @@ def _decide(found: Findings, limit: float, advice: str) -> tuple[Status, str]:
             f"{uniformity_words(spread)} ({spread.mean_beyond_margin:.3f} beyond the margin); many "
             "small differences, or replicates that are not independent of each other"
         )
-    if spread is not None and spread.narrow:
+    if spread is not None and spread.shared:
         return "invalid", (
             f"the sides are not independent of each other: {uniformity_words(spread)}; they share "
             "their noise, as the same seeds or copied pictures do"

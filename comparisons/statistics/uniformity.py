@@ -14,17 +14,19 @@ and the test is left out: of skewed noise the first function is skewed and the o
 Pareto noise with exponent 1.2, 32 pictures against 16 means of 16, 2 of 400 right ones differed.)
 
 Too small a mean p-value means that blocks differ systematically, or that replicates are not
-independent of each other; too large a one that candidate and reference share their noise.
+independent of each other; too large a one that candidate and reference share their noise, or that
+the replicates of a side make up for each other (`dependence.shared_by_sides`).
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
 from scipy.linalg import hadamard
 
 from comparisons.results.case import FloatArray
+from comparisons.statistics.dependence import shared_by_sides
 from comparisons.statistics.scales import DARK, UNIFORMITY_LEVEL, Margins, cell_means, cell_pixels
 from comparisons.statistics.sides import Side
 from comparisons.statistics.unmet import Events
@@ -52,6 +54,8 @@ class Uniformity:
     p_narrow: float
     blocks: int
     replicates: int
+    shared: bool = False
+    """The blocks are `narrow` because the sides share noise."""
     level: float = UNIFORMITY_LEVEL
     """Chance of a false alarm of both tests together."""
 
@@ -104,7 +108,7 @@ def uniformity(a: Side, b: Side, margins: Margins, level: float = 1.0) -> Unifor
     beyond_mean = float(_p_values(beyond, np.delete(size, difference, axis=0)).mean())
     # At least the standard deviation of the mean of as many independent uniform numbers.
     error = max(error, math.sqrt(1.0 / 12.0 / size.shape[1]))
-    return Uniformity(
+    found = Uniformity(
         mean=float(means[difference]),
         expected=expected,
         error=error,
@@ -115,6 +119,7 @@ def uniformity(a: Side, b: Side, margins: Margins, level: float = 1.0) -> Unifor
         replicates=half,
         level=level * UNIFORMITY_LEVEL,
     )
+    return replace(found, shared=found.narrow and shared_by_sides(*pictures))
 
 
 def _unmet(a: Side, b: Side) -> FloatArray:
