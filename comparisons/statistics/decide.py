@@ -121,7 +121,8 @@ def findings(
     if len(a) == 1 or (not isinstance(b, Known) and len(b) == 1):
         image, tiles, pixels, side = single_tests(a, b, tile, margins)
         return Findings(image, tiles, pixels, None, None, side, True)
-    one, two = side_of(a), known_side(b) if isinstance(b, Known) else side_of(b)
+    one = side_of(a)
+    two = known_side(b, one.mean) if isinstance(b, Known) else side_of(b)
     return Findings(
         image_test(one, two, margins, level),
         tile_test(one, two, tile, margins, level),

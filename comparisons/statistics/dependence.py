@@ -17,6 +17,7 @@ pattern do. The former have deviations that are correlated in the pixels where t
 latter have none.
 """
 
+import functools
 import itertools
 import math
 from dataclasses import dataclass
@@ -153,6 +154,7 @@ def _about_mean(pairs: FloatArray) -> FloatArray:
     return np.asarray(pairs - (pairs.sum() - np.trace(pairs)) / (count * (count - 1)))
 
 
+@functools.cache
 def _orders(count: int) -> npt.NDArray[np.int64]:
     """Other orders of so many: of few all, but for their reverses, else random ones."""
     if count == FEWEST:

@@ -20,6 +20,7 @@ the replicates of a side make up for each other (`dependence.shared_by_sides`).
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy import stats
@@ -27,7 +28,14 @@ from scipy.linalg import hadamard
 
 from comparisons.results.case import FloatArray
 from comparisons.statistics.dependence import shared_by_sides
-from comparisons.statistics.scales import DARK, UNIFORMITY_LEVEL, Margins, cell_means, cell_pixels
+from comparisons.statistics.scales import (
+    DARK,
+    UNIFORMITY_LEVEL,
+    Margins,
+    cell_means,
+    cell_pixels,
+    cell_sums,
+)
 from comparisons.statistics.sides import Side
 from comparisons.statistics.unmet import Events
 from comparisons.statistics.welch import are_unequal, noise_ratio
@@ -126,9 +134,8 @@ def _unmet(a: Side, b: Side) -> FloatArray:
     """The square of two standard errors of rare light (see `rare`) in the blocks' differences. The
     ranks presume noise of one distribution on both sides; of a side that seldom meets a light, most
     blocks are darker, though none by more than a few events."""
-    of_a, of_b = cell_means(a.mean, BLOCK), cell_means(b.mean, BLOCK)
-    difference = of_a - of_b
-    events = Events.of_cells(a, b, of_a, of_b, cell_pixels(b.mean, BLOCK))
+    difference = cell_means(a.mean - b.mean, BLOCK)
+    events = Events.of_cells(a, b, partial(cell_sums, tile=BLOCK), cell_pixels(b.mean, BLOCK))
     return np.asarray(8.0 * np.abs(difference) * events.missed_by(difference))
 
 

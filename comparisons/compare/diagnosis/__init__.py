@@ -21,7 +21,9 @@ from comparisons.compare.diagnosis.spots import SHARE, one_place, rim
 from comparisons.results.case import Cause, FloatArray, Images, RungResult
 from comparisons.statistics.metrics import count_nonfinite
 
-__all__ = ["likeliest", "of_rungs"]
+__all__ = ["FLEXIBLE", "likeliest", "of_rungs"]
+
+FLEXIBLE = (colour.A_CURVE, colour.A_MATRIX)
 
 
 # ---- causes recognised from the numbers of the deterministic rungs -------------------------------

@@ -15,6 +15,9 @@ from reference_rt.textures.image_file import linear
 
 CHANNELS = ("red", "green", "blue")
 
+A_CURVE, A_MATRIX = "a monotone tone curve", "a matrix of colours"
+"""Names of causes with so many parameters that they may fit what has a simpler cause."""
+
 LUMINANCE = to_xyz(SRGB)[1]
 """The share of red, green and blue of sRGB in the luminance."""
 
@@ -76,7 +79,7 @@ def _matrices(misfit: Misfit) -> Iterator[Hypothesis]:
     matrix = misfit.regression(r).T
     rows = "; ".join(" ".join(f"{v:.3g}" for v in row) for row in matrix)
     evidence = f"the candidate's colours are the reference's times the matrix ({rows})"
-    yield Hypothesis("matrix", "a matrix of colours", evidence, r @ matrix.T, 9)
+    yield Hypothesis("matrix", A_MATRIX, evidence, r @ matrix.T, 9)
 
 
 # ---- tone curves ---------------------------------------------------------------------------------
@@ -142,9 +145,6 @@ def _curves(misfit: Misfit) -> Iterator[Hypothesis]:
         evidence = f"the candidate is the reference through {name}: it is made for a display"
         yield Hypothesis("known curve", name, evidence, mapped, 0)
     yield from _any_curve(misfit, r)
-
-
-A_CURVE = "a monotone tone curve"
 
 
 def _is_customary(gamma: float) -> bool:
