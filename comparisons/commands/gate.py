@@ -95,6 +95,9 @@ def gate(
         str | None, typer.Option(help="Suffix of {output}. (default: .exr)", metavar=".EXT")
     ] = None,
     layer: Layer = "",
+    reference_layer: Annotated[
+        str | None, typer.Option(help="The same of --reference. (default: that of --layer)")
+    ] = None,
     limit: Annotated[
         float,
         typer.Option(help="Smallest relative bias of the image mean that must be detectable."),
@@ -168,6 +171,9 @@ def gate(
     def tell(line: str) -> None:
         say(line, err=True)
 
+    theirs = layer if reference_layer is None else reference_layer
+    if reference_layer is not None and not reference:
+        raise UsageError("--reference-layer: only applies to --reference; expected that too")
     name = baseline or ("" if described is None else described.name)
     name = printable(name or Path((reference or [Path("nothing")])[0]).stem)
     kept = () if run is None else (out / "candidates" / "a candidate",)
@@ -177,7 +183,7 @@ def gate(
     try:
         request = Request(
             scene=described,
-            references=tuple(p for path in reference or () for p in read_candidates(path, layer)),
+            references=tuple(p for path in reference or () for p in read_candidates(path, theirs)),
             variance=variance,
             baseline=baseline or "",
             baselines=baselines,

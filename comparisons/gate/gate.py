@@ -261,6 +261,7 @@ def _displayed(pictures: FloatArray) -> FloatArray:
 
 def _notes(candidates: Sequence[Picture]) -> tuple[str, ...]:
     """Notes about the files, for the reader."""
+    converted = next(((p.note,) for p in candidates if p.note), ())
     if any(picture.quantised and not picture.displayed for picture in candidates):
-        return ("the candidate has 8 bits per channel: its rounding counts as an error",)
-    return ()
+        return ("the candidate has 8 bits per channel: its rounding counts as an error", *converted)
+    return converted

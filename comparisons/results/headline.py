@@ -36,7 +36,10 @@ def _agree(case: Case) -> str:
     seen = _detectable(_first(case, "agree", "statistics"))
     if seen is None:
         return "no difference was found"
-    return f"no difference was found, and a bias of {_percent(seen)} would have been seen"
+    return (
+        f"no difference was found, and a bias of the image mean of {_percent(seen)} would have "
+        "been seen"
+    )
 
 
 def _unchanged(case: Case) -> str:
@@ -51,8 +54,8 @@ def _inconclusive(case: Case) -> str:
         return "too noisy to decide" if rung is None else f"undecided: {_clause(rung.reason)}"
     if seen > limit:
         return (
-            f"too noisy to decide: only a bias above {_percent(seen)} would be seen, and "
-            f"{_percent(limit)} is asked for"
+            f"too noisy to decide: only a bias of the image mean above {_percent(seen)} would be "
+            f"seen, and {_percent(limit)} is asked for"
         )
     unseen = rung.numbers.get("unseen_light")
     missing = unseen.get("missing_at_most") if isinstance(unseen, Mapping) else None

@@ -19,7 +19,7 @@ from comparisons.gate.request import Request
 from comparisons.gate.rounds import SEEDS, Rounds, gated_renderer
 from comparisons.results.case import Case
 from reference_rt.core.arrays import FloatArray
-from reference_rt.util.errors import ImageError
+from reference_rt.util.errors import ImageError, UsageError
 
 SIDE = 32
 
@@ -181,6 +181,35 @@ def test_the_first_picture_is_checked_before_the_rest(how: str) -> None:
     assert renderer.seeds == [1]
 
 
+class BrokenLater(Renderer):
+    """Whose third picture has a fault."""
+
+    def __init__(self, how: str) -> None:
+        super().__init__()
+        self._how = how
+
+    def _made(self, made: list[Picture]) -> list[Picture]:
+        if len(self.starts) == 3 and self._how == "nan":
+            made[0].radiance[3, 4, 1] = np.nan
+        if len(self.starts) == 3 and self._how == "size":
+            return [Picture(made[0].radiance[1:], name="the third")]
+        return made
+
+
+@pytest.mark.parametrize("seconds", [None, 600.0])
+def test_each_picture_is_checked_before_the_next(seconds: float | None) -> None:
+    renderer, rounds = BrokenLater("nan"), Rounds(seconds=seconds)
+    case = gated(renderer, rounds)
+    assert renderer.seeds == rounds.seeds(0, 3)
+    assert case.verdict == "invalid"
+    assert "1 pixel of the candidate not finite" in case.reason
+    assert f"seed {rounds.seeds(2, 3)[0]} is the first with such pixels" in str(case.notes)
+    renderer = BrokenLater("size")
+    with pytest.raises(ImageError, match="the third: is 32 x 31 pixels; expected 32 x 32"):
+        gated(renderer, rounds)
+    assert renderer.seeds == rounds.seeds(0, 3)
+
+
 @pytest.mark.parametrize("copied", [8, 3])
 def test_seeds_of_the_reference(copied: int) -> None:
     """All copies: unchanged after the first look. Some: the others are compared."""
@@ -206,6 +235,21 @@ def test_more_candidates_than_pictures_of_a_precise_reference(noise: float) -> N
     errors = np.array(list(found.numbers["standard_error_of_bias"].values()))
     # The largest of two estimates, one of 15 degrees of freedom: 99.9 % are below 1.6 times.
     assert (errors < 1.7 * np.hypot(expected, 0.01 / np.sqrt(16 * SIDE**2))).all()
+
+
+@pytest.mark.parametrize("limit", [0.0, 0.0005, 0.001, 1.0])
+def test_a_limit_that_cannot_be_met(limit: float) -> None:
+    with pytest.raises(UsageError, match=r"expected a fraction above 0\.001, the bias"):
+        gated(Renderer(), limit=limit)
+
+
+def test_dim_pictures_of_float32() -> None:
+    """Whose variances' squares are 0 even as float64."""
+    candidate, reference = (
+        [Picture(1e-41 * p.radiance) for p in pictures(range(k, k + 8))] for k in (1, 100)
+    )
+    case = request.gated(Request(references=tuple(reference), limit=0.02), candidate)
+    assert case.verdict == "agree", case.reason
 
 
 def test_a_reference_of_few_pictures_is_named_as_the_limit() -> None:

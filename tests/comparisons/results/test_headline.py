@@ -72,12 +72,13 @@ def test_what_differs_after_its_cause(rung, sides, what):
     [
         (
             case("agree", RungResult("geometry", "agree", "x"), statistics("agree")),
-            "no difference was found, and a bias of 0.35 % would have been seen",
+            "no difference was found, and a bias of the image mean of 0.35 % would have been seen",
         ),
         (case("agree", RungResult("whitted", "agree", "x")), "no difference was found"),
         (
             case("inconclusive", statistics("inconclusive", limit=0.001)),
-            "too noisy to decide: only a bias above 0.35 % would be seen, and 0.10 % is asked for",
+            "too noisy to decide: only a bias of the image mean above 0.35 % would be seen, and "
+            "0.10 % is asked for",
         ),
         (
             case("inconclusive", statistics("inconclusive")),
