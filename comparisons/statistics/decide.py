@@ -8,6 +8,7 @@ import numpy.typing as npt
 from comparisons.results.case import FloatArray, RungResult, Status
 from comparisons.statistics.advice import noise_free_candidate, wanted
 from comparisons.statistics.metrics import count_nonfinite
+from comparisons.statistics.patterns import line_test, mode_test, named_line, named_mode
 from comparisons.statistics.rare import Unseen, unseen, worse
 from comparisons.statistics.scales import IMAGE_LEVEL, POWER, TILE, Margins
 from comparisons.statistics.sides import Known, known_side, picture_array, side_of
@@ -22,6 +23,7 @@ from comparisons.statistics.wording import (
     finite,
     image_numbers,
     interval,
+    line_numbers,
     percent,
     uniformity_numbers,
     uniformity_words,
@@ -54,6 +56,9 @@ class Findings:
     image: BiasTest
     tiles: BiasTest
     pixels: BiasTest
+    lines: BiasTest | None
+    modes: BiasTest | None
+    """Of `patterns`; None for single and for small pictures."""
     uniformity: Uniformity | None
     unseen: Unseen | None
     """The worse of both sides; None if either is a single picture."""
@@ -120,13 +125,15 @@ def findings(
     `compare`."""
     if len(a) == 1 or (not isinstance(b, Known) and len(b) == 1):
         image, tiles, pixels, side = single_tests(a, b, tile, margins)
-        return Findings(image, tiles, pixels, None, None, side, True)
+        return Findings(image, tiles, pixels, None, None, None, None, side, True)
     one = side_of(a)
     two = known_side(b, one.mean) if isinstance(b, Known) else side_of(b)
     return Findings(
         image_test(one, two, margins, level),
         tile_test(one, two, tile, margins, level),
         pixel_test(one, two, margins, level),
+        line_test(one, two, margins, level),
+        mode_test(one, two, margins, level),
         uniformity(one, two, margins, level),
         worse(*(_unseen(side, level) for side in (a, b))),
         tile,
@@ -205,6 +212,8 @@ def _verdict(
         "image": of_image,
         "tiles": {"side": found.tile, **cell_numbers(found.tiles, found.tile)},
         "pixels": cell_numbers(found.pixels, 1),
+        "lines": None if found.lines is None else line_numbers(found.lines),
+        "modes": None if found.modes is None else line_numbers(found.modes),
         "uniformity": uniformity_numbers(found.uniformity),
     }
     return RungResult("statistics", status, reason, numbers)
@@ -222,6 +231,18 @@ def _decide(found: Findings, limit: float, advice: str) -> tuple[Status, str]:
         return "differ", which(found.tiles, found.tile, "tiles", ", though not the image mean")
     if found.pixels.differs.any():
         return "differ", which(found.pixels, 1, "pixels", ", though not a whole tile")
+    if found.lines is not None and found.lines.differs.any():
+        lines, count = found.lines, np.count_nonzero(found.lines.differs.any(axis=-1))
+        line = named_line(lines.worst[0], len(found.pixels.difference))
+        return "differ", (
+            f"{count} of {len(lines.difference)} rows and columns differ, though no tile and no "
+            f"pixel; the worst, {line}: {beyond(lines, lines.worst)}"
+        )
+    if found.modes is not None and found.modes.differs.any():
+        return "differ", (
+            "brightness differs smoothly over the picture, though not its mean: "
+            f"{named_mode(found.modes.worst[0])}, {beyond(found.modes, found.modes.worst)}"
+        )
     if spread is not None and spread.wide:
         return "differ", (
             "small blocks differ more between the sides than within: "

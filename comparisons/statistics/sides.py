@@ -1,7 +1,9 @@
 """The two sides of a comparison, and the noise estimated from their replicates."""
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -10,7 +12,10 @@ from scipy.ndimage import correlate1d
 from comparisons.results.case import FloatArray
 from comparisons.statistics.filtered import excess
 from comparisons.statistics.rare import event, event_of, met_once
-from comparisons.statistics.scales import cell_means, cell_pixels, cell_sums
+from comparisons.statistics.scales import cell_pixels, cell_sums
+
+Sums = Callable[[FloatArray], FloatArray]
+"""From pictures (..., height, width, 3) to sums over parts of them."""
 
 FAINTEST = 1e-150
 """Variances that are smaller count as none: their squares would be 0."""
@@ -57,13 +62,18 @@ class Side:
 
     def of_tiles(self, tile: int) -> Noise:
         """The noise of tiles of one picture, (rows, columns, 3)."""
-        pixels = cell_pixels(self.mean, tile)
-        variance = cell_sums(self.variance, tile)
+        sums = partial(cell_sums, tile=tile)
+        return self.of_sums(sums, sums, sums, cell_pixels(self.mean, tile))
+
+    def of_sums(self, sums: Sums, squares: Sums, fourths: Sums, pixels: FloatArray) -> Noise:
+        """The noise of weighted sums over one picture's pixels, divided by `pixels`;  squares,
+        fourths: sums with the weights' squares and fourth powers."""
+        variance = squares(self.variance)
         summed = (1.0 + self.filtered) * variance / pixels**2
-        dof = self._dof(variance, cell_sums(self.fourth, tile), pixels) / (1.0 + self.filtered)
+        dof = self._dof(variance, fourths(self.fourth), pixels) / (1.0 + self.filtered)
         if self.pictures is None:
             return Noise(summed, dof, summed, dof)
-        own = cell_means(self.pictures, tile).var(axis=0, ddof=1)
+        own = (sums(self.pictures) / pixels).var(axis=0, ddof=1)
         return Noise(own, float(self.count - 1), summed, dof)
 
     def of_image(self) -> Noise:
