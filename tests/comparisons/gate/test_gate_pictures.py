@@ -9,7 +9,7 @@ import pytest
 from picture_writers import exr, hdr, rgbe
 from PIL import Image
 
-from comparisons.gate.gate import gate_pictures
+from comparisons.gate.gate import _is_dithered, gate_pictures
 from comparisons.gate.pictures_in import (
     Picture,
     from_array,
@@ -20,6 +20,7 @@ from comparisons.gate.pictures_in import (
 from comparisons.gate.reference import of_files
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.exr import write_exr
+from reference_rt.rendering.image import srgb
 from reference_rt.textures.image_file import linear
 from reference_rt.util.errors import ImageError
 
@@ -124,3 +125,28 @@ def test_layers_are_named_with_the_option(tmp_path: Path, picture: FloatArray) -
     write_exr(tmp_path / "a.exr", channels, {})
     with pytest.raises(ImageError, match=r"expected --layer \(or --reference-layer\) as one of"):
         read_candidate(tmp_path / "a.exr")
+
+
+def shown(values: FloatArray, codes: FloatArray) -> Picture:
+    """Linear values as an 8-bit picture stores them, with noise of so many codes before that."""
+    encoded = np.clip(np.round(255.0 * srgb(values) + codes), 0.0, 255.0)
+    return Picture(linear(encoded / 255.0), quantised=True, displayed=True)
+
+
+def test_a_dithered_picture_without_noise_is_the_reference() -> None:
+    """Not one that is cut off instead of rounded, a bit brighter, or wrong in a tile or a pixel."""
+    y, x = np.mgrid[0:48, 0:64] / 64.0
+    exact = (0.3 + 0.2 * np.sin(5.0 * x) * np.cos(7.0 * y))[..., None] * np.array([1.0, 0.8, 0.3])
+    tile, pixel = np.zeros((2, *exact.shape))
+    tile[16:32, 16:32] = 0.3
+    pixel[5, 9] = 2.0
+    reference = of_files([Picture(exact)], None, True)
+    for seed in range(20):
+        dither = np.random.default_rng(seed).uniform(-0.5, 0.5, exact.shape)
+        assert _is_dithered(shown(exact, dither).radiance, exact)
+        for change in (0.0 * dither, dither - 0.5, dither + 0.1, dither + tile, dither + pixel):
+            assert not _is_dithered(shown(exact, change).radiance, exact)
+    for change, verdict in ((dither, "agree"), (dither - 0.5, "differ")):
+        case = gate_pictures([shown(exact, change)], reference)
+        assert case.verdict == verdict, case.reason
+        assert ("as those of dithering" in str(case.notes)) == (verdict == "agree")
