@@ -137,7 +137,7 @@ def gate(
         from comparisons.gate.reference import is_noise_free
         from comparisons.gate.request import Request, gated
         from comparisons.gate.rounds import Rounds, gated_renderer
-        from comparisons.results.headline import headline
+        from comparisons.results.headline import headline, numbers_table
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.console import ProgressLine
 
@@ -218,6 +218,8 @@ def gate(
     say(f"{case.scene}: {case.verdict}: {headline(case)}")
     if case.cause is not None:
         say(f"  {case.cause.name}: {case.cause.evidence}")
+    for line in numbers_table(case):
+        say(f"  {line}")
     say(f"  {case.reason}")
     tell(f"{results}, {report}")
     raise typer.Exit(outputs.code_of(case))

@@ -48,11 +48,6 @@ CROP = 128
 """Side in pixels of the middle of the picture, in which a movement is sought."""
 
 
-MOVEMENTS = 199
-"""Random movements of one side's noise that show how far correlations of the sides scatter: the
-chance that unrelated noise is taken for shared noise is 1 / 200."""
-
-
 @dataclass(frozen=True)
 class Successive:
     """correlation: of successive pictures, minus that of any two;  movement: in pixels to the right
@@ -99,20 +94,19 @@ def successive(pictures: FloatArray) -> Successive | None:
 
 
 def shared_by_sides(a: FloatArray, b: FloatArray) -> bool:
-    """Whether replicates of one side share noise with replicates of the other: their correlations
-    are larger than with noise that is moved by any of some random movements."""
+    """Whether replicates of one side share noise with replicates of the other: the squares of their
+    correlations are larger than with noise that is moved, by whatever movement. Of unrelated noise
+    that is so with a chance of one over the number of pixels."""
     one, two = (_middle(_deviations(x).sum(axis=-1)) for x in (a, b))
-    rng = np.random.default_rng(0)
-
-    def squares(moved: FloatArray) -> float:
-        return float((_correlations(one, moved) ** 2).sum())
-
-    in_place = squares(two)
-    height, width = two.shape[1:]
-    return in_place > 0.0 and all(
-        squares(np.roll(two, divmod(int(by), width), axis=(1, 2))) < in_place
-        for by in rng.integers(1, height * width, MOVEMENTS)
+    size = one.shape[1:]
+    first, second = (
+        np.fft.rfft2(x / np.sqrt(np.maximum((x**2).sum(axis=(1, 2), keepdims=True), 1e-300)))
+        for x in (one, two)
     )
+    squares = np.zeros(size)
+    for picture, other in itertools.product(first, second):
+        squares += np.fft.irfft2(picture.conj() * other, size) ** 2
+    return bool(squares[0, 0] > 0.0 and squares.argmax() == 0)
 
 
 def _deviations(pictures: FloatArray) -> FloatArray:

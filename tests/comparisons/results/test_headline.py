@@ -5,7 +5,7 @@ import typing
 import pytest
 
 from comparisons.results.case import Case, Cause, RungResult, Status
-from comparisons.results.headline import headline
+from comparisons.results.headline import headline, numbers_table
 from comparisons.results.rungs import RUNGS
 
 STATUSES = typing.get_args(Status)
@@ -138,3 +138,16 @@ def test_every_rung_may_differ_besides(verdict, other):
     told = headline(case(verdict, first, RungResult(other, "differ", "9 of 10 rays; and more")))
     assert told
     assert "more" not in told
+
+
+def test_the_numbers_as_a_table():
+    lines = {"tested": 256, "differ": 0, "median_detectable_bias": 0.013}
+    rung = statistics(tiles=3, lines=lines, pixels=1)
+    assert numbers_table(case("differ", rung)) == [
+        "tested                found                         would have been seen",
+        "image mean            R +1.0 %, G +1.1 %, B +1.2 %  0.35 %",
+        "64 tiles              3 differ",
+        "256 rows and columns  0 differ                      1.3 % in half of them",
+        "16,384 pixels         1 differ",
+    ]
+    assert numbers_table(case("invalid", RungResult("input", "invalid", "why"))) == []
