@@ -92,7 +92,8 @@ def gate(
         ),
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="First value of {seed}. (default: 1)")
+        int | None,
+        typer.Option(min=0, help="First value of {seed}; the others are far from it. (default: 1)"),
     ] = None,
     time_limit: Annotated[
         float | None,
@@ -107,6 +108,9 @@ def gate(
         str | None, typer.Option(help="Suffix of {output}. (default: .exr)", metavar=".EXT")
     ] = None,
     layer: Layer = "",
+    reference_layer: Annotated[
+        str | None, typer.Option(help="The same of --reference. (default: that of --layer)")
+    ] = None,
     limit: Annotated[
         float,
         typer.Option(help="Smallest relative bias of the image mean that must be detectable."),
@@ -146,7 +150,7 @@ def gate(
         from comparisons.gate.reference import is_noise_free
         from comparisons.gate.request import Request, gated
         from comparisons.gate.rounds import Rounds, gated_renderer
-        from comparisons.results.headline import headline
+        from comparisons.results.headline import headline, numbers_table
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.console import ProgressLine
 
@@ -194,6 +198,9 @@ def gate(
     def tell(line: str) -> None:
         say(line, err=True)
 
+    theirs = layer if reference_layer is None else reference_layer
+    if reference_layer is not None and not reference:
+        raise UsageError("--reference-layer: only applies to --reference; expected that too")
     name = baseline or ("" if described is None else described.name)
     name = printable(name or Path((reference or [Path("nothing")])[0]).stem)
     kept = () if run is None else (out / "candidates" / "a candidate",)
@@ -203,7 +210,7 @@ def gate(
     try:
         request = Request(
             scene=described,
-            references=tuple(p for path in reference or () for p in read_candidates(path, layer)),
+            references=tuple(p for path in reference or () for p in read_candidates(path, theirs)),
             variance=variance,
             baseline=baseline or "",
             baselines=baselines,
@@ -238,6 +245,8 @@ def gate(
     say(f"{case.scene}: {case.verdict}: {headline(case)}")
     if case.cause is not None:
         say(f"  {case.cause.name}: {case.cause.evidence}")
+    for line in numbers_table(case):
+        say(f"  {line}")
     say(f"  {case.reason}")
     tell(f"{results}, {report}")
     raise typer.Exit(outputs.code_of(case))

@@ -189,7 +189,7 @@ def likeliest_cause(
     """The likeliest cause of a difference; single lights, and paths of other lengths, are rendered
     only if needed."""
     plain = diagnosis.likeliest(images)
-    if plain is not None and plain.explained > SURE:
+    if plain is not None and plain.explained > SURE and plain.name not in diagnosis.FLEXIBLE:
         return plain
     if lights is None and lengths is None:
         return plain

@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -114,16 +114,16 @@ class Driver:
         """Whether one start makes several pictures."""
         return self._command.together
 
-    def pictures(self, seeds: range) -> list[Picture]:
+    def pictures(self, seeds: Sequence[int]) -> list[Picture]:
         """A picture for each seed.
 
         Raises RendererError (it hung, crashed, or did not write an output) and ImageError (an
         output is not a picture).
         """
-        starts = [seeds] if self._command.together else [range(s, s + 1) for s in seeds]
+        starts = [seeds] if self._command.together else [[seed] for seed in seeds]
         return [picture for start in starts if start for picture in self._start(start)]
 
-    def _start(self, seeds: range) -> list[Picture]:
+    def _start(self, seeds: Sequence[int]) -> list[Picture]:
         which = _named(seeds)
         first = len(self.made) + 1
         last = first + len(seeds) - 1
@@ -172,8 +172,8 @@ class Driver:
             shutil.copyfile(said, self._keep / LOG)
 
 
-def _named(seeds: range) -> str:
-    return f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"
+def _named(seeds: Sequence[int]) -> str:
+    return f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {', '.join(map(str, seeds))}"
 
 
 def _run(arguments: list[str], said: Path, seconds: float, which: str) -> None:

@@ -28,6 +28,7 @@ from comparisons.results.case import (
 from comparisons.rungs.images import images_rung
 from comparisons.rungs.input import input_rung
 from comparisons.statistics.metrics import image_metrics
+from comparisons.statistics.scales import TILE, cell_pixels, cell_sums
 from reference_rt.rendering.image import srgb
 from reference_rt.textures.image_file import linear
 from reference_rt.util.errors import ImageError, UsageError
@@ -118,11 +119,19 @@ def judged(
         lights, lengths = without_rim_later(lights, lengths, rim)
     notes = [*notes, *_notes(candidates)]
     if reference.noise_free and candidates[0].displayed:
-        reference = replace(reference, pictures=_displayed(reference.pictures))
-        notes.append(
-            "the candidate is stored as 8-bit sRGB: the reference is rounded and clamped to 1 in "
-            "the same way, and brighter values are not compared"
-        )
+        if _is_dithered(candidates[0].radiance, reference.pictures[0]):
+            shown = candidates[0].radiance[np.newaxis]
+            notes.append(
+                "the candidate is stored as 8-bit sRGB: it is within a code of the reference "
+                "everywhere, and its errors have no mean, as those of dithering; they count as none"
+            )
+        else:
+            shown = _displayed(reference.pictures)
+            notes.append(
+                "the candidate is stored as 8-bit sRGB: the reference is rounded and clamped to 1 "
+                "in the same way, and brighter values are not compared"
+            )
+        reference = replace(reference, pictures=shown)
     if reference.noise_free and len(candidates) > 1:
         raise UsageError(f"{len(candidates)} candidates of a picture without noise; expected one")
     pictures = stacked(candidates)
@@ -254,6 +263,28 @@ def _replicates(reference: Reference) -> FloatArray | None:
     return np.stack([mean + deviation, mean - deviation])
 
 
+DITHER = 1.0 / 6.0
+"""Variance of a code dithered by half a code to either side, and then rounded: twice that of a
+number between -1/2 and 1/2."""
+
+UNBIASED = 5.0
+"""Standard errors of the mean of such errors that no tile exceeds by chance: one in a million."""
+
+
+def _is_dithered(candidate: FloatArray, reference: FloatArray) -> bool:
+    """Whether the candidate's 8-bit codes are the reference's plus noise of at most a code, without
+    a mean in any channel of the picture or of a tile."""
+    codes, exact = (255.0 * srgb(np.clip(x, 0.0, 1.0)) for x in (candidate, reference))
+    error = codes - exact
+    if np.array_equal(np.round(codes), np.round(exact)) or np.abs(error).max() > 1.0 + 1e-6:
+        return False
+    for side in (TILE, max(error.shape[:2])):
+        sums, pixels = cell_sums(error, side), cell_pixels(error, side)
+        if np.any(np.abs(sums) > UNBIASED * np.sqrt(DITHER * pixels)):
+            return False
+    return True
+
+
 def _displayed(pictures: FloatArray) -> FloatArray:
     """Linear pictures rounded to 8-bit sRGB."""
     return linear(np.round(255.0 * srgb(np.clip(pictures, 0.0, 1.0))) / 255.0)
@@ -261,6 +292,7 @@ def _displayed(pictures: FloatArray) -> FloatArray:
 
 def _notes(candidates: Sequence[Picture]) -> tuple[str, ...]:
     """Notes about the files, for the reader."""
+    converted = next(((p.note,) for p in candidates if p.note), ())
     if any(picture.quantised and not picture.displayed for picture in candidates):
-        return ("the candidate has 8 bits per channel: its rounding counts as an error",)
-    return ()
+        return ("the candidate has 8 bits per channel: its rounding counts as an error", *converted)
+    return converted

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from comparisons.compare.primaries import SRGB, Chromaticities, conversion
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.exr import read_headers
 from reference_rt.core.image_files import ImageFile, open_image
@@ -30,13 +31,14 @@ class Picture:
     """radiance: (height, width, 3) linear sRGB, row 0 on top, premultiplied by opacity;  opacity:
     (height, width) from 0 to 1, None if the file has none;  quantised: whether it was stored with
     8 bits per channel;  displayed: whether these are sRGB values, clamped to 1;  name: the file's
-    name, or a description;  header: text found in the file."""
+    name, or a description;  note: what was converted;  header: text found in the file."""
 
     radiance: FloatArray
     opacity: FloatArray | None = None
     quantised: bool = False
     displayed: bool = False
     name: str = "array"
+    note: str = ""
     header: dict[str, str] = field(default_factory=dict)
 
 
@@ -69,7 +71,10 @@ def read_candidates(path: Path, layer: str = "") -> tuple[Picture, ...]:
     except FileNotFoundError:
         raise ImageError(f"{path}: there is no such file; expected an image") from None
     except ValueError as error:
-        raise ImageError(f"{path}: {error}") from None
+        # A scene's file names a layer by a field, the gate by an option.
+        options = "expected --layer (or --reference-layer) as"
+        text = str(error).replace("expected `layer` as", options)
+        raise ImageError(f"{path}: {text}") from None
     except OSError as error:
         raise ImageError(
             f"{path}: cannot be read: {error.strerror or error}; expected an image"
@@ -98,10 +103,36 @@ def _picture(image: ImageFile) -> Picture:
                 radiance[rows] *= covered[..., None]
     if image.is_integer and opacity is not None and not (opacity < 1.0).any():
         opacity = None
+    note = ""
+    if isinstance(image, ExrFile) and (found := _chromaticities(image.path, image.part)):
+        radiance = radiance @ conversion(found, SRGB).T
+        note = f"{image.path}: its header names other primaries than sRGB's, and was heeded"
     quantised = image.bits == 8
     return Picture(
-        radiance, opacity, quantised, quantised and image.is_integer, str(image.path), image.text
+        radiance,
+        opacity,
+        quantised,
+        quantised and image.is_integer,
+        str(image.path),
+        note,
+        image.text,
     )
+
+
+def _chromaticities(path: Path, part: int) -> Chromaticities:
+    """CIE x, y of red, green, blue and white by an EXR file's header; () for sRGB's, which are the
+    default. Raises ValueError."""
+    values = [float(v) for v in read_headers(path)[part].get("chromaticities", ())]
+    found = tuple(zip(values[::2], values[1::2], strict=True))
+    if np.allclose(found or SRGB, SRGB, atol=ROUNDED):
+        return ()
+    if not np.isfinite(values).all():
+        raise ValueError("has chromaticities that are not finite")
+    return found
+
+
+ROUNDED = 1e-3
+"""Difference of CIE x and y that the rounding of published primaries makes."""
 
 
 def from_array(array: npt.ArrayLike, name: str = "array") -> tuple[Picture, ...]:

@@ -129,7 +129,8 @@ def of_files(references: Sequence[Picture], variance: Path | None, noise_free: b
                 f"{references[0].name}"
             )
     prints = tuple(fingerprint(picture) for picture in pictures)
-    return Reference(pictures, spread, noise_free, fingerprints=prints)
+    notes = next(((p.note,) for p in references if p.note), ())
+    return Reference(pictures, spread, noise_free, notes=notes, fingerprints=prints)
 
 
 def check_sizes(candidates: Sequence[Picture], expected: str, whose: str) -> None:

@@ -15,6 +15,7 @@ from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes
 from comparisons.gate.rim import check_rim
 from comparisons.results.case import Case
+from comparisons.statistics import Margins
 from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import UsageError
@@ -51,8 +52,12 @@ class Request:
             raise UsageError("nothing to compare with; expected a scene, reference or baseline")
         if self.variance is not None and not self.references:
             raise UsageError("got a variance without a reference; expected both")
-        if not 0.0 < self.limit < 1.0:
-            raise UsageError(f"the limit is {self.limit:g}; expected a fraction, such as 0.005")
+        permitted = Margins().image
+        if not permitted < self.limit < 1.0:
+            raise UsageError(
+                f"the limit is {self.limit:g}; expected a fraction above {permitted:g}, the "
+                "bias of the image mean that is permitted, such as 0.005"
+            )
         if self.baseline:
             baselines.check_name(self.baseline)
 

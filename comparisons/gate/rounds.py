@@ -12,24 +12,33 @@ from comparisons.gate.driver import Driver
 from comparisons.gate.gate import first_fault, gate_pictures, judged, look, unchanged
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes, size_of
-from comparisons.gate.request import Request, prepared
+from comparisons.gate.request import Judge, Request, prepared
 from comparisons.results.case import Case, RungResult
 from reference_rt.rendering.render import Progress
+
+STRIDE = 1_327_217_885
+"""From one seed to the next, modulo SEEDS: their golden section, so that no two seeds of n are
+nearer than about SEEDS / (2.24 n) (the three-gap theorem), and odd, so that none occurs twice.
+Small renderers seed a pixel by the seed plus its number: nearby seeds make copies that are moved.
+"""
+
+SEEDS = 1 << 31
+"""Seeds are below it, for renderers that read a signed number of 32 bits."""
 
 
 @dataclass(frozen=True)
 class Rounds:
-    """seed: of the first replicate, the others follow;  replicates: of the first look, or all if
-    they are fixed;  seconds: time limit, after which no replicates are added; None: `replicates`
-    are fixed."""
+    """seed: of the first replicate; those of the others are far from it;  replicates: of the first
+    look, or all if they are fixed;  seconds: time limit, after which no replicates are added; None:
+    `replicates` are fixed."""
 
     seed: int = 1
     replicates: int = looks.FIRST
     seconds: float | None = looks.SECONDS
 
-    def seeds(self, begin: int, end: int) -> range:
+    def seeds(self, begin: int, end: int) -> list[int]:
         """Of the replicates from `begin` to `end`, counted from 0."""
-        return range(self.seed + begin, self.seed + end)
+        return [(self.seed + k * STRIDE) % SEEDS if k else self.seed for k in range(begin, end)]
 
 
 def gated_renderer(
@@ -41,8 +50,8 @@ def gated_renderer(
 ) -> Case:
     """The verdict on a renderer.  say: is told of each look;  progress: of the reference's.
 
-    The first replicate is checked before others are rendered, unless one start of the renderer
-    makes all. A reference of one picture, and one without noise, need no looks.  Raises what
+    Each replicate is checked before others are rendered, unless one start of the renderer makes
+    all. A reference of one picture, and one without noise, need no looks.  Raises what
     `gated` and `Driver.pictures` raise.
     """
     at_once = rounds.replicates if driver.together else 1
@@ -52,9 +61,26 @@ def gated_renderer(
     check_sizes(pictures, size_of(reference.pictures[0]), "as the reference")
     if first_fault(pictures[0], reference) is not None and not _is_copy(pictures[0], reference):
         return judge.case(partial(gate_pictures, pictures, reference))
+    try:
+        return _in_rounds(judge, driver, rounds, pictures, say)
+    except _NotFiniteError as error:
+        bad = error.picture
+        notes = [f"{bad.name} is the first with such pixels: no others were made after it"]
+        return judge.case(partial(gate_pictures, [bad], reference, notes=notes))
+
+
+def _in_rounds(
+    judge: Judge,
+    driver: Driver,
+    rounds: Rounds,
+    pictures: list[Picture],
+    say: Callable[[str], None],
+) -> Case:
+    """The verdict; `pictures` are those that were made.  Raises _NotFiniteError."""
+    request, reference = judge.request, judge.reference
     one_picture = reference.variance is None and len(reference.pictures) == 1
     if rounds.seconds is None or rounds.replicates == 1 or reference.noise_free or one_picture:
-        pictures += driver.pictures(rounds.seeds(len(pictures), rounds.replicates))
+        pictures += _rendered(driver, rounds.seeds(len(pictures), rounds.replicates), reference)
         return judge.case(partial(gate_pictures, pictures, reference))
 
     size = reference.pictures[0].size
@@ -66,8 +92,7 @@ def gated_renderer(
     def grow(count: int) -> None:
         nonlocal made
         new = pictures if made == 0 else []
-        new += driver.pictures(rounds.seeds(made + len(new), count))
-        check_sizes(new, size_of(reference.pictures[0]), "as the reference")
+        new += _rendered(driver, rounds.seeds(made + len(new), count), reference)
         for picture in copies.others(new):
             pool.add(picture)
         made = count
@@ -94,6 +119,29 @@ def gated_renderer(
         return unchanged(request.name, copies, reference)
     notes = [copies.note(len(others))] if copies.count else []
     return judge.case(partial(judged, others, reference, notes=notes, looks=found))
+
+
+class _NotFiniteError(Exception):
+    """A picture that was made has pixels that are not finite."""
+
+    def __init__(self, picture: Picture) -> None:
+        super().__init__(picture.name)
+        self.picture = picture
+
+
+def _rendered(driver: Driver, seeds: Sequence[int], reference: Reference) -> list[Picture]:
+    """Pictures of the reference's size, each checked before the next is made.  Raises ImageError
+    for another size, _NotFiniteError."""
+    found: list[Picture] = []
+    for start in [seeds] if driver.together else [[seed] for seed in seeds]:
+        new = driver.pictures(start) if start else []
+        if new:
+            check_sizes(new, size_of(reference.pictures[0]), "as the reference")
+        for picture in new:
+            if not np.isfinite(picture.radiance).all():
+                raise _NotFiniteError(picture)
+        found += new
+    return found
 
 
 def _is_copy(picture: Picture, reference: Reference) -> bool:

@@ -38,7 +38,10 @@ def _agree(case: Case) -> str:
     seen = _detectable(_first(case, "agree", "statistics"))
     if seen is None:
         return "no difference was found"
-    return f"no difference was found, and a bias of {_percent(seen)} would have been seen"
+    return (
+        f"no difference was found, and a bias of the image mean of {_percent(seen)} would have "
+        "been seen"
+    )
 
 
 def _unchanged(case: Case) -> str:
@@ -53,8 +56,8 @@ def _inconclusive(case: Case) -> str:
         return "too noisy to decide" if rung is None else f"undecided: {_clause(rung.reason)}"
     if seen > limit:
         return (
-            f"too noisy to decide: only a bias above {_percent(seen)} would be seen, and "
-            f"{_percent(limit)} is asked for"
+            f"too noisy to decide: only a bias of the image mean above {_percent(seen)} would be "
+            f"seen, and {_percent(limit)} is asked for"
         )
     unseen = rung.numbers.get("unseen_light")
     missing = unseen.get("missing_at_most") if isinstance(unseen, Mapping) else None
@@ -93,6 +96,31 @@ _SENTENCES: Mapping[Status, Callable[[Case], str]] = {
     "not-applicable": _by_reason,
     "invalid": _invalid,
 }
+
+
+# ---- the numbers of the statistics, as a table ---------------------------------------------------
+
+
+def numbers_table(case: Case) -> list[str]:
+    """Lines of columns: what the statistics tested, what they found, and the bias that would have
+    been seen; [] for a case without them."""
+    rung = next((r for r in case.rungs if r.name == "statistics"), None)
+    seen = _detectable(rung)
+    biases = {} if rung is None else rung.numbers.get("relative_bias")
+    if rung is None or seen is None or not isinstance(biases, Mapping):
+        return []
+    found = ", ".join(
+        f"{name} {_percent(bias, sign=True)}" for name, bias in biases.items() if bias is not None
+    )
+    rows = [("tested", "found", "would have been seen"), ("image mean", found, _percent(seen))]
+    for key, what in (("tiles", "tiles"), ("lines", "rows and columns"), ("pixels", "pixels")):
+        cells = rung.numbers.get(key)
+        if isinstance(cells, Mapping):
+            half = cells.get("median_detectable_bias")
+            would = "" if half is None else f"{_percent(half)} in half of them"
+            rows.append((f"{cells['tested']:,} {what}", f"{cells['differ']:,} differ", would))
+    widths = [max(len(row[k]) for row in rows) for k in range(2)]
+    return [f"{a:<{widths[0]}}  {b:<{widths[1]}}  {c}".rstrip() for a, b, c in rows]
 
 
 # ---- what differs, by rung ----------------------------------------------------------------------

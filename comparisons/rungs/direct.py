@@ -84,9 +84,10 @@ def _point_emitter(context: LightContext, light: int) -> Any:
 
 
 def is_dark(
-    context: LightContext, light: int, target: FloatArray, offsets: FloatArray
+    context: LightContext, light: int, target: FloatArray, offsets: FloatArray, lamp: IntArray
 ) -> arbiter.BoolArray:
-    """(n,): whether Mitsuba's shadow ray, shortened by its epsilons, is blocked in our tracer.
+    """(n,): whether Mitsuba's shadow ray, shortened by its epsilons, is blocked in our tracer, or
+    meets another surface than the light behind its end;  lamp: the light's shape, -1 if unknown.
 
     It starts on that side of the surface to which Mitsuba's geometric normal tells it: on a mesh
     that stands in for a curved shape, that of a flat triangle.
@@ -108,7 +109,20 @@ def is_dark(
     met = query.intersect(context.tables, o, target - offsets - o)
     facing = np.sum(met.n * (target - o), axis=1) < 0.0
     passed_by = met.t > 1.0 + SHADOW_EPSILON
-    return np.asarray((met.t < 1.0 - SHADOW_EPSILON) | passed_by | ~facing)
+    before = (lamp >= 0) & (met.shape != lamp)
+    return np.asarray((met.t < 1.0 - SHADOW_EPSILON) | passed_by | ~facing | before)
+
+
+JUST_BEFORE = 1e-7
+"""The fraction of a shadow ray, before its end, from which the light's own shape is met."""
+
+
+def _lamp(context: LightContext, light: int, target: FloatArray) -> IntArray:
+    """(n,): the shape that the points on an area light lie on; -1 if that is not known."""
+    if kind_of(context, light) != AREA:
+        return np.full(len(target), -1)
+    step = JUST_BEFORE * (target - context.hits.p)
+    return query.intersect(context.tables, target - step, 2.0 * step).shape.astype(np.int64)
 
 
 PIXELS = 1024
@@ -268,9 +282,10 @@ def _compare(
         error = np.abs(there - theirs[numbers]).max(axis=1)
         dark = ~theirs[numbers].any(axis=1)
         lit_differs = (value[numbers].any(axis=1) == dark) & of_shadow[numbers]
-        now_dark = is_dark(context.of(numbers), light, target[numbers], offsets)
+        now_dark = is_dark(context.of(numbers), light, target[numbers], offsets, lamp[numbers])
         return np.asarray((error <= 2.0 * bound[numbers]) | (lit_differs & (now_dark == dark)))
 
+    lamp = _lamp(context, light, target)
     radius = context.sizes.frame.delta(rays.o, hits.p, context.sizes.reach_of(hits.shape))
     radius += of_stand_ins(context, "sag")
     settled = arbiter.explained(wrong, radius[wrong], like_theirs)

@@ -11,6 +11,7 @@ import numpy as np
 from scipy import stats
 
 from comparisons.results.case import FloatArray, Images, Metrics, RungResult
+from comparisons.statistics.filtered import excess
 from comparisons.statistics.metric_null import (
     LEVEL,
     NOISE_LIMIT,
@@ -21,6 +22,8 @@ from comparisons.statistics.metric_null import (
 )
 from comparisons.statistics.metrics import decibels, has_flip
 from comparisons.statistics.shared_noise import excess_by_sharing
+from comparisons.statistics.sides import side_of
+from comparisons.statistics.unmet import image_missed
 
 MEAN_BIAS = 0.001
 """Permitted relative bias of a channel's mean: Mitsuba's ray epsilon causes some, as in the
@@ -111,9 +114,16 @@ def images_rung(
             facts.append(
                 "pixels far from each other share random numbers, so that metrics have no threshold"
             )
+    filtered = _filtered(images, replicates)
+    if filtered > 0.0:
+        numbers["excess_by_filter"] = filtered
+        facts.append(
+            "the reference's pixels share noise, as through a filter, which its variance does not "
+            "tell: only the squared difference and the bias are judged"
+        )
     gates = {
-        **_metric_gates(images, metrics, replicates, sharing),
-        "bias": _bias(images, replicates),
+        **_metric_gates(images, metrics, replicates, sharing, filtered > 0.0),
+        "bias": _bias(images, replicates, filtered),
     }
     numbers |= {name: gate.as_json() for name, gate in gates.items()}
     for name, gate in gates.items():
@@ -155,9 +165,11 @@ def _metric_gates(
     metrics: Metrics,
     replicates: tuple[FloatArray, FloatArray] | None,
     sharing: float,
+    filtered: bool,
 ) -> dict[str, Gate]:
-    """sharing: as found by `excess_by_sharing`.  Above 1 the resampled noise of few replicates does
-    not show how far the metrics scatter, and only the squared difference and bias are judged."""
+    """filtered: a known reference's pixels share noise;  sharing: as found by `excess_by_sharing`.
+    If so, or above 1, the resampled noise does not show how far the metrics scatter, and only the
+    squared difference and bias are judged."""
     size = math.sqrt(float((images.reference**2).mean()))
 
     def values(errors: FloatArray) -> dict[str, float]:
@@ -180,7 +192,7 @@ def _metric_gates(
     }
     by_noise = dict.fromkeys(measured, math.nan)
     worst = {name: threshold for name, (threshold, _) in NOISE_FREE.items()}
-    if replicates is not None and (sharing > 1.0 or not can_draw(replicates)):
+    if replicates is not None and (filtered or sharing > 1.0 or not can_draw(replicates)):
         return {name: Gate(value, math.nan, math.nan, True) for name, value in measured.items()}
     if replicates is not None:
         found, expected, highest = noise_alone(images, replicates)
@@ -201,29 +213,50 @@ def _sharing(replicates: tuple[FloatArray, FloatArray]) -> float:
     return max((excess_by_sharing(x) for x in replicates if not is_known(x)), default=1.0)
 
 
-def _bias(images: Images, replicates: tuple[FloatArray, FloatArray] | None) -> Gate:
-    """The largest bias of a channel's mean, relative to the reference's."""
+def _filtered(images: Images, replicates: tuple[FloatArray, FloatArray] | None) -> float:
+    """As `statistics.filtered.excess`; 0 unless the reference's variance is known."""
+    if replicates is None or not is_known(replicates[1]):
+        return 0.0
+    spread = 0.5 * (replicates[1][0] - replicates[1][1])
+    return excess(images.candidate, images.reference, spread**2)
+
+
+def _bias(
+    images: Images, replicates: tuple[FloatArray, FloatArray] | None, filtered: float = 0.0
+) -> Gate:
+    """The largest bias of a channel's mean, relative to the reference's;  filtered: the excess of
+    the variance of a known reference's mean."""
     mean = images.reference.mean(axis=(0, 1))
     difference = np.abs(images.candidate.mean(axis=(0, 1)) - mean)
     scale = np.maximum(np.abs(mean), DARK * abs(float(mean.mean())))
-    noise = np.zeros(3)
-    quantile = 0.0
+    noise = reach = np.zeros(3)
     if replicates is not None:
-        noise = np.hypot(*(_error_of_mean(x) for x in replicates))
+        ours, theirs = (_error_of_mean(x) for x in replicates)
+        noise = np.hypot(ours, math.sqrt(1.0 + filtered) * theirs)
         dof = min(_BY_PIXELS if is_known(x) else len(x) - 1 for x in replicates)
-        quantile = float(stats.t.isf(LEVEL / 6.0, dof))  # three channels, two sides
-    excess = difference - MEAN_BIAS * scale - quantile * noise
+        of_one = LEVEL / 6.0  # three channels, two sides
+        missed = stats.norm.isf(of_one) * np.sqrt(_missed(replicates))
+        reach = np.hypot(stats.t.isf(of_one, dof) * noise, missed)
+    excess = difference - MEAN_BIAS * scale - reach
     worst = int(np.argmax(excess))
     if not scale[worst]:
         value = math.inf if difference[worst] else 0.0
         return Gate(value, math.nan, MEAN_BIAS, not excess[worst] > 0.0)
     value, by_noise = difference[worst] / scale[worst], noise[worst] / scale[worst]
-    threshold = MEAN_BIAS + quantile * by_noise
+    threshold = MEAN_BIAS + reach[worst] / scale[worst]
     return Gate(float(value), float(by_noise), float(threshold), not excess[worst] > 0.0)
 
 
 _BY_PIXELS = 1000
 """Degrees of freedom of an error that is estimated from many pixels."""
+
+
+def _missed(replicates: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """(3,): the variance of the mean's difference by rare light that a side may have missed (see
+    `statistics.rare`)."""
+    if any(is_known(x) or len(x) < 2 for x in replicates):
+        return np.zeros(3)
+    return image_missed(*(side_of(x) for x in replicates))
 
 
 def _error_of_mean(pictures: FloatArray) -> FloatArray:

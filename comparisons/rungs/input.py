@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from comparisons.results.case import FloatArray, RungResult, Status
+from comparisons.statistics.dependence import successive
 from comparisons.statistics.metrics import nonfinite_pixels, white_level
 from comparisons.statistics.shared_noise import (
     common_noise,
@@ -74,6 +75,7 @@ def input_rung(
         or _constant(a, b)
         or (None if alone else _repeated(a, b))
         or (_odd("candidate", a) or _odd("reference", b))
+        or (_in_order("candidate", a) or _in_order("reference", b))
         or _sharing_noise(a, b)
         or _quantised(a, b)
     )
@@ -229,6 +231,29 @@ def _odd(whose: str, x: FloatArray) -> str | None:
     )
 
 
+INDEPENDENT = "expected independent noise, a seed of its own for each replicate"
+
+
+def _in_order(whose: str, x: FloatArray) -> str | None:
+    """Replicates that depend on the one before, in words."""
+    found = successive(x)
+    if found is None:
+        return None
+    if any(found.movement):
+        x_moved, y_moved = found.movement
+        return (
+            f"each replicate of the {whose} is like the one before, moved by {x_moved:+d}, "
+            f"{y_moved:+d} pixels (right, down; correlation {found.correlation:.2f}), as where "
+            "the seed plus the pixel's number seeds a pixel; expected independent noise: seeds "
+            "that are far apart, or hashed with the pixel's number"
+        )
+    return (
+        f"the replicates of the {whose} depend on their order: the correlation of successive ones "
+        f"is {found.correlation:+.2f} from that of any two, as in a history or in prefixes of one "
+        f"accumulation; {INDEPENDENT}"
+    )
+
+
 COMMON = 0.05
 """Variance of the noise common to all replicates, over a replicate's own, above which it is
 reported.  At 16 replicates the mean's error is then underestimated by a third."""
@@ -237,19 +262,18 @@ reported.  At 16 replicates the mean's error is then underestimated by a third."
 def _sharing_noise(a: FloatArray, b: FloatArray) -> str | None:
     if len(a) < 2:
         return None
-    advice = "expected independent noise, a seed of its own for each replicate"
     if (found := correlated_pair(a)) is not None:
         i, j, correlation = found
         return (
             f"replicates {i} and {j} of the candidate share noise (correlation {correlation:.2f}); "
-            f"{advice}"
+            f"{INDEPENDENT}"
         )
     common = common_noise(a, b) if len(b) > 1 else None
     if common is not None and common > COMMON:
         share = common / (1.0 + common)
         return (
             f"the candidate's replicates share noise: {100.0 * share:.0f} % of their variance is "
-            f"the same in all; {advice}"
+            f"the same in all; {INDEPENDENT}"
         )
     return None
 

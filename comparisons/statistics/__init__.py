@@ -1,10 +1,11 @@
 """Statistical tests of noisy pictures: the means of independent replicates on both sides.
 
 Each side renders the scene R times with independent seeds. The means are compared, with the
-variance of either side (Welch 1947), at four scales. Each scale is a family of tests that share one
+variance of either side (Welch 1947), at six scales. Each scale is a family of tests that share one
 level (Šidák 1967); the levels of all families add up to one false alarm in a thousand cases.
 
 - *image*: the mean of each channel; *tiles*: of each channel of each tile; *pixels*: of each pixel.
+- *lines*, *modes*: of each row and column; of smooth patterns over the picture (`patterns`).
 - *uniformity*: the rank of the difference of small blocks among differences that hold only noise.
 
 Each mean has three standard errors, and a bias is proven only if it is so with each. One comes from

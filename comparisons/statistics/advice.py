@@ -123,6 +123,9 @@ FEW = 2.0
 """Replicates are called too few if more of them need so many times fewer samples than more samples
 per pixel do."""
 
+LITTLE = 1.1
+"""Factors below it are said in words: an estimated factor is no more exact (`samples_factor`)."""
+
 ENOUGH = 8.0
 """Degrees of freedom from which on more replicates are as good as more samples per pixel."""
 
@@ -135,6 +138,8 @@ _UNKNOWN = "these pictures do not show how many samples are needed: give more re
 def _times(replicates: float, samples: float, whose: str) -> str:
     if not math.isfinite(replicates):
         return _UNKNOWN
+    if max(replicates, samples) < LITTLE:
+        return f"slightly more samples{whose} suffice: a tenth of them"
     spp = _number(samples)
     if samples > FEW * replicates:
         other = f", or {spp} times the samples per pixel of each" if samples < MOST else ""

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from comparisons.results.case import FloatArray, RungResult, Status
 from comparisons.statistics.advice import noise_free_candidate, wanted
 from comparisons.statistics.metrics import count_nonfinite
+from comparisons.statistics.patterns import line_test, mode_test, named_line, named_mode
 from comparisons.statistics.rare import Unseen, unseen, worse
 from comparisons.statistics.scales import IMAGE_LEVEL, POWER, TILE, Margins
 from comparisons.statistics.sides import Known, known_side, picture_array, side_of
@@ -22,6 +23,7 @@ from comparisons.statistics.wording import (
     finite,
     image_numbers,
     interval,
+    line_numbers,
     percent,
     uniformity_numbers,
     uniformity_words,
@@ -37,6 +39,12 @@ ONE_PICTURE = (
     "noise: only replicates show it"
 )
 
+NEGATIVE = (
+    "the sides differ by less than their replicates' spread says, though no picture of one side "
+    "shares noise with one of the other: the replicates of a side make up for each other (negative "
+    "correlation), as jointly stratified ones do, so that the errors are smaller than stated"
+)
+
 TOP = ("relative_bias", "standard_error_of_bias", "detectable_bias", "p_value")
 """Those of the image's numbers that are repeated at the top level."""
 
@@ -48,6 +56,9 @@ class Findings:
     image: BiasTest
     tiles: BiasTest
     pixels: BiasTest
+    lines: BiasTest | None
+    modes: BiasTest | None
+    """Of `patterns`; None for single and for small pictures."""
     uniformity: Uniformity | None
     unseen: Unseen | None
     """The worse of both sides; None if either is a single picture."""
@@ -114,12 +125,15 @@ def findings(
     `compare`."""
     if len(a) == 1 or (not isinstance(b, Known) and len(b) == 1):
         image, tiles, pixels, side = single_tests(a, b, tile, margins)
-        return Findings(image, tiles, pixels, None, None, side, True)
-    one, two = side_of(a), known_side(b) if isinstance(b, Known) else side_of(b)
+        return Findings(image, tiles, pixels, None, None, None, None, side, True)
+    one = side_of(a)
+    two = known_side(b, one.mean) if isinstance(b, Known) else side_of(b)
     return Findings(
         image_test(one, two, margins, level),
         tile_test(one, two, tile, margins, level),
         pixel_test(one, two, margins, level),
+        line_test(one, two, margins, level),
+        mode_test(one, two, margins, level),
         uniformity(one, two, margins, level),
         worse(*(_unseen(side, level) for side in (a, b))),
         tile,
@@ -179,6 +193,9 @@ def _verdict(
         reason += f"; {unseen_words(found.unseen)}"
     if found.single:
         reason += f"; {ONE_PICTURE}"
+    spread = found.uniformity
+    if spread is not None and spread.narrow and not spread.shared:
+        reason += f"; {NEGATIVE}: {uniformity_words(spread)}"
     of_image = image_numbers(image)
     numbers = {
         "replicates_candidate": len(a),
@@ -195,6 +212,8 @@ def _verdict(
         "image": of_image,
         "tiles": {"side": found.tile, **cell_numbers(found.tiles, found.tile)},
         "pixels": cell_numbers(found.pixels, 1),
+        "lines": None if found.lines is None else line_numbers(found.lines),
+        "modes": None if found.modes is None else line_numbers(found.modes),
         "uniformity": uniformity_numbers(found.uniformity),
     }
     return RungResult("statistics", status, reason, numbers)
@@ -212,13 +231,25 @@ def _decide(found: Findings, limit: float, advice: str) -> tuple[Status, str]:
         return "differ", which(found.tiles, found.tile, "tiles", ", though not the image mean")
     if found.pixels.differs.any():
         return "differ", which(found.pixels, 1, "pixels", ", though not a whole tile")
+    if found.lines is not None and found.lines.differs.any():
+        lines, count = found.lines, np.count_nonzero(found.lines.differs.any(axis=-1))
+        line = named_line(lines.worst[0], len(found.pixels.difference))
+        return "differ", (
+            f"{count} of {len(lines.difference)} rows and columns differ, though no tile and no "
+            f"pixel; the worst, {line}: {beyond(lines, lines.worst)}"
+        )
+    if found.modes is not None and found.modes.differs.any():
+        return "differ", (
+            "brightness differs smoothly over the picture, though not its mean: "
+            f"{named_mode(found.modes.worst[0])}, {beyond(found.modes, found.modes.worst)}"
+        )
     if spread is not None and spread.wide:
         return "differ", (
             "small blocks differ more between the sides than within: "
             f"{uniformity_words(spread)} ({spread.mean_beyond_margin:.3f} beyond the margin); many "
             "small differences, or replicates that are not independent of each other"
         )
-    if spread is not None and spread.narrow:
+    if spread is not None and spread.shared:
         return "invalid", (
             f"the sides are not independent of each other: {uniformity_words(spread)}; they share "
             "their noise, as the same seeds or copied pictures do"

@@ -160,7 +160,8 @@ def _scatter(maps: FloatArray) -> float:
     total = max(float(variance.sum()), float(sums.sum(axis=1).var(ddof=1)))
     if not total > 0.0:
         return 0.0
-    dof = max(1.0, total**2 / float((variance**2).sum()))
+    # Over the total first: squares of dim pictures' variances would be 0.
+    dof = max(1.0, 1.0 / max(float(((variance / total) ** 2).sum()), 1e-300))
     quantile = float(stats.t.isf(LEVEL, dof))
     return quantile * math.sqrt(total * (1.0 + 1.0 / len(maps)))
 

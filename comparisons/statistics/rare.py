@@ -45,9 +45,17 @@ def met_once(pictures: FloatArray) -> FloatArray:
 
 def event(energy: FloatArray, scale: FloatArray) -> FloatArray:
     """(3,): of energies met once (h, w, 3) the size over `scale`, weighted by itself; 0 if there is
-    none."""
-    size = energy / scale
-    return ratio((size**2).sum(axis=(0, 1)), size.sum(axis=(0, 1)))
+    none.
+
+    If every event has the same multiple of its pixel's `scale`, this is that multiple; if all have
+    one energy, it is that over the mean scale where they fell.
+    """
+    return event_of(energy**2, energy * scale)
+
+
+def event_of(squares: FloatArray, products: FloatArray) -> FloatArray:
+    """(3,): the sum of the squared energies (h, w, 3) over that of energies times scale."""
+    return ratio(squares.sum(axis=(0, 1)), products.sum(axis=(0, 1)))
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,14 @@ TILE = 16
 IMAGE_LEVEL = 0.0005
 """Chance of a false alarm of the tests of the image mean, all channels together."""
 
-TILE_LEVEL = 0.0002
-PIXEL_LEVEL = 0.0002
+TILE_LEVEL = 0.0001
+LINE_LEVEL = 0.00005
+MODE_LEVEL = 0.00005
+PIXEL_LEVEL = 0.0001
 UNIFORMITY_LEVEL = 0.0001
-"""The same for the other families: all together at most one correct case in a thousand is reported
-to differ. The image mean has the largest share because its interval also states the equivalence."""
+"""The same for the other families: all together, with the test of the replicates' order
+(`dependence`), at most one correct case in a thousand is reported to differ. The image mean has the
+largest share because its interval also states the equivalence."""
 
 POWER = 0.99
 """The smallest detectable bias is the one that is proven with this chance."""

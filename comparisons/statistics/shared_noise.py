@@ -251,8 +251,9 @@ WHITE = 0.15
 of a picture lie along edges or over surfaces, and are correlated."""
 
 LIKE_PICTURE = 0.1
-"""Largest fraction of common noise that the reference, its gradient and its curvature may explain:
-a gain, a shift or a filter causes such a difference in a picture with fine texture."""
+"""Largest fraction of common noise that the reference's channels, their gradient and curvature may
+explain: a gain, exchanged or mixed channels, a shift or a filter cause such a difference in a
+picture with fine texture."""
 
 BY_CHANCE = 5e-4
 """Chance that independent replicates have as much noise in common; the other conditions make an
@@ -381,10 +382,13 @@ def common_noise(candidate: FloatArray, reference: FloatArray) -> float | None:
         return None
     if not (share > 0.0 and float(np.median(ratios)) > EVERYWHERE * float(ratios.mean()) > 0.0):
         return None
-    z = np.where(noisy, difference.sum(axis=-1) / np.sqrt(np.where(noisy, own, 1.0)), 0.0)
-    if max(abs(_neighbours(z)), abs(_neighbours(z.T))) > WHITE:
+    # Each channel by itself: errors of channels that are exchanged cancel in their sum.
+    z = np.where(noisy[..., None], difference / np.sqrt(np.where(noisy, own, 1.0))[..., None], 0.0)
+    if max(abs(_neighbours(np.moveaxis(side, -1, 0))) for side in (z, z.swapaxes(0, 1))) > WHITE:
         return None
-    if _explained(z, reference.mean(axis=0).sum(axis=-1), own, noisy) > LIKE_PICTURE:
+    if _explained(z, reference.mean(axis=0), variances[1] / len(reference), own, noisy) > (
+        LIKE_PICTURE
+    ):
         return None
     return share
 
@@ -431,21 +435,34 @@ def _log_factor(squares: FloatArray) -> float:
 
 
 def _neighbours(z: FloatArray) -> float:
-    """The correlation of horizontal neighbours."""
-    left, right = z[:, :-1], z[:, 1:]
+    """The correlation of horizontal neighbours in pictures (..., height, width)."""
+    left, right = z[..., :-1], z[..., 1:]
     power = math.sqrt(float((left**2).sum()) * float((right**2).sum()))
     return float((left * right).sum()) / power if power else 0.0
 
 
-def _explained(z: FloatArray, picture: FloatArray, own: FloatArray, noisy: FloatArray) -> float:
-    """The fraction of z that the picture, its gradient and its curvature explain, fitted
-    jointly."""
-    if min(picture.shape) < 3:
+def _explained(
+    z: FloatArray, picture: FloatArray, noise: FloatArray, own: FloatArray, noisy: FloatArray
+) -> float:
+    """The fraction of z (height, width, 3) that the picture's channels, and the gradient and
+    curvature of their sum, explain, fitted jointly;  noise: the picture's variance."""
+    if min(picture.shape[:2]) < 3:
         return 1.0
-    dy, dx = (np.asarray(slope) for slope in np.gradient(picture))
+    grey = picture.sum(axis=-1)
+    dy, dx = (np.asarray(slope) for slope in np.gradient(grey))
     curvature = np.asarray(np.gradient(dy, axis=0)) + np.asarray(np.gradient(dx, axis=1))
     weights = 1.0 / np.sqrt(own[noisy])
-    basis = np.stack([x[noisy] * weights for x in (picture, dx, dy, curvature)], axis=1)
+    channels = picture[noisy] * weights[:, None]
+    # Mixtures of channels that are mostly noise, as where all have one hue, would explain noise.
+    noise_of = (noise[noisy] * weights[:, None] ** 2).sum(axis=0) + 1e-300
+    power, mixtures = np.linalg.eigh(channels.T @ channels / np.sqrt(np.outer(noise_of, noise_of)))
+    seen = mixtures[:, power > SEEN] / np.sqrt(noise_of)[:, None]
+    basis = np.column_stack([channels @ seen, *(x[noisy] * weights for x in (dx, dy, curvature))])
     wanted = z[noisy]
     fitted = basis @ np.linalg.lstsq(basis, wanted, rcond=None)[0]
     return float((fitted**2).sum() / (wanted**2).sum())
+
+
+SEEN = 10.0
+"""Least power of a mixture of channels over that of its noise: noise is then at most a tenth of
+what the mixture explains, which is LIKE_PICTURE."""

@@ -1,16 +1,21 @@
 """The two sides of a comparison, and the noise estimated from their replicates."""
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import correlate1d
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.metrics import ratio
-from comparisons.statistics.rare import event, met_once
-from comparisons.statistics.scales import cell_means, cell_pixels, cell_sums
+from comparisons.statistics.filtered import excess
+from comparisons.statistics.rare import event, event_of, met_once
+from comparisons.statistics.scales import cell_pixels, cell_sums
+
+Sums = Callable[[FloatArray], FloatArray]
+"""From pictures (..., height, width, 3) to sums over parts of them."""
 
 FAINTEST = 1e-150
 """Variances that are smaller count as none: their squares would be 0."""
@@ -52,24 +57,31 @@ class Side:
     variance: FloatArray
     fourth: FloatArray
     count: int
+    filtered: float = 0.0
+    """Of a known mean the excess of the variance of sums of pixels (see `filtered`)."""
 
     def of_tiles(self, tile: int) -> Noise:
         """The noise of tiles of one picture, (rows, columns, 3)."""
-        pixels = cell_pixels(self.mean, tile)
-        variance = cell_sums(self.variance, tile)
-        summed = variance / pixels**2
-        dof = self._dof(variance, cell_sums(self.fourth, tile), pixels)
+        sums = partial(cell_sums, tile=tile)
+        return self.of_sums(sums, sums, sums, cell_pixels(self.mean, tile))
+
+    def of_sums(self, sums: Sums, squares: Sums, fourths: Sums, pixels: FloatArray) -> Noise:
+        """The noise of weighted sums over one picture's pixels, divided by `pixels`;  squares,
+        fourths: sums with the weights' squares and fourth powers."""
+        variance = squares(self.variance)
+        summed = (1.0 + self.filtered) * variance / pixels**2
+        dof = self._dof(variance, fourths(self.fourth), pixels) / (1.0 + self.filtered)
         if self.pictures is None:
             return Noise(summed, dof, summed, dof)
-        own = cell_means(self.pictures, tile).var(axis=0, ddof=1)
+        own = (sums(self.pictures) / pixels).var(axis=0, ddof=1)
         return Noise(own, float(self.count - 1), summed, dof)
 
     def of_image(self) -> Noise:
         """The noise of the mean of one picture, (3,)."""
         size = float(self.mean.shape[0] * self.mean.shape[1])
         variance = self.variance.sum(axis=(0, 1))
-        summed = variance / size**2
-        dof = self._dof(variance, self.fourth.sum(axis=(0, 1)), size)
+        summed = (1.0 + self.filtered) * variance / size**2
+        dof = self._dof(variance, self.fourth.sum(axis=(0, 1)), size) / (1.0 + self.filtered)
         if self.pictures is None:
             return Noise(summed, dof, summed, dof)
         own = self.pictures.mean(axis=(1, 2)).var(axis=0, ddof=1)
@@ -91,13 +103,12 @@ class Side:
 
     def event(self, scale: FloatArray) -> FloatArray:
         """(3,): the energy of an event of rare light in a pixel of one picture over `scale`, (h, w,
-        3) and positive; of a known mean, that of a Poisson variable's events, the variance over the
+        3) and >= 0; of a known mean, that of a Poisson variable's events, the variance over the
         mean."""
         if self.pictures is not None:
             return event(self.met_once, scale)
-        lit = np.where(self.variance > 0.0, np.abs(self.mean), 0.0).sum(axis=(0, 1))
-        energy = (self.variance / scale).sum(axis=(0, 1))
-        return np.where(lit > 0.0, ratio(energy, lit), 0.0)
+        lit = np.where(self.variance > 0.0, np.abs(self.mean), 0.0)
+        return event_of(self.variance, lit * scale)
 
     def _dof(
         self, variance: FloatArray, fourth: FloatArray, pixels: FloatArray | float
@@ -127,9 +138,11 @@ def side_of(images: FloatArray) -> Side:
     return Side(images, mean, squares / (len(images) - 1), fourth / len(images), len(images))
 
 
-def known_side(known: Known) -> Side:
-    """A side of which only the mean and its variance are known."""
-    return Side(None, known.mean, known.variance, known.variance**2, 1)
+def known_side(known: Known, other: FloatArray | None = None) -> Side:
+    """A side of which only the mean and its variance are known;  other: the other side's mean,
+    which shows whether its pixels share noise."""
+    shared = 0.0 if other is None else excess(other, known.mean, known.variance)
+    return Side(None, known.mean, known.variance, known.variance**2, 1, shared)
 
 
 def neighbourhood(values: FloatArray) -> FloatArray:

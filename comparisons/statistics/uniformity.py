@@ -14,18 +14,28 @@ and the test is left out: of skewed noise the first function is skewed and the o
 Pareto noise with exponent 1.2, 32 pictures against 16 means of 16, 2 of 400 right ones differed.)
 
 Too small a mean p-value means that blocks differ systematically, or that replicates are not
-independent of each other; too large a one that candidate and reference share their noise.
+independent of each other; too large a one that candidate and reference share their noise, or that
+the replicates of a side make up for each other (`dependence.shared_by_sides`).
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy import stats
 from scipy.linalg import hadamard
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.scales import DARK, UNIFORMITY_LEVEL, Margins, cell_means, cell_pixels
+from comparisons.statistics.dependence import shared_by_sides
+from comparisons.statistics.scales import (
+    DARK,
+    UNIFORMITY_LEVEL,
+    Margins,
+    cell_means,
+    cell_pixels,
+    cell_sums,
+)
 from comparisons.statistics.sides import Side
 from comparisons.statistics.unmet import Events
 from comparisons.statistics.welch import are_unequal, noise_ratio
@@ -52,6 +62,8 @@ class Uniformity:
     p_narrow: float
     blocks: int
     replicates: int
+    shared: bool = False
+    """The blocks are `narrow` because the sides share noise."""
     level: float = UNIFORMITY_LEVEL
     """Chance of a false alarm of both tests together."""
 
@@ -104,7 +116,7 @@ def uniformity(a: Side, b: Side, margins: Margins, level: float = 1.0) -> Unifor
     beyond_mean = float(_p_values(beyond, np.delete(size, difference, axis=0)).mean())
     # At least the standard deviation of the mean of as many independent uniform numbers.
     error = max(error, math.sqrt(1.0 / 12.0 / size.shape[1]))
-    return Uniformity(
+    found = Uniformity(
         mean=float(means[difference]),
         expected=expected,
         error=error,
@@ -115,15 +127,15 @@ def uniformity(a: Side, b: Side, margins: Margins, level: float = 1.0) -> Unifor
         replicates=half,
         level=level * UNIFORMITY_LEVEL,
     )
+    return replace(found, shared=found.narrow and shared_by_sides(*pictures))
 
 
 def _unmet(a: Side, b: Side) -> FloatArray:
     """The square of two standard errors of rare light (see `rare`) in the blocks' differences. The
     ranks presume noise of one distribution on both sides; of a side that seldom meets a light, most
     blocks are darker, though none by more than a few events."""
-    of_a, of_b = cell_means(a.mean, BLOCK), cell_means(b.mean, BLOCK)
-    difference = of_a - of_b
-    events = Events.of_cells(a, b, of_a, of_b, cell_pixels(b.mean, BLOCK))
+    difference = cell_means(a.mean - b.mean, BLOCK)
+    events = Events.of_cells(a, b, partial(cell_sums, tile=BLOCK), cell_pixels(b.mean, BLOCK))
     return np.asarray(8.0 * np.abs(difference) * events.missed_by(difference))
 
 

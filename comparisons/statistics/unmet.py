@@ -1,12 +1,13 @@
 """The noise of light that a side may have missed, in a difference of means (see `rare`)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import correlate1d
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.scales import HALF
+from comparisons.statistics.scales import DARK, HALF
 from comparisons.statistics.sides import NEIGHBOURS, Side
 
 
@@ -20,24 +21,27 @@ class Events:
 
     @classmethod
     def of_cells(
-        cls, a: Side, b: Side, cells_a: FloatArray, cells_b: FloatArray, pixels: FloatArray | float
+        cls,
+        a: Side,
+        b: Side,
+        sums: Callable[[FloatArray], FloatArray],
+        pixels: FloatArray | float,
     ) -> "Events":
-        """For cells of so many pixels, whose means are given.
+        """For cells of so many pixels;  sums: over each cell, of a picture.
 
-        The size of events is taken relative to the other side's radiance where that is above the
-        picture's mean: the edge of a bright lamp has larger ones than any other place. The side
-        with fewer replicates has seen fewer rare paths: its events count as at least as large as
-        the other's.
+        The size of events is taken relative to the other side's radiance: the edge of a bright lamp
+        has larger ones than any other place. So an event in a cell has the cell's brightness,
+        weighted by itself as the energy of events is. Below the picture's mean, events may be as
+        large as there, as of light that leaks into the dark, or smaller: the larger size counts.
+        The side with fewer replicates has seen fewer rare paths: its events count as at least as
+        large as the other's.
         """
-        of_a, of_b = a.event(_at_least_mean(b.mean)), b.event(_at_least_mean(a.mean))
+        of_a, of_b = (_in_cells(x, np.abs(y.mean), sums) for x, y in ((a, b), (b, a)))
         if b.pictures is not None and a.count < b.count:
             of_a = np.maximum(of_a, of_b)
         elif b.pictures is not None and b.count < a.count:
             of_b = np.maximum(of_a, of_b)
-        return cls(
-            0.5 * of_a * _at_least_mean(cells_b, b.mean) / (pixels * a.count),
-            0.5 * of_b * _at_least_mean(cells_a, a.mean) / (pixels * b.count),
-        )
+        return cls(0.5 * of_a / (pixels * a.count), 0.5 * of_b / (pixels * b.count))
 
     def missed_by(self, difference: FloatArray) -> FloatArray:
         """The event of the side whose mean is lower: it may have missed some."""
@@ -48,10 +52,26 @@ class Events:
         return np.maximum(self.candidate, self.reference)
 
 
-def _at_least_mean(values: FloatArray, picture: FloatArray | None = None) -> FloatArray:
-    """The values, but at least the mean of the picture; ones if that is black."""
-    mean = abs(float((values if picture is None else picture).mean()))
-    return np.maximum(np.abs(values), mean) if mean else np.ones_like(values)
+def _in_cells(side: Side, seen: FloatArray, sums: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """The energy of an event of `side` in each cell of one picture;  seen: the other's radiance."""
+    mean = float(seen.mean())
+    found = []
+    for least in (DARK, 1.0):
+        scale = np.maximum(seen, least * mean) if mean else np.ones_like(seen)
+        found.append(side.event(scale) * sums(scale**2) / sums(scale))
+    return np.maximum(*found)
+
+
+def of_image(a: Side, b: Side) -> Events:
+    """Those of the mean of the image."""
+    height, width = b.mean.shape[:2]
+    return Events.of_cells(a, b, lambda picture: picture.sum(axis=(0, 1)), float(height * width))
+
+
+def image_missed(a: Side, b: Side) -> FloatArray:
+    """(3,): the variance of the difference of the image means that missing light may add."""
+    difference = (a.mean - b.mean).mean(axis=(0, 1))
+    return np.asarray(np.abs(difference) * of_image(a, b).missed_by(difference))
 
 
 def unmet_variance(a: Side, b: Side) -> FloatArray:
@@ -62,7 +82,7 @@ def unmet_variance(a: Side, b: Side) -> FloatArray:
     stays a proof.
     """
     difference = a.mean - b.mean
-    events = Events.of_cells(a, b, a.mean, b.mean, 1.0).missed_by(difference)
+    events = Events.of_cells(a, b, np.asarray, 1.0).missed_by(difference)
     return np.asarray(np.abs(around(difference)) * events)
 
 

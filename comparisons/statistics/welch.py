@@ -3,6 +3,7 @@
 import functools
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -20,9 +21,10 @@ from comparisons.statistics.scales import (
     Margins,
     cell_means,
     cell_pixels,
+    cell_sums,
 )
 from comparisons.statistics.sides import Noise, Side, neighbourhood
-from comparisons.statistics.unmet import Events, unmet_variance
+from comparisons.statistics.unmet import Events, of_image, unmet_variance
 
 MOST_DOF = 1000
 """Cap on degrees of freedom: beyond it the quantile is the normal one within 1 %."""
@@ -268,7 +270,6 @@ def image_test(a: Side, b: Side, margins: Margins, level: float = 1.0) -> BiasTe
     reference = b.mean.mean(axis=(0, 1))
     difference = a.mean.mean(axis=(0, 1)) - reference
     errors = welch_errors(a.of_image(), b.of_image(), a, b)
-    pixels = float(b.mean.shape[0] * b.mean.shape[1])
     return bias_test(
         difference,
         reference,
@@ -276,7 +277,7 @@ def image_test(a: Side, b: Side, margins: Margins, level: float = 1.0) -> BiasTe
         margins.image,
         level * IMAGE_LEVEL,
         reference.mean(),
-        Events.of_cells(a, b, reference + difference, reference, pixels),
+        of_image(a, b),
     )
 
 
@@ -292,7 +293,7 @@ def tile_test(a: Side, b: Side, tile: int, margins: Margins, level: float = 1.0)
         margins.tile,
         level * TILE_LEVEL,
         b.mean.mean(),
-        Events.of_cells(a, b, reference + difference, reference, cell_pixels(b.mean, tile)),
+        Events.of_cells(a, b, partial(cell_sums, tile=tile), cell_pixels(b.mean, tile)),
     )
 
 

@@ -116,6 +116,22 @@ def cell_numbers(test: BiasTest, side: int) -> dict[str, Any]:
     }
 
 
+def line_numbers(test: BiasTest) -> dict[str, Any]:
+    """Numbers of rows and columns, or of modes."""
+    differ = test.differs.any(axis=-1)
+    return {
+        "tested": differ.size,
+        "differ": int(np.count_nonzero(differ)),
+        "median_detectable_bias": finite(np.median(test.over_scale(test.detectable))),
+        "worst": test.worst[0],
+        "worst_channel": CHANNELS[test.worst[1]],
+        "worst_bias": finite(test.relative[test.worst]),
+        "worst_half_width": finite(test.over_scale(test.half_width)[test.worst]),
+        "worst_margin": float(test.margin[test.worst]),
+        "worst_p_value": finite(float(test.p_value(test.worst))),
+    }
+
+
 def unseen_numbers(found: Unseen | None) -> dict[str, Any] | None:
     """Shares of the energy; None without replicates."""
     if found is None:

@@ -3,23 +3,27 @@
 `of_rungs` recognises causes from the numbers of the deterministic rungs.  `likeliest` fits each
 `Hypothesis` (gain, gamma, shift, lost light, ...) to the pictures and returns the one that explains
 most of the squared difference beyond noise, if it is clearly better than the others; otherwise the
-one place (row, tile, pixels) that holds the difference, or None.
+one place (row, tile, pixels) that holds the difference, or None.  A cause must also reproduce the
+bias of each channel's mean, and those of blocks (`Misfit.reproduces`).
 
-To add a hypothesis, yield it from `brightness.hypotheses` or `place.hypotheses`: the picture that
-the candidate would be, and how many parameters were fitted."""
+To add a hypothesis, yield it from `brightness`, `colour` or `place`: the picture that the candidate
+would be, and how many parameters were fitted.  A family that it is a special case of goes into
+`GENERALISED`."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from comparisons.compare.diagnosis import brightness, place
+from comparisons.compare.diagnosis import brightness, colour, place
 from comparisons.compare.diagnosis.misfit import Hypothesis, Misfit
-from comparisons.compare.diagnosis.spots import one_place, rim
+from comparisons.compare.diagnosis.spots import SHARE, one_place, rim
 from comparisons.results.case import Cause, FloatArray, Images, RungResult
 from comparisons.statistics.metrics import count_nonfinite
 
-__all__ = ["likeliest", "of_rungs"]
+__all__ = ["FLEXIBLE", "likeliest", "of_rungs"]
+
+FLEXIBLE = (colour.A_CURVE, colour.A_MATRIX)
 
 
 # ---- causes recognised from the numbers of the deterministic rungs -------------------------------
@@ -110,8 +114,26 @@ PENALTY = 0.5
 unexplained: with fitted parameters it always leaves a little less."""
 
 
-GENERALISED = {"gain": "gains", "gain of a channel": "gains", "sRGB": "gamma"}
-"""A family's generalisation, which fits as well and is therefore not its rival."""
+_TONE = {"power", "tone curve"}
+
+GENERALISED = {
+    "gain": {"gains", "matrix", *_TONE},
+    "gain of a channel": {"gains", "matrix"},
+    "gains": {"matrix"},
+    "channels": {"gains", "matrix"},
+    "known matrix": {"saturation", "matrix"},
+    "saturation": {"matrix"},
+    "offset": {"tone curve"},
+    "gamma": _TONE,
+    "encoding": {"gamma", *_TONE},
+    "sRGB": {"gamma", "encoding", *_TONE},
+    "known curve": {"encoding", *_TONE},
+    "power": {"tone curve"},
+    "clamped": {"tone curve"},
+    "8 bits": {"encoding", "tone curve"},
+    "zoom": {"distortion", "aberration"},
+}
+"""A family's generalisations, which fit as well and are therefore not its rivals."""
 
 
 def likeliest(
@@ -134,6 +156,7 @@ def likeliest(
         return None
     found = [
         *brightness.hypotheses(misfit, lights or {}),
+        *colour.hypotheses(misfit),
         *place.hypotheses(misfit),
         *also(misfit.reference),
     ]
@@ -142,12 +165,18 @@ def likeliest(
     left -= min(float(left.min()), 0.0)
     ranked = list(zip(found, left.tolist(), strict=True))
     best = _best(ranked, misfit.margin)
+    reproduced = best is not None and misfit.reproduces(best[0].picture)
     at_border = rim(misfit)
-    # A wrong rim changes no other pixel: what explains more of the difference is not of the rim.
-    if at_border is not None and 1.0 - left.min() < at_border.explained:
+    # A wrong rim changes no other pixel: what explains more of the difference is not of the rim,
+    # nor is what predicts as much of it as must lie in a rim.
+    enough = at_border is not None and 1.0 - left.min() >= at_border.explained
+    enough = enough or (reproduced and best is not None and best[1] <= 1.0 - SHARE)
+    if at_border is not None and not enough:
         return at_border
     if best is not None:
         hypothesis, unexplained = best
+        if not reproduced:
+            return None
         explained = 1.0 - unexplained
         evidence = (
             f"{hypothesis.evidence}: that explains {100.0 * explained:.4g} % of the difference"
@@ -174,10 +203,12 @@ def _best(found: list[tuple[Hypothesis, float]], margin: float) -> tuple[Hypothe
             winner = other
     if winner[1] > 1.0 - MOST:
         return None
+    # One with more parameters is no rival: it would have won, did it leave clearly less.
     rivals = [
         left
         for hypothesis, left in by_family.values()
-        if hypothesis.family not in (winner[0].family, GENERALISED.get(winner[0].family))
+        if hypothesis.family not in {winner[0].family, *GENERALISED.get(winner[0].family, ())}
+        and hypothesis.parameters <= winner[0].parameters
     ]
     next_one = min(rivals, default=1.0)
     clear = max(winner[1], NO_MATTER) <= CLEARER * next_one and next_one - winner[1] > margin

@@ -1,18 +1,15 @@
-"""Hypotheses about brightness: gain, offset, channels, transfer curves, limits, lights."""
+"""Hypotheses about brightness: gain, offset, limits, lights."""
 
-import itertools
 import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from scipy import optimize
 
+from comparisons.compare.diagnosis.colour import CHANNELS
 from comparisons.compare.diagnosis.misfit import Hypothesis, Misfit
 from comparisons.results.case import FloatArray
 from reference_rt.rendering.image import srgb
 from reference_rt.textures.image_file import linear
-
-CHANNELS = ("red", "green", "blue")
 
 REMARKABLE = {
     2.0: "twice",
@@ -33,8 +30,6 @@ NEAR = 0.01
 def hypotheses(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hypothesis]:
     """All of them, fitted."""
     yield from _gains(misfit)
-    yield from _permutations(misfit)
-    yield from _curves(misfit)
     yield from _limits(misfit)
     yield from _lights(misfit, lights)
 
@@ -67,51 +62,6 @@ def _gains(misfit: Misfit) -> Iterator[Hypothesis]:
     amount = misfit.amount(np.ones_like(r))
     evidence = f"every pixel of the candidate differs from the reference by {amount:+.3g} W/sr/m²"
     yield Hypothesis("offset", f"constant offset of {amount:+.3g}", evidence, r + amount, 1)
-
-
-def _permutations(misfit: Misfit) -> Iterator[Hypothesis]:
-    for order in itertools.permutations(range(3)):
-        moved = [k for k in range(3) if order[k] != k]
-        if not moved:
-            continue
-        names = " and ".join(CHANNELS[k] for k in moved) if len(moved) == 2 else "all channels"
-        yield Hypothesis(
-            "channels",
-            f"swapped channels: {names}",
-            "the candidate's red, green and blue are the reference's "
-            + ", ".join(CHANNELS[k] for k in order),
-            misfit.reference[..., list(order)],
-            0,
-        )
-
-
-def _curves(misfit: Misfit) -> Iterator[Hypothesis]:
-    r = np.maximum(misfit.reference, 0.0)
-    fit = optimize.minimize_scalar(
-        lambda g: misfit.squares(r ** math.exp(g)),
-        bounds=(-1.2, 1.2),
-        method="bounded",
-        options={"xatol": 1e-4},
-    )
-    gamma = math.exp(float(fit.x))
-    evidence = f"the candidate is the reference to the power of {gamma:.4g}"
-    yield Hypothesis("gamma", f"gamma of {gamma:.4g}", evidence, r**gamma, 1)
-    clipped = np.clip(r, 0.0, 1.0)
-    for encoded in (srgb(r), srgb(clipped)):
-        yield Hypothesis(
-            "sRGB",
-            "sRGB-encoded values taken for linear ones",
-            "the candidate is the reference through the sRGB curve",
-            encoded,
-            0,
-        )
-    yield Hypothesis(
-        "sRGB",
-        "linear values taken for sRGB-encoded ones",
-        "the candidate is the reference through the inverse of the sRGB curve",
-        linear(clipped),
-        0,
-    )
 
 
 def _limits(misfit: Misfit) -> Iterator[Hypothesis]:

@@ -5,9 +5,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
+from scipy import ndimage, optimize
 
 from comparisons.results.case import FloatArray, Images
+from comparisons.statistics.scales import DARK
 
 # ---- a hypothesis about what is wrong with a picture ---------------------------------------------
 
@@ -41,6 +42,13 @@ CLEARLY = 6.0
 """Standard deviations by which a difference must exceed noise before a cause is sought."""
 
 
+REST = 0.1
+"""The largest part of a bias, or of the squared difference of blocks, that a named cause leaves: a
+light of 64 samples per pixel, or a filter that is nearly the one used, leaves some percent."""
+
+BIAS = 0.001
+"""A bias of a channel's mean that is permitted (`statistics.Margins`) needs no cause."""
+
 DISTINCT = 50.0
 """Two fits are distinguished if their squares differ by this many times the noise of one value:
 about four standard deviations of the difference, for noise with KURTOSIS."""
@@ -71,8 +79,29 @@ class Misfit:
         self._scales = scales
         self._scale = max(scales, key=lambda scale: scale.clearness(difference))
         self.clear = self._scale.clearness(difference) > CLEARLY
-        self.excess = self._scale.squares(difference) - self._scale.noise
+        self.excess = self._scale.excess(difference)
         """How much the squares exceed those of noise alone."""
+
+    @property
+    def weights(self) -> FloatArray:
+        """(height, width, 3): of single pixels."""
+        return self._scales[0].weights
+
+    def reproduces(self, picture: FloatArray) -> bool:
+        """Whether `picture` as the reference leaves no more than REST of the bias of any channel's
+        mean, and of the squares at any scale of blocks at which the difference is clear."""
+        before, left = self.candidate - self.reference, self.candidate - picture
+        mean = np.abs(self.reference.mean(axis=(0, 1)))
+        permitted = BIAS * np.maximum(mean, DARK * mean.mean())
+        noise = CLEARLY * np.sqrt(self._scales[0].error2.sum(axis=(0, 1))) / (before.size // 3)
+        bias, rest = (np.abs(x.mean(axis=(0, 1))) for x in (before, left))
+        if np.any(rest > np.maximum(REST * bias, permitted) + noise):
+            return False
+        return all(
+            scale.excess(left) <= REST * scale.excess(before) + CLEARLY * scale.scatter
+            for scale in self._scales[1:]
+            if scale.clearness(before) > CLEARLY
+        )
 
     @property
     def margin(self) -> float:
@@ -89,13 +118,38 @@ class Misfit:
         it negative."""
         return (self.squares(picture) - self._scale.noise) / self.excess
 
-    def amount(self, direction: FloatArray) -> float:
-        """The least-squares factor of `direction`, added to the reference."""
+    def amount(self, direction: FloatArray, rest: FloatArray | None = None) -> float:
+        """The least-squares factor of `direction`, added to the reference;  rest: what it explains,
+        if not the pictures' difference."""
         w = self._scale.weights
         along = self._scale.binned(direction)
         power = float((w * along**2).sum())
-        difference = self._scale.binned(self.candidate - self.reference)
+        difference = self._scale.binned(self.candidate - self.reference if rest is None else rest)
         return float((w * along * difference).sum()) / power if power else 0.0
+
+    def rising(self, columns: FloatArray) -> FloatArray:
+        """The factors >= 0 of (height, width, 3, columns), the same for all channels, whose sum is
+        nearest to the candidate's pixels."""
+        root = np.sqrt(self.weights)[..., None]
+        weighted = np.concatenate([columns, self.candidate[..., None]], axis=-1) * root
+        # The normal equations, whose root is as small as the number of columns.
+        rows = weighted.reshape(-1, weighted.shape[-1])
+        triangle = np.asarray(np.linalg.qr(rows, mode="r"))
+        return np.asarray(optimize.nnls(triangle[:, :-1], triangle[:, -1])[0])
+
+    def regression(self, columns: FloatArray) -> FloatArray:
+        """(columns, 3): the factors of (height, width, columns) whose sum is nearest to each
+        channel of the candidate."""
+        a = self._scale.binned(columns).reshape(-1, columns.shape[-1])
+        wanted = self._scale.binned(self.candidate).reshape(-1, 3)
+        roots = np.sqrt(self._scale.weights).reshape(-1, 3)
+        return np.stack(
+            [
+                np.linalg.lstsq(a * roots[:, k, None], wanted[:, k] * roots[:, k], rcond=1e-6)[0]
+                for k in range(3)
+            ],
+            axis=1,
+        )
 
     def excesses(self) -> Iterator[tuple[int, FloatArray]]:
         """The block side in pixels and the excess of each block (rows, columns), for every scale
@@ -130,7 +184,10 @@ class _Scale:
     def squares(self, difference: FloatArray) -> float:
         return float((self.weights * self.binned(difference) ** 2).sum())
 
+    def excess(self, difference: FloatArray) -> float:
+        """How much the squares exceed those of noise alone."""
+        return self.squares(difference) - self.noise
+
     def clearness(self, difference: FloatArray) -> float:
         """By how many standard deviations the squares exceed those of noise."""
-        excess = self.squares(difference) - self.noise
-        return excess / (self.scatter + 1e-9)
+        return self.excess(difference) / (self.scatter + 1e-9)

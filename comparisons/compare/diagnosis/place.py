@@ -1,4 +1,4 @@
-"""Hypotheses about positions: shifts, mirrors, filters."""
+"""Hypotheses about positions: shifts, mirrors, filters, lenses."""
 
 import math
 from collections.abc import Iterator
@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy import ndimage, optimize
 
+from comparisons.compare.diagnosis import lens
 from comparisons.compare.diagnosis.misfit import Hypothesis, Misfit
 from comparisons.results.case import FloatArray
 
@@ -23,6 +24,7 @@ def hypotheses(misfit: Misfit) -> Iterator[Hypothesis]:
     if min(misfit.reference.shape[:2]) > 2 * FARTHEST:
         yield from _shifts(misfit)
         yield from _filters(misfit)
+        yield from lens.hypotheses(misfit)
 
 
 def _mirrors(r: FloatArray) -> Iterator[Hypothesis]:

@@ -1,6 +1,7 @@
 """Differences that are confined to one place: a row, column, tile or a few pixels."""
 
 import numpy as np
+import numpy.typing as npt
 
 from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.results.case import Cause, FloatArray
@@ -19,12 +20,28 @@ def one_place(misfit: Misfit) -> Cause | None:
     """The row, column, rectangle or few pixels in which the difference lies, if it does."""
     for block, excess in misfit.excesses():
         total = float(excess.sum())
-        found = _rectangle(excess, total, block)
+        found = [_rectangle(excess, total, block)]
         if block == 1:
-            found = _line(excess, total) or _pixels(excess, total) or found
-        if found is not None:
-            return found
+            found = [_line(excess, total), _pixels(excess, total), *found]
+        for place in found:
+            if place is not None and _holds(misfit, place[1], block):
+                return place[0]
     return None
+
+
+Place = tuple[Cause, npt.NDArray[np.bool_]]
+"""A cause, and the blocks (rows, columns) in which the difference lies."""
+
+
+def _holds(misfit: Misfit, blocks: npt.NDArray[np.bool_], block: int) -> bool:
+    """Whether the difference in the place makes the bias of each channel, and those of blocks."""
+    height, width = misfit.reference.shape[:2]
+    at = [
+        np.minimum(np.arange(n) // block, m - 1)
+        for n, m in zip((height, width), blocks.shape, strict=True)
+    ]
+    inside = blocks[np.ix_(*at)][..., None]
+    return misfit.reproduces(np.where(inside, misfit.candidate, misfit.reference))
 
 
 def rim(misfit: Misfit) -> Cause | None:
@@ -41,6 +58,10 @@ def rim(misfit: Misfit) -> Cause | None:
             sums = sorted(float(side.sum()) for side in sides)
             if share > SHARE and sums[1] > ON_A_SIDE * total:
                 pixels = width * block
+                outer = np.ones(excess.shape, dtype=np.bool_)
+                outer[width:-width, width:-width] = False
+                if not _holds(misfit, outer, block):
+                    continue
                 evidence = (
                     f"{_percent(share)} of the difference are within {pixels} px of the border: "
                     "some renderers take samples beyond it for a filter wider than a pixel, others "
@@ -61,7 +82,7 @@ ON_A_SIDE = 0.05
 """Least fraction of the difference on each of three sides."""
 
 
-def _line(excess: FloatArray, total: float) -> Cause | None:
+def _line(excess: FloatArray, total: float) -> Place | None:
     for axis, name in ((1, "row"), (0, "column")):
         sums = excess.sum(axis=axis)
         k = int(np.argmax(sums))
@@ -70,7 +91,9 @@ def _line(excess: FloatArray, total: float) -> Cause | None:
         # The whole line must be wrong, not only a pixel or two in it.
         if share > SHARE and np.median(along) > EVEN * along.mean():
             evidence = f"{_percent(share)} of the difference are in {name} {k}"
-            return Cause(f"one bad {name}", evidence, min(share, 1.0))
+            inside = np.zeros(excess.shape, dtype=np.bool_)
+            inside[(k, slice(None)) if axis == 1 else (slice(None), k)] = True
+            return Cause(f"one bad {name}", evidence, min(share, 1.0)), inside
     return None
 
 
@@ -82,7 +105,7 @@ def _percent(share: float) -> str:
     return f"{100.0 * min(share, 1.0):.0f} %"
 
 
-def _pixels(excess: FloatArray, total: float) -> Cause | None:
+def _pixels(excess: FloatArray, total: float) -> Place | None:
     count = max(1, int(FEW * excess.size))
     order = np.argsort(excess, axis=None)[::-1][:count]
     shares = np.cumsum(excess.ravel()[order]) / total
@@ -93,10 +116,13 @@ def _pixels(excess: FloatArray, total: float) -> Cause | None:
     share = min(float(shares[-1]), 1.0)
     many = "one pixel" if needed == 1 else f"{needed} pixels"
     evidence = f"{_percent(share)} of the difference are in {many}, the worst at x {x}, y {y}"
-    return Cause("a single wrong pixel" if needed == 1 else "a few wrong pixels", evidence, share)
+    inside = np.zeros(excess.shape, dtype=np.bool_)
+    inside.flat[order] = True
+    name = "a single wrong pixel" if needed == 1 else "a few wrong pixels"
+    return Cause(name, evidence, share), inside
 
 
-def _rectangle(excess: FloatArray, total: float, block: int) -> Cause | None:
+def _rectangle(excess: FloatArray, total: float, block: int) -> Place | None:
     """The rectangle of rows and columns that holds the difference, without the tails."""
     tail = 0.5 * (1.0 - SHARE) / 2.0
     edges = []
@@ -114,4 +140,6 @@ def _rectangle(excess: FloatArray, total: float, block: int) -> Cause | None:
     )
     thin = block == 1 and 1 in (width, height) and max(width, height) > 8
     name = ("one bad row" if height == 1 else "one bad column") if thin else "one bad tile"
-    return Cause(name, evidence, min(inside, 1.0))
+    blocks = np.zeros(excess.shape, dtype=np.bool_)
+    blocks[top:bottom, left:right] = True
+    return Cause(name, evidence, min(inside, 1.0)), blocks

@@ -67,7 +67,67 @@ def part(
 
 ALL = slice(None)
 
+
+def lens(*factors: float, barrel: float = 0.0) -> Callable[[FloatArray], FloatArray]:
+    """Seen with each channel's distances from the middle times a factor, and 1 + barrel r²."""
+
+    def change(p: FloatArray) -> FloatArray:
+        middle = (np.array(p.shape[:2]) - 1.0)[:, None, None] / 2.0
+        away = np.stack(np.mgrid[: p.shape[0], : p.shape[1]]) - middle
+        bent = 1.0 + barrel * (away**2).sum(axis=0) / (middle**2).sum()
+        seen = [
+            ndimage.map_coordinates(p[..., k], middle + away * f * bent, order=3, mode="nearest")
+            for k, f in enumerate(np.broadcast_to(factors or 1.0, 3))
+        ]
+        return np.stack(seen, axis=-1)
+
+    return change
+
+
+def matrix(rows: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    return lambda p: p @ np.asarray(rows).T
+
+
+def clipped(p: FloatArray) -> FloatArray:
+    return np.clip(p, 0.0, 1.0)
+
+
+def hable(p: FloatArray) -> FloatArray:
+    """The filmic curve of a game (Hable 2010)."""
+    a = 2.0 * p
+    return (a * (0.15 * a + 0.05) + 0.004) / (a * (0.15 * a + 0.5) + 0.06) - 0.02 / 0.3
+
+
+REC_2020 = np.array([[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0114], [0.0164, 0.0880, 0.8956]])
+"""ITU-R BT.2087, from Rec. 709."""
+
+ACES_CG = np.array([[0.6131, 0.3395, 0.0474], [0.0702, 0.9164, 0.0134], [0.0206, 0.1096, 0.8698]])
+"""From Rec. 709, adapted by Bradford (the Academy's colour transforms, `ACEScg`)."""
+
+XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+"""IEC 61966-2-1."""
+
+MIXED = np.array([[0.9, 0.1, 0.05], [0.0, 0.8, 0.1], [0.1, -0.1, 1.1]])
+
 PLANTED = {
+    "swapped channels: all channels": lambda p: p[..., [1, 2, 0]],
+    "grey: the luminance in each channel": matrix(np.tile(XYZ[1], (3, 1))),
+    "grey: the mean of the channels in each": matrix(np.full((3, 3), 1.0 / 3.0)),
+    "saturation of 0.8": matrix(0.8 * np.eye(3) + 0.2 * XYZ[1]),
+    "Rec. 2020 where linear sRGB is expected": matrix(REC_2020),
+    "linear sRGB taken for Rec. 2020": matrix(np.linalg.inv(REC_2020)),
+    "ACEScg where linear sRGB is expected": matrix(ACES_CG),
+    "CIE XYZ where linear sRGB is expected": matrix(XYZ),
+    "a matrix of colours": matrix(MIXED),
+    "zoom of 1.01": lens(1.0 / 1.01),
+    "zoom of 0.95": lens(1.0 / 0.95),
+    "barrel distortion of 0.01": lens(barrel=0.01),
+    "pincushion distortion of 0.01": lens(barrel=-0.01),
+    "chromatic aberration": lens(0.995, 1.0, 1.005),
+    "Reinhard's tone curve": lambda p: p / (1.0 + p),
+    "sRGB decoded by a gamma of 2.2": lambda p: srgb(clipped(p)) ** 2.2,
+    "a gamma of 2 decoded as sRGB": lambda p: linear(clipped(p) ** 0.5),
+    "tone curve: the power of 1.1": lambda p: 0.9 * np.maximum(p, 0.0) ** 1.1,
     "constant gain of 1.02": lambda p: 1.02 * p,
     "constant gain of 0.5": lambda p: 0.5 * p,
     "gain of red of 1.02": lambda p: p * [1.02, 1.0, 1.0],
@@ -211,6 +271,45 @@ def test_noise_alone_has_no_cause(pairs: int) -> None:
             error = np.sqrt(sum(x.var(axis=0, ddof=1) / count for x in sides))
             images = Images(*(x.mean(axis=0) for x in sides), error)
             assert likeliest(images) is None
+
+
+@pytest.mark.cases(1)
+@pytest.mark.parametrize("name", ["cornell_box", "spheres_whitted"])
+@pytest.mark.parametrize("curve", [hable, lambda p: 1.0 - np.exp(-1.5 * p)])
+def test_a_tone_curve_without_a_name(name: str, curve) -> None:
+    found = likeliest(pair(name, curve))
+    assert found is not None
+    assert "tone curve" in found.name
+
+
+def ghost(p: FloatArray) -> FloatArray:
+    return 0.95 * p + 0.05 * np.roll(p, (9, 13), axis=(0, 1))
+
+
+def falls_to_the_right(p: FloatArray) -> FloatArray:
+    return p * np.linspace(1.1, 0.9, p.shape[1])[None, :, None]
+
+
+def two_tiles(p: FloatArray) -> FloatArray:
+    return part(slice(10, 26), slice(60, 76), 1.2)(part(slice(40, 56), slice(40, 56), 0.8)(p))
+
+
+@pytest.mark.cases(2)
+@pytest.mark.parametrize("name", ["cornell_box", "spheres_whitted"])
+@pytest.mark.parametrize("change", [ghost, falls_to_the_right, two_tiles])
+def test_what_does_not_reproduce_the_bias_has_no_name(name: str, change) -> None:
+    assert likeliest(pair(name, change)) is None
+
+
+def test_a_cause_reproduces_each_channel_and_each_block() -> None:
+    clean = picture("cornell_box")
+    error = np.full(clean.shape, 0.001)
+    changed = Misfit(Images(1.1 * clean, clean, error))
+    assert changed.reproduces(1.1 * clean)
+    assert changed.reproduces(1.099 * clean)
+    assert not changed.reproduces(1.08 * clean)
+    assert not changed.reproduces(clean * [1.1, 1.1, 1.08])
+    assert not changed.reproduces(falls_to_the_right(1.1 * clean))
 
 
 def test_what_is_no_single_cause_has_no_name() -> None:

@@ -5,7 +5,7 @@ import typing
 import pytest
 
 from comparisons.results.case import Case, Cause, RungResult, Status
-from comparisons.results.headline import headline
+from comparisons.results.headline import headline, numbers_table
 from comparisons.results.rungs import RUNGS
 
 STATUSES = typing.get_args(Status)
@@ -72,12 +72,13 @@ def test_what_differs_after_its_cause(rung, sides, what):
     [
         (
             case("agree", RungResult("geometry", "agree", "x"), statistics("agree")),
-            "no difference was found, and a bias of 0.35 % would have been seen",
+            "no difference was found, and a bias of the image mean of 0.35 % would have been seen",
         ),
         (case("agree", RungResult("whitted", "agree", "x")), "no difference was found"),
         (
             case("inconclusive", statistics("inconclusive", limit=0.001)),
-            "too noisy to decide: only a bias above 0.35 % would be seen, and 0.10 % is asked for",
+            "too noisy to decide: only a bias of the image mean above 0.35 % would be seen, and "
+            "0.10 % is asked for",
         ),
         (
             case("inconclusive", statistics("inconclusive")),
@@ -137,3 +138,16 @@ def test_every_rung_may_differ_besides(verdict, other):
     told = headline(case(verdict, first, RungResult(other, "differ", "9 of 10 rays; and more")))
     assert told
     assert "more" not in told
+
+
+def test_the_numbers_as_a_table():
+    lines = {"tested": 256, "differ": 0, "median_detectable_bias": 0.013}
+    rung = statistics(tiles=3, lines=lines, pixels=1)
+    assert numbers_table(case("differ", rung)) == [
+        "tested                found                         would have been seen",
+        "image mean            R +1.0 %, G +1.1 %, B +1.2 %  0.35 %",
+        "64 tiles              3 differ",
+        "256 rows and columns  0 differ                      1.3 % in half of them",
+        "16,384 pixels         1 differ",
+    ]
+    assert numbers_table(case("invalid", RungResult("input", "invalid", "why"))) == []

@@ -214,3 +214,38 @@ def test_rays_in_the_plane_in_which_they_begin(name: str) -> None:
         for seed in range(3):
             found = direct(scene, scene.tables, counterpart, 60, seed)
             assert found.status == "agree", found.reason
+
+
+TUBE_BEFORE_A_LAMP = """
+camera: {type: perspective, eye: [97.69622802734375, 2.5210671424865723, -519.0569458007812],
+  target: [193.70447516441345, 1.9523029047995806, -491.09102165699005], fov: 0.002}
+film: {width: 64, height: 48}
+materials:
+  lamp: {type: emissive, radiance: 70000}
+  tube: {type: diffuse, reflectance: 0}
+  ground: {type: diffuse, reflectance: 0.1}
+shapes:
+  - {type: rectangle, material: lamp, transform: [{scale: 0.1},
+     {rotate: {axis: [1, 0, 0], degrees: 90}}, {translate: [-12, 10, 8]}]}
+  - {type: rectangle, material: ground, transform: [{scale: 1000},
+     {rotate: {axis: [1, 0, 0], degrees: -90}}]}
+  - type: cylinder
+    material: tube
+    capped: false
+    transform:
+      - matrix:
+          - [0.04158750230306614, 0.004900066502461673, -12.713, 0.731]
+          - [0.004900066502461673, 0.0471458355658988, 7.404999999999999, 2.595]
+          - [0.027321584881992513, -0.015914130107067926, 18.023000000000003, -9.973]
+"""
+"""A shadow ray of 535 m passes the end of a tube, right before the lamp, at 1.0005 radii."""
+
+
+def test_an_occluder_within_the_shadow_epsilon_of_a_far_lamp() -> None:
+    """Our arbiter's ray meets the tube there, which is not the light that it ends on."""
+    scene = Scene.parse(TUBE_BEFORE_A_LAMP)
+    with scalar():
+        found = direct(scene, scene.tables, load(scene), 300)
+        assert found.status == "agree", found.reason
+        faulty = faulty_counterpart(TUBE_BEFORE_A_LAMP, "radiance: 70000", "radiance: 75000")
+        assert direct(scene, scene.tables, faulty, 300).status == "differ"

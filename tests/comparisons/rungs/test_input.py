@@ -233,3 +233,26 @@ def test_negative_values_are_counted() -> None:
     assert result.status == "agree"
     assert result.numbers["negative_values"] == 1
     assert "1 negative value" in result.reason
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda p: p[..., ::-1],
+        lambda p: p[..., [1, 2, 0]],
+        lambda p: p.mean(axis=-1, keepdims=True) * np.ones(3),
+        lambda p: p * [1.2, 1.0, 0.8],
+    ],
+    ids=["two channels", "three channels", "grey", "tinted"],
+)
+@pytest.mark.parametrize("texture", ["smooth", "fine"])
+def test_wrong_colours_of_a_tinted_picture_are_no_shared_noise(change, texture: str) -> None:
+    """Their errors cancel in the sum over the channels, which left only noise to judge. Of a fine
+    texture they are independent between pixels, as noise is, but like the picture."""
+    rng = np.random.default_rng(0)
+    y, x = np.mgrid[0:48, 0:48] / 48
+    shade = (0.5 + 0.3 * np.sin(5.0 * x) * np.cos(7.0 * y))[..., None] * [1.0, 0.9, 0.7]
+    if texture == "fine":
+        shade = rng.uniform(0.4, 0.6, shade.shape)
+    sides = [shade * (1.0 + 0.1 * rng.normal(size=(8, *shade.shape))) for _ in range(2)]
+    assert input_rung(change(sides[0]), sides[1]).status == "agree"

@@ -21,6 +21,7 @@ from planted import (
 )
 
 from comparisons.statistics import Known, Margins, compare, standard_error, worst_regions
+from comparisons.statistics.advice import wanted
 from comparisons.statistics.decide import _decide, findings
 
 # The decision: specificity and equivalence
@@ -288,3 +289,13 @@ def test_light_too_faint_to_be_squared(exponent: int) -> None:
         results.append((found.status, found.numbers["relative_bias"]))
     assert results[0][0] == results[1][0] == "agree"
     assert results[1][1] == pytest.approx(results[0][1])
+
+
+def test_hardly_more_samples_are_told_in_words():
+    sides = (replicates(np.random.default_rng(k), scene()) for k in (1, 2))
+    image = findings(*sides, 16, MARGINS).image
+    limits = np.geomspace(0.002, 0.02, 60)
+    words = [wanted(image, limit, None)[0] for limit in limits]
+    assert not any("about 1.0 times" in text for text in words)
+    assert sum(text.startswith("slightly more samples") for text in words) > 2
+    assert any("it takes about 1.2 times" in text for text in words)

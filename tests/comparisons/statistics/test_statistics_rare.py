@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
-from planted import MARGINS
+from planted import HEIGHT, MARGINS, WIDTH, scene
 from scipy import stats
 
 from comparisons.compare.judge import Evidence, judge, of_replicates
+from comparisons.results.case import FloatArray, Images
+from comparisons.rungs.images import images_rung
 from comparisons.statistics import Known, compare
 from comparisons.statistics.decide import findings
+from comparisons.statistics.metrics import image_metrics
 from comparisons.statistics.rare import met_once, unseen, worse
 from comparisons.statistics.sides import side_of
 from comparisons.statistics.unmet import around, share_unmet
@@ -227,3 +230,30 @@ def test_sizes_of_tiles_and_pixels_are_stated():
         assert numbers[scale]["largest_detectable_bias"] == pytest.approx(largest)
     single = compare(a[:1], b)
     assert "single pixels are tested only where there is no noise" in single.reason
+
+
+def uneven(rng: np.random.Generator, count: int, chance: float, gain: float = 1.0) -> FloatArray:
+    """Half of the light in one sample of 1 / chance, of surfaces, a lamp and a black sky."""
+    met = rng.random((count, HEIGHT, WIDTH, 1)) < chance
+    return gain * scene() * (0.5 + 0.01 * rng.standard_normal(met.shape) + 0.5 / chance * met)
+
+
+@pytest.mark.parametrize("runs", [12, pytest.param(500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("chance", [1e-3, 1e-2])
+def test_rare_light_of_uneven_brightness_does_not_differ(chance: float, runs: int) -> None:
+    """Against a precise reference: an event on the lamp is larger than any that was met."""
+    for seed in range(runs):
+        rng = np.random.default_rng([seed, 7])
+        sides = uneven(rng, 8, chance), scene() * (1.0 + 0.01 * rng.standard_normal((16, 1, 1, 1)))
+        assert compare(*sides).status == "inconclusive"
+        means = Images(*(side.mean(axis=0) for side in sides))
+        found = images_rung(means, image_metrics(means), sides)
+        assert found.status == "agree", found.reason
+
+
+def test_a_gain_amid_light_that_is_met_often() -> None:
+    rng = np.random.default_rng(0)
+    exact = scene() * (1.0 + 0.001 * rng.standard_normal((16, HEIGHT, WIDTH, 1)))
+    for chance in (0.3, 0.1):
+        candidate = np.stack([uneven(rng, 64, chance, 0.98).mean(axis=0) for _ in range(16)])
+        assert compare(candidate, exact).status == "differ"

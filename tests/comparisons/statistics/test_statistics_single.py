@@ -6,9 +6,13 @@ import math
 import numpy as np
 import pytest
 from planted import FAULTS, MARGINS, STILL, replicates, scene
+from scipy import ndimage
 
+from comparisons.results.case import Images
+from comparisons.rungs.images import images_rung
 from comparisons.statistics import Known, compare, standard_error
 from comparisons.statistics.decide import findings
+from comparisons.statistics.metrics import image_metrics
 
 
 def test_a_single_picture_says_what_it_presumes():
@@ -156,3 +160,33 @@ def test_a_contact_shadow_in_a_single_picture_asks_for_replicates(place):
     assert result.numbers["samples_factor"] is None
     if result.status == "inconclusive":
         assert "give more replicates" in result.reason
+
+
+def known_through_a_filter(rng: np.random.Generator, width: float, noise: float = 0.05) -> Known:
+    """The mean of a picture whose pixels share samples through a Gaussian, with its variance."""
+    kernel = np.zeros((17, 17))
+    kernel[8, 8] = 1.0
+    kernel = ndimage.gaussian_filter(kernel, width)
+    deviation = noise * np.maximum(scene(), 0.01)
+    own = deviation * rng.standard_normal(deviation.shape)
+    spread = ndimage.gaussian_filter(own, (width, width, 0.0), mode="wrap")
+    variance = ndimage.convolve(deviation**2, (kernel**2)[..., None], mode="wrap")
+    return Known(scene() + spread, variance)
+
+
+@pytest.mark.parametrize("runs", [10, pytest.param(500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("width", [0.05, 0.7, 1.5])
+def test_a_known_mean_whose_pixels_share_a_filter(width: float, runs: int) -> None:
+    """Its variance does not show that the errors of neighbours add."""
+    for seed in range(runs):
+        rng = np.random.default_rng([seed, 3])
+        known = known_through_a_filter(rng, width)
+        candidate = scene() + 0.05 * scene() * rng.standard_normal((8, *scene().shape))
+        found = compare(candidate, known)
+        assert found.status in ("agree", "inconclusive"), found.reason
+        spread = np.sqrt(known.variance)
+        sides = candidate, np.stack([known.mean + spread, known.mean - spread])
+        means = Images(candidate.mean(axis=0), known.mean)
+        found = images_rung(means, image_metrics(means), sides)
+        assert found.status == "agree", found.reason
+        assert width < 0.5 or "share noise, as through a filter" in found.reason

@@ -1,0 +1,140 @@
+"""Replicates that depend on their order, or make up for each other, are told from independent
+ones, whatever the law of their noise."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from renderers_that_share import RENDERERS
+from scipy import stats
+
+from comparisons.results.case import FloatArray
+from comparisons.rungs.input import input_rung
+from comparisons.statistics import compare
+from comparisons.statistics.dependence import LEVEL, successive
+
+Law = Callable[[np.random.Generator, int, int], FloatArray]
+
+
+def normal(rng: np.random.Generator, count: int, side: int) -> FloatArray:
+    return 1.0 + 0.3 * rng.standard_normal((count, side, side, 3))
+
+
+def lognormal(rng: np.random.Generator, count: int, side: int) -> FloatArray:
+    return np.exp(2.0 * rng.standard_normal((count, side, side, 3)) - 2.0)
+
+
+def fireflies(rng: np.random.Generator, count: int, side: int) -> FloatArray:
+    smooth = 0.5 * rng.gamma(4.0, 0.25, (count, side, side, 3))
+    return smooth + (rng.random((count, side, side, 1)) < 1e-3) * 50.0
+
+
+def lit_corner(rng: np.random.Generator, count: int, side: int) -> FloatArray:
+    """Rare light in a few pixels, nothing elsewhere."""
+    pictures = np.zeros((count, side, side, 3))
+    pictures[:, :6, :6] = (rng.random((count, 6, 6, 1)) < 0.1) * 10.0
+    return pictures
+
+
+LAWS: dict[str, Law] = {
+    law.__name__: law for law in (normal, lognormal, fireflies, lit_corner)
+} | RENDERERS
+
+
+def history(pictures: FloatArray) -> FloatArray:
+    found = [pictures[0]]
+    for picture in pictures[1:]:
+        found.append(0.9 * found[-1] + 0.1 * picture)
+    return np.stack(found)
+
+
+def prefixes(pictures: FloatArray) -> FloatArray:
+    return np.cumsum(pictures, axis=0) / np.arange(1.0, len(pictures) + 1.0)[:, None, None, None]
+
+
+def overlapping(pictures: FloatArray) -> FloatArray:
+    """Each shares half of its samples with the next one."""
+    return 0.5 * (pictures + np.roll(pictures, 1, axis=0))
+
+
+@pytest.mark.cases(2)
+@pytest.mark.parametrize("count", [8, 11, 16])
+@pytest.mark.parametrize("law", ["normal", "lognormal", "fireflies", "photon map, radius 3"])
+def test_pictures_that_go_on_from_each_other(law: str, count: int) -> None:
+    rng = np.random.default_rng(count)
+    for made in (history, prefixes, overlapping):
+        pictures = made(LAWS[law](rng, count, 32))
+        found = successive(pictures)
+        assert found is not None, made
+        assert found.correlation > 0.2
+        assert found.movement == (0, 0)
+        # Not in another order, which hides the dependence from the order, not from pairs.
+        assert successive(rng.permutation(pictures)) is None
+
+
+@pytest.mark.parametrize("movement", [(-1, 0), (0, 1), (3, -7), (0, 0)])
+def test_each_picture_is_the_one_before_moved(movement: tuple[int, int]) -> None:
+    rng = np.random.default_rng(0)
+    x, y = movement
+    noise = normal(rng, 1, 160)[0]
+    own = normal(rng, 9, 160)
+    pictures = np.stack(
+        [0.8 * np.roll(noise, (k * y, k * x), axis=(0, 1)) + 0.2 * own[k] for k in range(9)]
+    )
+    found = successive(pictures)
+    if not any(movement):  # all alike: the order does not matter
+        assert found is None
+        return
+    assert found is not None
+    assert found.movement == movement
+    wrong = input_rung(pictures, normal(rng, 9, 160)).reason
+    assert f"like the one before, moved by {x:+d}, {y:+d} pixels" in wrong
+
+
+def test_the_side_that_depends_on_its_order_is_named() -> None:
+    rng = np.random.default_rng(0)
+    wrong, right = history(normal(rng, 16, 32)), normal(rng, 8, 32)
+    for sides, name in (((wrong, right), "candidate"), ((right, wrong), "reference")):
+        found = input_rung(*sides)
+        assert found.status == "invalid"
+        assert f"the replicates of the {name} depend on their order" in found.reason
+
+
+def alarms(law: str, count: int, cases: int) -> int:
+    found = 0
+    for seed in range(cases):
+        found += successive(LAWS[law](np.random.default_rng([seed, count]), count, 24)) is not None
+    return found
+
+
+@pytest.mark.cases(3)
+@pytest.mark.parametrize("law", LAWS)
+def test_independent_replicates_have_no_order(law: str) -> None:
+    assert alarms(law, 8, 6) + alarms(law, 12, 4) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", LAWS)
+def test_independent_replicates_have_no_order_in_many_cases(law: str) -> None:
+    cases = 500
+    found = sum(alarms(law, count, cases) for count in (8, 16))
+    assert found <= stats.binom.isf(1e-4, 2 * cases, LEVEL)
+
+
+def strata(rng: np.random.Generator, count: int, side: int) -> FloatArray:
+    """Pictures that take turns in the strata of one pattern of each pixel."""
+    turns = rng.permuted(np.tile(np.arange(count), (side * side, 1)), axis=1).T
+    u = (turns + rng.random(turns.shape)) / count
+    return (0.5 + u).reshape(count, side, side, 1) * np.array([1.0, 0.8, 0.5])
+
+
+def test_replicates_that_make_up_for_each_other_are_judged() -> None:
+    """Their mean is better than their spread says; noise that both sides share is another fault."""
+    rng = np.random.default_rng(0)
+    found = compare(strata(rng, 16, 48), strata(rng, 16, 48))
+    assert found.status == "inconclusive", found.reason
+    assert "make up for each other (negative correlation)" in found.reason
+    own = normal(rng, 16, 48)
+    shared = compare(own, rng.permutation(own) + 0.05 * (normal(rng, 16, 48) - 1.0))
+    assert shared.status == "invalid"
+    assert "they share their noise" in shared.reason

@@ -1,0 +1,101 @@
+"""Rows, columns and smooth patterns that keep the mean of the picture."""
+
+import numpy as np
+import pytest
+from renderers_that_share import RENDERERS
+from scipy import stats
+
+from comparisons.results.case import FloatArray
+from comparisons.statistics import Margins, compare
+from comparisons.statistics.patterns import ORDERS, line_test, mode_test, named_line, named_mode
+from comparisons.statistics.sides import side_of
+
+HEIGHT, WIDTH = 48, 64
+
+
+def scene() -> FloatArray:
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH] / HEIGHT
+    return (0.5 + 0.2 * np.sin(5.0 * x) * np.cos(7.0 * y))[..., None] * np.array([1.0, 0.8, 0.3])
+
+
+def judged(changed: FloatArray, seed: int = 0, noise: float = 0.05):
+    rng = np.random.default_rng(seed)
+    shape = noise**-2
+    sides = [m * rng.gamma(shape, 1.0 / shape, (16, *m.shape)) for m in (changed, scene())]
+    return compare(*sides)
+
+
+def keeps_the_mean(factor: FloatArray) -> FloatArray:
+    """The scene times (height, width), scaled to the scene's own mean in each channel."""
+    changed = scene() * factor[..., None]
+    return changed * scene().mean(axis=(0, 1)) / changed.mean(axis=(0, 1))
+
+
+def vignette(amount: float) -> FloatArray:
+    y, x = np.mgrid[-1.0 : 1.0 : HEIGHT * 1j, -1.0 : 1.0 : WIDTH * 1j]
+    return keeps_the_mean(1.0 - amount * (x**2 + y**2) / 2.0)
+
+
+@pytest.mark.parametrize("along", ["row", "column"])
+def test_a_line_that_tiles_and_pixels_do_not_show(along: str) -> None:
+    for seed, k in enumerate((0, 13, 47)):
+        changed = scene()
+        changed[(k,) if along == "row" else (slice(None), k)] *= 0.97
+        result = judged(changed, seed)
+        assert result.status == "differ"
+        assert (
+            f"rows and columns differ, though no tile and no pixel; the worst, {along} {k}: "
+            in (result.reason)
+        )
+
+
+@pytest.mark.parametrize(("amount", "noise"), [(0.02, 0.03), (-0.02, 0.03), (0.01, 0.01)])
+def test_a_vignette_that_keeps_the_mean(amount: float, noise: float) -> None:
+    for seed in range(3):
+        result = judged(vignette(amount), seed, noise)
+        assert result.status == "differ"
+        assert (
+            "brightness differs smoothly over the picture, though not its mean: a whole wave"
+            in (result.reason)
+        )
+
+
+def test_each_mode_is_found_and_named() -> None:
+    sides = [side_of(scene() * np.random.default_rng(k).gamma(1e4, 1e-4, (8, HEIGHT, WIDTH, 1)))
+             for k in (1, 2)]  # fmt: skip
+    assert mode_test(*sides, Margins()).differs.sum() == 0
+    for index, (y, x) in enumerate(ORDERS):
+        wave = np.outer(
+            np.cos(np.pi * y * (np.arange(HEIGHT) + 0.5) / HEIGHT),
+            np.cos(np.pi * x * (np.arange(WIDTH) + 0.5) / WIDTH),
+        )
+        changed = side_of(sides[0].pictures + 0.01 * scene().mean() * wave[..., None])
+        found = mode_test(changed, sides[1], Margins())
+        assert found.worst[0] == index
+        amplitude = found.difference[index] / scene().mean()
+        np.testing.assert_allclose(amplitude, 0.01, rtol=0.1)
+        assert found.differs[index].all()
+        assert not np.delete(found.differs, index, axis=0).any()
+    assert named_mode(3) == "half a wave along x and half a wave along y"
+    assert (named_line(5, HEIGHT), named_line(HEIGHT + 5, HEIGHT)) == ("row 5", "column 5")
+
+
+def alarms(law: str, cases: int, counts: tuple[int, int] = (8, 16)) -> int:
+    found = 0
+    for seed in range(cases):
+        rng = np.random.default_rng([seed, *counts, 5])
+        sides = [side_of(RENDERERS[law](rng, count, 32)) for count in counts]
+        found += any(test(*sides, Margins()).differs.any() for test in (line_test, mode_test))
+    return found
+
+
+@pytest.mark.cases(3)
+@pytest.mark.parametrize("law", RENDERERS)
+def test_right_pictures_have_no_wrong_lines_and_modes(law: str) -> None:
+    assert alarms(law, 6) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", [law for law in RENDERERS if law != "1 point light"])
+def test_right_pictures_have_no_wrong_lines_and_modes_in_many_cases(law: str) -> None:
+    assert alarms(law, 1000) <= stats.binom.isf(1e-4, 1000, 1e-4)
