@@ -53,13 +53,17 @@ Data = dict[str, Any]
 @dataclass
 class Writing:
     """A scene being written.  folder: of its files;  files: how many there are;  named: the
-    materials;  reasons: why Cycles is not eligible."""
+    materials;  reasons: why Cycles is not eligible;  glass, lamps: the boxes (2, 3) around shapes of
+    glass, and around those that emit;  reach: the largest coordinate of a vertex."""
 
     scene: Scene
     folder: Path
     files: int = 0
     named: dict[str, Data] = field(default_factory=dict)
     reasons: list[str] = field(default_factory=list)
+    glass: list[FloatArray] = field(default_factory=list)
+    lamps: list[FloatArray] = field(default_factory=list)
+    reach: float = 0.0
 
     @contextmanager
     def collected(self) -> Iterator[None]:
@@ -105,6 +109,8 @@ def write(scene: Scene, folder: Path, threads: int | None = None) -> None:
                 found["lights"].append(light_of(light))
     found["background"] = background.tolist()
     found["meshes"] = _meshes(writing)
+    with writing.collected():
+        _check_places(writing)
     if writing.reasons:
         raise IneligibleError("; ".join(writing.reasons))
     (folder / "scene.json").write_text(json.dumps(found), encoding="utf-8")
@@ -377,14 +383,12 @@ def _meshes(writing: Writing) -> list[Data]:
                     if surface.uv is None and _has_texture(writing.named[name]["shader"]):
                         raise IneligibleError(f"the shape {name_of(leaf.shape)} under a texture")
                     m = affine.map_in(leaf.shape, place_of(scene, leaf, copy.outer))
-                    if not _holds(
-                        affine.apply_points(
-                            m, surface.vertices[surface.faces[:MEASURED]].reshape(-1, 3)
-                        ).reshape(-1, 3, 3)
-                    ):
+                    vertices = affine.apply_points(m, surface.vertices)
+                    if not _holds(vertices[surface.faces[:MEASURED]]):
                         raise IneligibleError(
                             f"the shape {name_of(leaf.shape)}, too small for float32"
                         )
+                    _note_place(leaf.shape, writing.named[name], vertices, writing)
                     one: Data = {"material": name}
                     if copy.instance < 0 or affine.mirrors(m):
                         triangles += len(surface.faces)
@@ -399,6 +403,41 @@ def _meshes(writing: Writing) -> list[Data]:
                     writing.reasons.append(f"more than {MOST_TRIANGLES:,} triangles")
                     return found
     return found
+
+
+CLOSED = (rt.Sphere, rt.Box, rt.Torus)
+
+
+def _note_place(shape: Any, material: Data, vertices: FloatArray, writing: Writing) -> None:
+    box = np.stack([vertices.min(axis=0), vertices.max(axis=0)])
+    writing.reach = max(writing.reach, float(np.abs(box).max()))
+    if material["sampling"] == "FRONT":
+        writing.lamps.append(box)
+    if "'glass'" in str(material["shader"]):
+        is_closed = isinstance(shape, CLOSED) or getattr(shape, "capped", False)
+        if not is_closed:
+            raise IneligibleError(f"glass on the shape {name_of(shape)}, which may not be closed")
+        writing.glass.append(box)
+
+
+def _check_places(writing: Writing) -> None:
+    """Cycles does not divide radiance by the square of the index where it leaves glass: that cancels
+    where the camera and all lights are outside.  A view that is much smaller than the scene is too
+    coarse in float32."""
+    camera = writing.scene.camera
+    points = [
+        np.array([light.position] * 2) for light in writing.scene.lights if isinstance(light, Point)
+    ]
+    for box in (np.array([camera.eye] * 2), *points, *writing.lamps):
+        for glass in writing.glass:
+            if np.all(box[0] <= glass[1]) and np.all(glass[0] <= box[1]):
+                raise IneligibleError("a camera or a lamp in glass")
+    if math.dist(camera.eye, camera.target) < VIEW * writing.reach:
+        raise IneligibleError("a view of less than a thousandth of the scene")
+
+
+VIEW = 1e-3
+"""Least distance of the target over the scene's size: float32 holds the view to 1e-4 then."""
 
 
 def _material(name: str | None, writing: Writing) -> str:

@@ -27,9 +27,9 @@ VOTERS = (
     *("filter_mitchell", "filter_tent", "index_matched", "light_directional", "light_shapes"),
     *("material_blend", "material_conductor", "material_two_sided", "mesh_knot", "near_delta"),
     *("soft_shadows", "tilted_lamps", "tiny"),
-    *("truth/blend_furnace", "truth/box_lamp", "truth/canyon", "truth/closed_room"),
-    *("truth/directional_on_roof", "truth/disk_lamp", "truth/glass_boundary", "truth/mirror_image"),
-    *("truth/penumbra_of_disk", "truth/retro_reflector", "truth/setting_sphere", "truth/slab"),
+    *("truth/blend_furnace", "truth/box_lamp", "truth/closed_room"),
+    *("truth/disk_lamp", "truth/mirror_image"),
+    *("truth/penumbra_of_disk", "truth/setting_sphere", "truth/slab"),
     *("truth/sphere_in_sphere", "truth/three_points", "truth/triangle_lamp", "truth/wall_to_floor"),
 )
 
