@@ -53,8 +53,8 @@ Data = dict[str, Any]
 @dataclass
 class Writing:
     """A scene being written.  folder: of its files;  files: how many there are;  named: the
-    materials;  reasons: why Cycles is not eligible;  glass, lamps: the boxes (2, 3) around shapes of
-    glass, and around those that emit;  reach: the largest coordinate of a vertex."""
+    materials;  reasons: why Cycles is not eligible;  glass, lamps: the boxes (2, 3) around shapes
+    of glass, and around those that emit;  reach: the largest coordinate of a vertex."""
 
     scene: Scene
     folder: Path
@@ -421,7 +421,7 @@ def _note_place(shape: Any, material: Data, vertices: FloatArray, writing: Writi
 
 
 def _check_places(writing: Writing) -> None:
-    """Cycles does not divide radiance by the square of the index where it leaves glass: that cancels
+    """Cycles does not divide radiance by the square of the index behind glass: that cancels
     where the camera and all lights are outside.  A view that is much smaller than the scene is too
     coarse in float32."""
     camera = writing.scene.camera
