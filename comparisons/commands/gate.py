@@ -16,6 +16,7 @@ from comparisons.commands.options import (
     Layer,
     NoiseFree,
     Threads,
+    Witness,
     compare_extra,
 )
 from comparisons.commands.truth import truth_gate
@@ -116,6 +117,7 @@ def gate(
         typer.Option(help="Smallest relative bias of the image mean that must be detectable."),
     ] = 0.005,
     noise_free: NoiseFree = False,
+    witness: Witness = None,
     rim: Annotated[
         int,
         typer.Option(
@@ -173,6 +175,7 @@ def gate(
             "size": size,
         }
         others |= {"baseline": baseline, "fixed": fixed, "noise-free": noise_free, "rim": rim}
+        others |= {"witness": witness}
         for name, value in {**others, "junit": junit, "github": github, "define": define}.items():
             if value:
                 raise UsageError(f"--{name}: does not apply to --truth; expected one of them")
@@ -219,6 +222,7 @@ def gate(
             threads=threads,
             rim=rim,
             name=name,
+            witness=witness,
         )
         with ProgressLine() as progress:
             if run is not None:

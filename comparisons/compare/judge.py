@@ -1,6 +1,6 @@
 """From the evidence about a case to its verdict."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from comparisons.results.case import (
     ImageRegion,
     Images,
     RungResult,
+    Status,
     decide,
 )
 from comparisons.results.rungs import RUNGS
@@ -104,10 +105,7 @@ def judge(evidence: Evidence, limit: float) -> Case:
                 images = replace(images, witness=picture)
     rungs = limited(rungs)
     verdict, reason = decide(rungs, metrics)
-    if verdict != "agree" and any("alone" in rung.numbers for rung in rungs):
-        # A difference of two says that one is wrong; the third says which.
-        (said,) = (rung.reason for rung in rungs if rung.name == "witness")
-        reason = f"{reason}; {said}" if said not in reason else reason
+    reason = with_vote(verdict, reason, rungs)
     cause: Cause | None = None
     worst: tuple[ImageRegion, ...] = ()
     if verdict == "differ":
@@ -129,6 +127,13 @@ def judge(evidence: Evidence, limit: float) -> Case:
         worst=worst,
         left_out=evidence.left_out,
     )
+
+
+def with_vote(verdict: Status, reason: str, rungs: Sequence[RungResult]) -> str:
+    """The reason of a verdict, with who of three renderers stands alone: a difference of two says
+    that one is wrong, the third says which."""
+    said = next((rung.reason for rung in rungs if "alone" in rung.numbers), "")
+    return reason if verdict == "agree" or said in reason else f"{reason}; {said}"
 
 
 def picture_rungs(

@@ -7,9 +7,10 @@ import numpy as np
 
 from comparisons import statistics
 from comparisons.compare import diagnosis
-from comparisons.compare.judge import Lights, despite, likeliest_cause
+from comparisons.compare.judge import Lights, despite, likeliest_cause, with_vote
 from comparisons.compare.looks import Looks, level_of
 from comparisons.compare.path_length import Lengths
+from comparisons.cycles.witness import Witness
 from comparisons.gate.digest import Copies
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes, size_of, stacked
@@ -48,16 +49,17 @@ def gate_pictures(
     name: str = "candidate",
     lights: Lights | None = None,
     lengths: Lengths | None = None,
+    witness: Witness | None = None,
     notes: Sequence[str] = (),
     rim: int = 0,
 ) -> Case:
     """The verdict on candidates; several are replicates.
 
     limit: the smallest relative bias of the image mean that must be detectable;  lights, lengths:
-    for the diagnosis of a difference;  rim: how many of the outermost pixels are left out on each
-    side.  Candidates that are copies of the reference's pictures are `unchanged`.  Raises
-    ImageError for candidates whose size is not the reference's, UsageError for several candidates
-    without noise and for a rim that leaves nothing.
+    for the diagnosis of a difference;  witness: a third renderer, where there is no rim;  rim: how
+    many of the outermost pixels are left out on each side.  Candidates that are copies of the
+    reference's pictures are `unchanged`.  Raises ImageError for candidates whose size is not the
+    reference's, UsageError for several candidates without noise and for a rim that leaves nothing.
     """
     check_sizes(candidates, size_of(reference.pictures[0]), "as the reference")
     copies = Copies.of(reference.fingerprints)
@@ -73,6 +75,7 @@ def gate_pictures(
         name=name,
         lights=lights,
         lengths=lengths,
+        witness=witness,
         notes=notes,
         rim=rim,
     )
@@ -106,6 +109,7 @@ def judged(
     name: str = "candidate",
     lights: Lights | None = None,
     lengths: Lengths | None = None,
+    witness: Witness | None = None,
     notes: Sequence[str] = (),
     rim: int = 0,
     looks: Looks | None = None,
@@ -146,7 +150,13 @@ def judged(
             _statistics(pictures, reference, limit) if looks is None else looks.judged,
             _images_rung(images, metrics, pictures, reference),
         ]
+        known = _replicates(reference)
+        if witness is not None and known is not None and len(pictures) > 1:
+            heard, third = witness((pictures, known), ("candidate's", reference.name))
+            rungs.append(heard)
+            images = replace(images, witness=third)
     verdict, reason = decide(rungs, metrics)
+    reason = with_vote(verdict, reason, rungs)
     cause: Cause | None = None
     worst: tuple[ImageRegion, ...] = ()
     if verdict == "differ":

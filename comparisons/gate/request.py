@@ -4,10 +4,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Literal
 
 from comparisons.compare.compare import single_lights
 from comparisons.compare.judge import Lights
 from comparisons.compare.path_length import path_lengths
+from comparisons.cycles.witness import Witness, witness_of
 from comparisons.gate import baselines, reference
 from comparisons.gate.digest import scene_digest
 from comparisons.gate.gate import LIMIT, gate_pictures
@@ -31,7 +33,8 @@ class Request:
 
     variance: a file with the variance of a single reference;  baselines: their folder;  limit: the
     smallest relative bias of the image mean that must be detectable;  noise_free: the renderer uses
-    no random numbers;  rim: how many of the outermost pixels are left out;  name: the case's.
+    no random numbers;  rim: how many of the outermost pixels are left out;  name: the case's;
+    witness: a third renderer, of the scene, with a box filter.
     """
 
     scene: Scene | None = None
@@ -44,6 +47,7 @@ class Request:
     threads: int | None = None
     rim: int = 0
     name: str = "candidate"
+    witness: Literal["cycles"] | None = None
 
     def __post_init__(self) -> None:
         if self.references and self.baseline:
@@ -52,6 +56,10 @@ class Request:
             raise UsageError("nothing to compare with; expected a scene, reference or baseline")
         if self.variance is not None and not self.references:
             raise UsageError("got a variance without a reference; expected both")
+        if self.witness is not None and self.scene is None:
+            raise UsageError("got a witness without a scene; expected both")
+        if self.witness is not None and self.rim:
+            raise UsageError("got a witness and a rim; expected one of them")
         permitted = Margins().image
         if not permitted < self.limit < 1.0:
             raise UsageError(
@@ -89,8 +97,15 @@ class Judge:
             name=request.name,
             lights=None if scene is None else _lights(scene, request.threads),
             lengths=None if scene is None else path_lengths(scene, request.threads),
+            witness=self._witness(),
             rim=request.rim,
         )
+
+    def _witness(self) -> Witness | None:
+        if self.request.witness is None or self.request.scene is None:
+            return None
+        limit, threads = self.request.limit, self.request.threads
+        return witness_of(self.request.scene, limit, threads, lambda line: None)
 
 
 def prepared(

@@ -9,7 +9,7 @@ import reference_rt as rt
 from comparisons.cycles import backend
 from comparisons.cycles.translate import IneligibleError
 from comparisons.cycles.witness import vote
-from reference_rt.util.errors import ReferenceUnavailableError
+from reference_rt.util.errors import ReferenceUnavailableError, UsageError
 
 NAMES = ("ours", "Mitsuba's", "Cycles'")
 LIMIT = 0.02
@@ -112,3 +112,37 @@ def test_all_reasons_are_given(monkeypatch, tmp_path):
         backend.Cycles(scene)
     for part in ("whitted", "plastic", "plane", "CSG", "spot"):
         assert part in str(caught.value)
+
+
+def test_the_gate_hears_a_witness(monkeypatch):
+    """The candidate's pictures, ours, and the witness's are one vote; a vote needs a scene."""
+    from comparisons.gate import request as gate
+    from comparisons.gate.pictures_in import Picture
+
+    heard = []
+
+    def witness_of(scene, limit, threads, say):
+        def hear(replicates, sides):
+            heard.append(sides)
+            third = _pictures(7, count=len(replicates[0]))
+            return vote((*replicates, third), (*sides, "Cycles'"), limit), third.mean(axis=0)
+
+        return hear
+
+    monkeypatch.setattr(gate, "witness_of", witness_of)
+    scene = SCENE.changed(film=rt.Film(width=48, height=48))
+    dark, right = (
+        [Picture(x, name=f"{name} {k}") for k, x in enumerate(_pictures(seed, factor=factor))]
+        for name, seed, factor in (("dark", 1, 0.9), ("right", 2, 1.0))
+    )
+    asked = gate.Request(scene, references=tuple(right), limit=LIMIT, witness="cycles")
+    case = gate.gated(asked, dark)
+    assert case.verdict == "differ"
+    assert "candidate's stands alone" in case.reason
+    assert case.images.witness.shape == (48, 48, 3)
+    assert len(heard) == 1
+    for wrong in ({"scene": None}, {"rim": 2}):
+        with pytest.raises(UsageError, match="got a witness"):
+            gate.Request(
+                **{"scene": scene, "references": tuple(right), "witness": "cycles"} | wrong
+            )
