@@ -8,6 +8,7 @@ are read by `mitsuba.second`.
 
 import json
 import math
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -114,6 +115,17 @@ def write(scene: Scene, folder: Path, threads: int | None = None) -> None:
     if writing.reasons:
         raise IneligibleError("; ".join(writing.reasons))
     (folder / "scene.json").write_text(json.dumps(found), encoding="utf-8")
+
+
+def obstacles(scene: Scene) -> list[str]:
+    """Why Cycles does not vote on a scene, rendered with a box filter; [] if it does."""
+    film = scene.film.model_copy(update={"filter": BoxFilter(), "layers": ()})
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            write(scene.changed(film=film), Path(folder))
+        except IneligibleError as error:
+            return str(error).split("; ")
+    return []
 
 
 def bounces_of(integrator: Any) -> int:

@@ -205,7 +205,8 @@ class _Child:
     def carry_out(self, request: str, seconds: float, say: Callable[[str], None]) -> Ended:
         """See `Children.carry_out`."""
         start, deadline = time.perf_counter(), time.monotonic() + seconds
-        log_start = os.fstat(self._log.fileno()).st_size
+        # What it says before its first request is part of that: it may have failed to start.
+        log_start = os.fstat(self._log.fileno()).st_size if self._cases else 0
         self._cases += 1
         assert self._process.stdin is not None
         # That it is dead already shows at the end of its output.

@@ -2,6 +2,7 @@
 which kernels its picture uses, and which of them are compiled already.
 """
 
+import importlib.metadata
 import re
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -34,7 +35,7 @@ from reference_rt.shapes.csg import Solid
 from reference_rt.shapes.shape import TabulationContext
 from reference_rt.textures import TABLES as TEXTURE_TABLES
 from reference_rt.textures.bitmap import Memory
-from reference_rt.util.errors import printable
+from reference_rt.util.errors import UsageError, printable
 
 Lines = list[tuple[str, str]]
 
@@ -428,6 +429,23 @@ def print_page(scene: Scene) -> None:
             table.add_row(printable(what), printable(why))
         console.print(table)
         console.print()
+
+
+WITNESSES = "reference_rt.witnesses"
+"""The group of entry points of other packages: functions of a scene that return the reasons why a
+renderer may not vote on it."""
+
+
+def print_witness(scene: Scene, name: str) -> None:
+    """Print whether another renderer may vote on a scene's pictures.  Raises UsageError."""
+    known = importlib.metadata.entry_points(group=WITNESSES)
+    if name not in known.names:
+        expected = ", ".join(sorted(known.names)) or "a package that adds one"
+        raise UsageError(f"--witness: expected {expected}, got '{name}'")
+    reasons = known[name].load()(scene)
+    print(f"{name} does not vote:" if reasons else f"{name} votes")
+    for reason in reasons:
+        print(f"  {printable(reason)}")
 
 
 def _by_reason(lines: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:

@@ -133,12 +133,23 @@ def preview(
 
 @app.command()
 @guarded
-def explain(scene: SceneArgument, define: Defaults = None) -> None:
+def explain(
+    scene: SceneArgument,
+    define: Defaults = None,
+    witness: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Whether a third renderer may vote on it: cycles."),
+    ] = None,
+) -> None:
     """Print what a scene uses, how near to float64's limits it is, and its kernels."""
-    from reference_rt.cli.explain import print_page
+    from reference_rt.cli.explain import print_page, print_witness
     from reference_rt.rendering.scene import Scene
 
-    print_page(Scene.load(scene, by_name(define)))
+    loaded = Scene.load(scene, by_name(define))
+    if witness is not None:
+        print_witness(loaded, witness)
+        return
+    print_page(loaded)
 
 
 @app.command("warm-up")

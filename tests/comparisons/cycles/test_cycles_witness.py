@@ -1,14 +1,17 @@
 """Who of three renderers stands alone, and a Cycles that is absent, broken or hangs."""
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import reference_rt as rt
 from comparisons.cycles import backend
 from comparisons.cycles.translate import IneligibleError
 from comparisons.cycles.witness import vote
+from reference_rt.cli.main import app
 from reference_rt.util.errors import ReferenceUnavailableError, UsageError
 
 NAMES = ("ours", "Mitsuba's", "Cycles'")
@@ -146,3 +149,18 @@ def test_the_gate_hears_a_witness(monkeypatch):
             gate.Request(
                 **{"scene": scene, "references": tuple(right), "witness": "cycles"} | wrong
             )
+
+
+@pytest.mark.parametrize(
+    ("scene", "witness", "code", "words"),
+    [
+        ("cornell_box", "cycles", 0, ["cycles votes"]),
+        ("csg_die", "cycles", 0, ["does not vote", "plane", "CSG", "spot"]),
+        ("csg_die", "another", 2, ["--witness: expected cycles"]),
+    ],
+)
+def test_explain_says_who_may_vote(scene, witness, code, words):
+    path = Path(__file__).parents[3] / "scenes" / f"{scene}.yaml"
+    done = CliRunner().invoke(app, ["explain", str(path), "--witness", witness])
+    assert done.exit_code == code
+    assert all(word in done.output for word in words)
