@@ -21,6 +21,7 @@ FLOORS = {
             "geometry",
             "statistics",
             "mitsuba",
+            "pbrt",
             "runs",
             "cycles",
             "rungs",
