@@ -95,6 +95,7 @@ def test_options(integrator, depth, tmp_path):
     assert (
         options["Film"][1].items()
         >= {
+            "string filename": ["out.exr"],
             "integer xresolution": [48],
             "integer yresolution": [32],
             "string sensor": ["cie1931"],

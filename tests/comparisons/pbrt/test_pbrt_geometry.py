@@ -7,6 +7,7 @@ from pbrt_reader import camera_rays, intersect, scene_of, written
 
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling.warp import concentric_disk
+from reference_rt.util.errors import SceneError
 
 # ---- shapes --------------------------------------------------------------------------------------
 
@@ -198,3 +199,20 @@ def test_camera_rays_of_scenes_meet_the_same(name, tmp_path):
     points = np.random.default_rng(6).uniform(size=(300, 2))
     o, d = camera_rays(file, points)
     assert_same_hits(scene, file, tmp_path, o, d)
+
+
+@pytest.mark.slow
+def test_every_scene_is_written_or_refused(tmp_path):
+    """As many as the documentation says."""
+    count = 0
+    paths = sorted(SCENES.glob("*.yaml"))
+    for path in paths:
+        try:
+            written(Scene.load(path), tmp_path)
+            count += 1
+        except SceneError as error:
+            for reason in (error, *error.others):
+                assert reason.path
+                assert reason.message.startswith("pbrt-v4 cannot express ")
+    text = " ".join((SCENES.parent / "docs" / "scenes.md").read_text().split())
+    assert f"{count} of the {len(paths)} scenes of `scenes/` can be written" in text
