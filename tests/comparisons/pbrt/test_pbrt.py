@@ -346,6 +346,19 @@ def test_command(tmp_path):
     assert sum(shape.light is not None for shape in file.shapes) == 1
 
 
+def test_the_files_of_a_former_scene_do_not_outlive_it(tmp_path):
+    np.save(tmp_path / "a.npy", np.ones((2, 2, 3)))
+    papered = scene_of(
+        tmp_path,
+        shapes=[{"type": "sphere", "material": "paper"}],
+        materials={"paper": {"type": "diffuse", "reflectance": "a"}},
+        textures={"a": {"type": "bitmap", "file": "a.npy"}},
+    )
+    for scene, count in ((papered, 1), (scene_of(), 0), (papered, 1)):
+        assert write_pbrt(scene, tmp_path / "out.pbrt")[0] == count
+        assert len([*tmp_path.glob("out_files/*")]) == count
+
+
 REFUSED = {
     "camera": {"camera": {"type": "perspective", "near": 0.1}},
     "integrator": {"integrator": {"type": "whitted"}},
@@ -368,6 +381,11 @@ REFUSED = {
         "shapes": [{"type": "sphere", "material": "paper"}],
         "materials": {"paper": {"type": "diffuse", "reflectance": "turned"}},
         "textures": {"turned": {"type": "checker", "uv": {"rotate": 30}}},
+    },
+    "textures.mirrored": {
+        "shapes": [{"type": "sphere", "material": "wall"}],
+        "materials": {"wall": {"type": "diffuse", "reflectance": "mirrored"}},
+        "textures": {"mirrored": {"type": "bitmap", "file": "a.png", "wrap": "mirror"}},
     },
 }
 
