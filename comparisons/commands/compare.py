@@ -261,7 +261,8 @@ def convert(
         Path, typer.Argument(metavar="SCENE", help="A Mitsuba .xml scene, or one of ours.")
     ],
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="A .yaml, .json or (for Mitsuba) .xml file.")
+        Path,
+        typer.Option("--output", "-o", help="A .yaml, .json, .xml (for Mitsuba) or .pbrt file."),
     ],
     to: Annotated[
         Literal["scene", "json"],
@@ -272,8 +273,8 @@ def convert(
     define: Defaults = None,
     allow_missing: AllowMissing = False,
 ) -> None:
-    """Write a scene in our format, as a Mitsuba scene (.xml), or as data for other renderers
-    (--to json), with its meshes and images in a folder beside it.
+    """Write a scene in our format, for Mitsuba (.xml) or pbrt-v4 (.pbrt), or as data for other
+    renderers (--to json), with its meshes and images in a folder beside it.
 
     Scenes in our format render without Mitsuba.
     """
@@ -281,16 +282,18 @@ def convert(
         from comparisons.mitsuba.writing import write_xml
         from comparisons.mitsuba.writing.files import SUFFIXES, check_name, folder_of, write_scene
         from comparisons.mitsuba.writing.resolved import write_resolved
+        from comparisons.pbrt import write_pbrt
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.files import check_writable
 
-    is_mitsuba = output.suffix.lower() == ".xml" and to == "scene"
-    if to == "scene" and not is_mitsuba:
-        check_name(output, SUFFIXES)
+    others = {".xml": write_xml, ".pbrt": write_pbrt}
+    write = others.get(output.suffix.lower()) if to == "scene" else None
+    if to == "scene" and write is None:
+        check_name(output, (*SUFFIXES, *others))
     check_writable(output)
     found = Scene.load(scene, by_name(define), allow_missing)
-    if is_mitsuba:
-        count, notes = write_xml(found, output)
+    if write is not None:
+        count, notes = write(found, output)
         for note in notes:
             say(f"note: {note}", err=True)
     elif to == "json":

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import platformdirs
 
-from comparisons.experiments.convergence.methods import Method
+from comparisons.experiments.convergence.methods import CYCLES, Method
 from comparisons.experiments.convergence.store import Store
 from comparisons.mitsuba.backend import LLVM, backend
 from comparisons.mitsuba.llvm_libraries import LIBRARY
@@ -38,7 +38,8 @@ def starts_of(
 
     "cold" means empty caches of compiled kernels; the program files are in the system's file cache.
     """
-    sides = list(dict.fromkeys(method.side for method in methods))
+    # Cycles comes in Blender, of which it is a small part: its start is not measured.
+    sides = list(dict.fromkeys(method.side for method in methods if method.side != CYCLES))
     found: dict[str, dict[str, dict[str, float]]] = {}
     for number, side in enumerate(sides):
         say("starts of processes", number / len(sides))

@@ -158,6 +158,7 @@ def write_files(scene: SceneModel, path: Path, text_of: Callable[["Files"], str]
     mark = secrets.token_hex(4)
     temporary, old = (folder.with_name(f".{mark}-{k}-{folder.name}") for k in ("new", "old"))
     files = Files(scene, temporary, folder.name)
+    done = False
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         text = text_of(files)
@@ -167,12 +168,13 @@ def write_files(scene: SceneModel, path: Path, text_of: Callable[["Files"], str]
                 folder.rename(old)
             if temporary.exists():
                 temporary.rename(folder)
+        done = True
     except OSError as error:
         raise ImageError(
             f"{folder}: cannot be written: {error.strerror or error}; expected a writable place"
         ) from None
     finally:
-        if old.exists() and not folder.exists():
+        if not done and old.exists() and not folder.exists():
             with suppress(OSError):
                 old.rename(folder)
         for left in (temporary, old):
