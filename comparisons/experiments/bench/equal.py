@@ -109,12 +109,18 @@ SECONDS = 15.0
 
 QUICK = ("cornell_box", "many_lights", "mesh_knot", "textured_room")
 
-DEFAULT, BEST = "mitsuba_llvm", "mitsuba_llvm_best"
+DEFAULT, BEST, CYCLES = "mitsuba_llvm", "mitsuba_llvm_best", "cycles"
+PEERS = {
+    DEFAULT: "Mitsuba llvm, default sampler",
+    BEST: "Mitsuba llvm, best sampler",
+    CYCLES: "Cycles",
+}
 MEDIAN_GOAL, WORST_GOAL, BEST_GOAL = 0.5, 1.5, 1.0
 
 
 def measure_error(setting: Setting) -> list[Row]:
-    """Median and worst against the default sampler, median against the best one.
+    """Median and worst against the default sampler, median against the best one, and against
+    Cycles where it is installed.
 
     Raises ReferenceUnavailableError.
     """
@@ -172,6 +178,12 @@ def rows(
     what = f"time to {TARGET:.0%} relative error"
     details: dict[str, Any] = {"target": TARGET, "seconds": found, "left_out": left_out}
     details["extrapolated"] = {name: list(who) for name, who in guessed.items() if who}
+    against_cycles = _ratios(found, CYCLES)
+    of_cycles = []
+    if against_cycles:  # where it is installed
+        title = f"{what}, median over {_scenes(against_cycles, CYCLES, guessed)}: / Cycles"
+        args = found, CYCLES, against_cycles, MEDIAN_GOAL, details
+        of_cycles = [_error_row("error_cycles", title, *args)]
     worst = max(against_default, key=lambda name: against_default[name], default="")
     return [
         _error_row("error_default",
@@ -183,7 +195,7 @@ def rows(
             f"the same, the worst scene ({worst}{_worst(worst, DEFAULT, guessed)})",
             found.get(worst, {}).get("ours", math.nan),
             found.get(worst, {}).get(DEFAULT, math.nan),
-            "Mitsuba llvm, default sampler",
+            PEERS[DEFAULT],
             "s",
             against_default.get(worst, math.nan),
             WORST_GOAL,
@@ -195,6 +207,7 @@ def rows(
              f"{what}, median over {_scenes(against_best, BEST, guessed)}: / Mitsuba llvm, "
              "its best sampler",
              found, BEST, against_best, BEST_GOAL, details),
+        *of_cycles,
     ]  # fmt: skip
 
 
@@ -237,7 +250,6 @@ def _error_row(
     details: dict[str, Any],
 ) -> Row:
     """The row of medians over scenes of both times and their ratios, with quartiles over scenes."""
-    sampler = "default" if peer == DEFAULT else "best"
     low, median, high = (math.nan,) * 3
     ours = theirs = math.nan
     if ratios:
@@ -253,7 +265,7 @@ def _error_row(
         title,
         ours,
         theirs,
-        f"Mitsuba llvm, {sampler} sampler",
+        PEERS[peer],
         "s",
         median,
         goal,

@@ -133,7 +133,7 @@ GROUPS = (
     Group("equal_samples", tuple(equal.VARIANTS), equal.measure_samples),
     Group(
         "equal_error",
-        ("error_default", "error_default_worst", "error_best"),
+        ("error_default", "error_default_worst", "error_best", "error_cycles"),
         equal.measure_error,
     ),
     Group(

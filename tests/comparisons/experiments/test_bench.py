@@ -132,11 +132,12 @@ def test_what_is_no_number_is_null() -> None:
 def test_equal_error_takes_the_median_of_the_scenes_ratios() -> None:
     times = {
         "a": {"ours": 1.0, "mitsuba_llvm": 4.0, "mitsuba_llvm_best": 2.0},
-        "b": {"ours": 1.0, "mitsuba_llvm": 2.0, "mitsuba_llvm_best": 1.0},
+        "b": {"ours": 1.0, "mitsuba_llvm": 2.0, "mitsuba_llvm_best": 1.0, "cycles": 5.0},
         "c": {"ours": 3.0, "mitsuba_llvm": 1.5},
         "d": {"mitsuba_llvm": 1.5},
     }
-    median, worst, best = equal.rows(times, {"e": "why"})
+    median, worst, best, cycles = equal.rows(times, {"e": "why"})
+    assert (cycles.name, cycles.ratio) == ("error_cycles", 0.2)
     assert (median.ratio, median.met) == (0.5, True)
     assert (worst.ratio, worst.met, worst.details["worst"]) == (2.0, False, "c")
     assert (best.ratio, best.met) == (0.75, True)
