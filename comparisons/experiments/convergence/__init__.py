@@ -39,8 +39,8 @@ def reached(scene: Scene, target: float, seconds: float) -> "dict[str, Target]":
     budget of all methods together, without compilation.  Methods: "ours", "mitsuba_llvm",
     "mitsuba_llvm_best" (its best sampler), "mitsuba_scalar", "cycles".  A method that cannot render
     the scene, or not within the budget, is absent; the time of one with a proven bias above the
-    target is infinite.  Times are medians of warm renders on all cores, interpolated between rungs, or
-    "extrapolated" by a fit beyond the last rung.
+    target is infinite.  Times are medians of warm renders on all cores, interpolated between rungs,
+    or "extrapolated" by a fit beyond the last rung.
 
     Raises SceneError, ReferenceUnavailableError; ValueError for a deterministic scene.
     """
