@@ -1,7 +1,8 @@
 """Makes docs/pictures/ and docs/gallery.md: `python docs/make_pictures.py [NAME...]`.
 
-The gallery has every scene of scenes/; the first picture of README.md is a comparison with Mitsuba.
-NAME: only the pictures of these scenes, or `compare`; the page is always written.
+The gallery has every scene of scenes/; the first picture of README.md is a comparison with Mitsuba;
+the pictures of docs/truth.md are the formulas' own.  NAME: only the pictures of these scenes, or
+`compare`, or `truth`; the page is always written.
 """
 
 import sys
@@ -11,10 +12,13 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from docs_pages import DOCS, save
+from PIL import Image
 
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, gather
 from comparisons.compare.judge import judge
+from comparisons.truth.case import cases
+from comparisons.truth.outputs import formula_picture
 from reference_rt import Scene, render
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.image import display, srgb
@@ -34,8 +38,8 @@ LARGE = (
     "mesh_knot",
     "csg_dice",
 )
-WIDE, NARROW = 400, 240
-"""Widths in pixels of the large pictures, and of the others."""
+WIDE, NARROW, TRUTH = 400, 240, 96
+"""Widths in pixels of the large pictures, of the others, and of those of truth."""
 
 SAMPLES = 128
 """Least samples per pixel of pictures with noise."""
@@ -53,7 +57,7 @@ def main() -> None:
     """Write all pictures and the page."""
     (PICTURES / "scenes").mkdir(parents=True, exist_ok=True)
     paths = sorted(SCENES.glob("*.yaml"))
-    wanted = sys.argv[1:] or [*(path.stem for path in paths), "compare"]
+    wanted = sys.argv[1:] or [*(path.stem for path in paths), "compare", "truth"]
     for path in paths:
         if path.stem in wanted:
             picture_of(path)
@@ -61,6 +65,8 @@ def main() -> None:
         temporary.write_text("\n".join(page(paths)) + "\n", encoding="utf-8")
     if "compare" in wanted:
         comparison()
+    if "truth" in wanted:
+        formulas()
 
 
 def picture_of(path: Path) -> None:
@@ -145,6 +151,17 @@ def comparison() -> None:
     with replacing(PICTURES / "compare.png") as temporary:
         figure.savefig(temporary, dpi=110, format="png")
     print(case.verdict, case.reason)
+
+
+def formulas() -> None:
+    """What each case of truth expects, as PNG."""
+    (PICTURES / "truth").mkdir(exist_ok=True)
+    for case in cases().values():
+        values = np.rint(formula_picture(case.compute())).astype(np.uint8)
+        size = -(-TRUTH // len(values))
+        image = Image.fromarray(values.repeat(size, axis=0).repeat(size, axis=1))
+        with replacing(PICTURES / "truth" / f"{case.name}.png") as temporary:
+            image.save(temporary, "PNG", optimize=True)
 
 
 def shown(image: FloatArray) -> FloatArray:

@@ -50,8 +50,9 @@ class Expected:
 
 @dataclass(frozen=True)
 class Case:
-    """name: of the case and its scene file;  area: a key of AREAS;  formula: in one line;  tests:
-    what a renderer must do for it;  source: of the formula;  derivation: in a few sentences."""
+    """name: of the case and its scene file;  area: a key of AREAS;  formula: in one line, with
+    LaTeX between dollars;  tests: what a renderer must do for it;  source: of the formula;
+    derivation: in a few sentences."""
 
     name: str
     area: str

@@ -1,5 +1,6 @@
 """The results of truth for people and machines: a table, `results.json`, a page, a badge."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -118,6 +119,7 @@ def write(out: Path, rows: Sequence[Row], provenance: Mapping[str, Any]) -> None
         areas=[(AREAS[a], [r for r in rows if r.case.area == a]) for a in AREAS],
         signs=SIGNS,
         triple=_triple,
+        plain=plain_formula,
         number=_number,
     )
     write_text(out / "report.html", page)
@@ -172,7 +174,7 @@ def score_card(rows: Sequence[Row], width: int) -> RenderableType:
 
 
 def markdown(rows: Sequence[Row], provenance: Mapping[str, Any]) -> str:
-    """The tables of docs/truth.md: a line for each case, with a cell for each renderer."""
+    """The tables of docs/truth.md: a line for each case, with what docs/make_pictures.py shows."""
     renderers = list(dict.fromkeys(row.renderer for row in rows))
     text = ["| area | " + " | ".join(renderers) + " |", "|---" * (len(renderers) + 1) + "|"]
     right = {(a, r): f"{n} of {m}" for a, r, n, m in scores(rows)}
@@ -181,17 +183,26 @@ def markdown(rows: Sequence[Row], provenance: Mapping[str, Any]) -> str:
         cells = [right.get((area, renderer), "") for renderer in renderers]
         text.append(f"| {AREAS[area]} | {' | '.join(cells)} |")
     for area in areas:
-        text += ["", f"### {AREAS[area].capitalize()}", ""]
-        text += ["| case | formula | what it tests | " + " | ".join(renderers) + " |"]
-        text += ["|---" * (len(renderers) + 3) + "|"]
+        text += ["", f"### {AREAS[area].capitalize()}", "", "| picture | case |", "|---|---|"]
         for name in dict.fromkeys(row.case.name for row in rows if row.case.area == area):
-            some = {row.renderer: row for row in rows if row.case.name == name}
-            case = next(iter(some.values())).case
-            formula = case.formula.replace("|", "\\|").replace("*", "\\*")
-            cells = [_cell(some[r]) if r in some else "" for r in renderers]
-            text.append(f"| `{name}` | {formula} | {case.tests} | {' | '.join(cells)} |")
+            some = [row for row in rows if row.case.name == name]
+            text.append(f"| ![{name}](pictures/truth/{name}.png) | {_words(some)} |")
     where = f"{provenance['machine']}, {provenance['cores']} cores, {provenance['date'][:10]}"
     return "\n".join([*text, "", f"`reference-rt truth`; {where}.", ""])
+
+
+def _words(rows: Sequence[Row]) -> str:
+    """What a page says about a case: one cell of a table."""
+    case = rows[0].case
+    source = "" if case.source == "elementary" else f" ({case.source})"
+    large = re.sub(r"\$([^$]*\\(?:frac|sum|int)[^$]*)\$", r"$\\displaystyle \1$", case.formula)
+    parts = [
+        f"`{case.name}`: {case.tests}",
+        f"{large}{source}",
+        case.derivation.replace("|", "\\|").replace("*", "\\*"),
+        "; ".join(f"{row.renderer}: {_cell(row)}" for row in rows),
+    ]
+    return "<br>".join(parts)
 
 
 def _cell(row: Row) -> str:
@@ -200,6 +211,24 @@ def _cell(row: Row) -> str:
         return row.status
     sign = "" if row.status == "right" else f"**{row.status}** "
     return f"{sign}{j.percent:+.3f} ± {j.power:.2g} %"
+
+
+def plain_formula(formula: str) -> str:
+    """A case's formula without LaTeX, for pages that do not typeset it."""
+    text, before = formula.replace("$", "").replace(r"\cdot", "."), ""
+    while text != before:  # innermost braces first
+        before = text
+        text = re.sub(r"_\{(\w+)\}", r"_\1", text)
+        text = re.sub(r"\\sqrt\{([^{}]*)\}", r"sqrt(\1)", text)
+        text = re.sub(r"\\frac\{([^{}]*)\}\{([^{}]*)\}", _quotient, text)
+    text = re.sub(r"\\([A-Za-z]+)", r" \1", text)
+    return re.sub(r"\( +", "(", " ".join(text.split()))
+
+
+def _quotient(found: re.Match[str]) -> str:
+    above, below = found.groups()
+    above = f"({above})" if re.search(" [+-] ", above) else above
+    return f"{above} / ({below})" if " " in below else f"{above} / {below}"
 
 
 def _number(x: float) -> str:
@@ -212,11 +241,17 @@ def _triple(values: Sequence[float]) -> str:
     return shown[0] if len(set(shown)) == 1 else ", ".join(shown)
 
 
+def formula_picture(expected: Expected) -> FloatArray:
+    """(height, width, 3), from 0 to 255; what the formula does not state is grey."""
+    stated = expected.stated[..., None]
+    truth = np.where(stated, expected.pixels, 0.0)
+    return np.where(stated, 255.0 * encode(truth, white_level(truth)), 128.0)
+
+
 def _shown(expected: Expected, mean: FloatArray) -> tuple[tuple[str, str], ...]:
     """Formula, picture and difference; what the formula does not state is grey."""
     stated = expected.stated[..., None]
     truth = np.where(stated, expected.pixels, 0.0)
-    white = white_level(truth)
     grey = np.full_like(truth, 128.0)
     difference = np.where(stated, mean - truth, 0.0)
     worst = np.take_along_axis(difference, np.abs(difference).argmax(axis=-1)[..., None], axis=-1)
@@ -224,7 +259,7 @@ def _shown(expected: Expected, mean: FloatArray) -> tuple[tuple[str, str], ...]:
     end = np.where(worst > 0.0, RED, BLUE)
     red_blue = WHITE + np.abs(worst) / span * (end - np.array(WHITE))
     return (
-        ("formula", png_url(np.where(stated, 255.0 * encode(truth, white), grey))),
-        ("picture", png_url(255.0 * encode(np.maximum(mean, 0.0), white))),
+        ("formula", png_url(formula_picture(expected))),
+        ("picture", png_url(255.0 * encode(np.maximum(mean, 0.0), white_level(truth)))),
         (f"difference, up to {span:.2g}", png_url(np.where(stated, red_blue, grey))),
     )

@@ -89,6 +89,14 @@ def test_every_scene_is_in_the_gallery() -> None:
     assert missing == []  # docs/make_pictures.py adds them
 
 
+def test_every_case_of_truth_is_on_its_page() -> None:
+    page = (ROOT / "docs/truth.md").read_text(encoding="utf-8")
+    names = [path.stem for path in (ROOT / "scenes/truth").glob("*.yaml")]
+    missing = [n for n in names if f"(pictures/truth/{n}.png) | `{n}`" not in page]
+    assert missing == []  # docs/make_pictures.py truth, and reference-rt truth --markdown
+    assert [n for n in names if not re.search(f"^{n} +[●○.]", page, re.M)] == []  # make_faults.py
+
+
 def test_every_page_is_in_the_contents() -> None:
     contents = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     pages = [

@@ -25,7 +25,6 @@ Albedo = Callable[[FloatArray], FloatArray]
 """Of cosines (...), (...) or (..., 3)."""
 
 WIDTH = 2.4
-FURNACE = "albedo times sky"
 FRESNEL = "Fresnel's equations"
 
 
@@ -64,19 +63,19 @@ def _uniform(albedo: FloatArray) -> Expected:
     return Expected(mix(coverage(film, 32, 32), albedo * SKY, SKY), 1e-9)
 
 
-@case("rho times sky", "a matte ball in a furnace")
+@case(r"$\rho L$", "a matte ball in a furnace")
 def diffuse_furnace() -> Expected:
     """A matte surface sends back its reflectance, in all directions."""
     return _uniform(RHO)
 
 
-@case("rho times sky", "a mirror ball in a furnace")
+@case(r"$\rho L$", "a mirror ball in a furnace")
 def mirror_furnace() -> Expected:
     """A mirror shows the sky times its reflectance."""
     return _uniform(np.array([0.9, 0.6, 0.3]))
 
 
-@case("sky", "glass loses no light, whatever it bends and mirrors")
+@case(r"$L$", "glass loses no light, whatever it bends and mirrors")
 def glass_furnace() -> Expected:
     """Reflectance and transmittance are 1 together; radiance over the index squared is the same
     along a ray: a ball of glass cannot be seen."""
@@ -84,27 +83,29 @@ def glass_furnace() -> Expected:
 
 
 @case(
-    "F(cos) times sky, F of a complex index", "a metal's Fresnel reflectance", "Born & Wolf, 14.2"
+    r"$F(\cos\theta) L$, $F$ of a complex index",
+    "a metal's Fresnel reflectance",
+    "Born & Wolf, 14.2",
 )
 def metal_furnace() -> Expected:
     """The mean of the reflectances of both polarisations."""
     return _ball(lambda c: np.stack([fresnel_metal(c, *pair) for pair in GOLD], axis=-1))
 
 
-@case("F(cos) times sky", "the reflectance of glass at every angle", FRESNEL)
+@case(r"$F(\cos\theta) L$", "the reflectance of glass at every angle", FRESNEL)
 def glass_reflection() -> Expected:
     """The glass's transmittance is set to 0."""
     return _plane(lambda c: fresnel(c, 1.5))
 
 
-@case("(F + (1 - F) / eta^2) sky", "radiance changes with the index squared", FRESNEL)
+@case(r"$(F + \frac{1 - F}{\eta^2}) L$", "radiance changes with the index squared", FRESNEL)
 def glass_boundary() -> Expected:
     """One boundary, and the same radiance from both sides.  What comes out of glass fills eta^2
     times the solid angle that it had inside."""
     return _plane(lambda c: fresnel(c, 1.5) + (1.0 - fresnel(c, 1.5)) / 2.25)
 
 
-@case("(F + (1 - F) eta^2) sky; F = 1 beyond the critical angle", "total reflection", FRESNEL)
+@case(r"$(F + (1 - F) \eta^2) L$, $F = 1$ beyond the critical angle", "total reflection", FRESNEL)
 def glass_from_inside() -> Expected:
     """As `glass_boundary`, seen from the glass: all that comes in is within the critical angle,
     41.8 degrees, and eta^2 as bright.  Pixels that it crosses are not stated."""
@@ -120,14 +121,14 @@ def glass_from_inside() -> Expected:
     return _plane(radiance, 1e-8, view)
 
 
-@case("2 F / (1 + F) times sky", "a thin pane's reflectance, all bounces within", "Stokes 1862")
+@case(r"$\frac{2 F}{1 + F} L$", "a thin pane's reflectance, all bounces within", "Stokes 1862")
 def pane_reflection() -> Expected:
     """Light is mirrored by the front, or passes it and is mirrored by the back an odd number of
     times: F + (1 - F)^2 F / (1 - F^2)."""
     return _plane(lambda c: 2.0 * fresnel(c, 1.5) / (1.0 + fresnel(c, 1.5)))
 
 
-@case("(1 - F) / (1 + F) times sky", "a thin pane's transmittance", "Stokes 1862")
+@case(r"$\frac{1 - F}{1 + F} L$", "a thin pane's transmittance", "Stokes 1862")
 def pane_transmission() -> Expected:
     """What `pane_reflection` leaves."""
     return _plane(lambda c: (1.0 - fresnel(c, 1.5)) / (1.0 + fresnel(c, 1.5)))
@@ -147,20 +148,22 @@ def _panes(count: int) -> Expected:
     return _plane(radiance)
 
 
-@case("(1 - R) lamp + R sky, R = 6 F / (1 + 5 F)", "a stack of three panes", "Stokes 1862")
+@case(
+    r"$(1 - R) L_{lamp} + R L$, $R = \frac{6 F}{1 + 5 F}$", "a stack of three panes", "Stokes 1862"
+)
 def stack_of_panes() -> Expected:
     """N panes mirror 2 N F / (1 + (2 N - 1) F): adding one to the stack sums a geometric series of
     bounces between it and the others."""
     return _panes(3)
 
 
-@case("(1 - R) lamp + R sky, R = 2 F / (1 + F)", "a thick slab of glass: two boundaries")
+@case(r"$(1 - R) L_{lamp} + R L$, $R = \frac{2 F}{1 + F}$", "a thick slab of glass: two boundaries")
 def slab() -> Expected:
     """As `stack_of_panes` with one pane, which refracts: factors of the index cancel."""
     return _panes(1)
 
 
-@case("sum over k of rho^k L, of both sides in turn", "two mirrors that face each other")
+@case(r"$\sum_k \rho^k L_k$, of both sides in turn", "two mirrors that face each other")
 def facing_mirrors() -> Expected:
     """Each mirror shines by itself, with a and b, and mirrors the other's image: a + rho b + rho^2
     a + ...  The path is cut after 12 edges."""
@@ -173,7 +176,10 @@ def facing_mirrors() -> Expected:
     return Expected(pixels, 1e-4)
 
 
-@case("rho^3 L, area of the triangle turned by 180 degrees", "three mirrors send light back")
+@case(
+    r"$\rho^3 L A$, $A$ the area of the triangle turned by 180 degrees",
+    "three mirrors send light back",
+)
 def retro_reflector() -> Expected:
     """A ray that meets three mirrors at right angles leaves against its direction, on the other
     side of the axis through their corner: a triangle behind the camera is seen turned."""
@@ -214,20 +220,20 @@ def _lit_ball(f: Callable[[FloatArray, FloatArray, int], FloatArray]) -> Expecte
 MICROFACETS = "Walter et al. 2007"
 
 
-@case("D G F / (4 cos) E", "a rough metal (GGX) in one light", MICROFACETS)
+@case(r"$\frac{D G F}{4 \cos\theta} E$", "a rough metal (GGX) in one light", MICROFACETS)
 def ggx_in_light() -> Expected:
     """D is GGX's distribution of normals, G Smith's masking of both directions, F Fresnel's
     reflectance at the half vector."""
     return _lit_ball(lambda wi, wo, k: rough_metal(wi, wo, 0.4, *GOLD[k], name="ggx"))
 
 
-@case("D G F / (4 cos) E", "a rough metal (Beckmann) in one light", MICROFACETS)
+@case(r"$\frac{D G F}{4 \cos\theta} E$", "a rough metal (Beckmann) in one light", MICROFACETS)
 def beckmann_in_light() -> Expected:
     """As `ggx_in_light`, with Beckmann's distribution and its exact masking."""
     return _lit_ball(lambda wi, wo, k: rough_metal(wi, wo, 0.4, *GOLD[k], name="beckmann"))
 
 
-@case("(kd n . l + ks (r . v)^p) E", "the textbook's local shading", "Phong 1975")
+@case(r"$(k_d (n \cdot l) + k_s (r \cdot v)^p) E$", "the textbook's local shading", "Phong 1975")
 def phong_in_light() -> Expected:
     """The highlight's cosine is that of the light's direction and the mirrored view."""
 
@@ -251,21 +257,29 @@ def _rough_ball(name: str) -> Expected:
     return _ball(albedo, 2e-5)
 
 
-@case("integral of D G F / (4 cos) times sky", "the albedo of a rough metal (GGX)", MICROFACETS)
+@case(
+    r"$L \int \frac{D G F}{4 \cos\theta} d\omega$", "the albedo of a rough metal (GGX)", MICROFACETS
+)
 def ggx_furnace() -> Expected:
     """The integral over half vectors, on a grid of the distribution's own quantiles."""
     return _rough_ball("ggx")
 
 
 @case(
-    "integral of D G F / (4 cos) times sky", "the albedo of a rough metal (Beckmann)", MICROFACETS
+    r"$L \int \frac{D G F}{4 \cos\theta} d\omega$",
+    "the albedo of a rough metal (Beckmann)",
+    MICROFACETS,
 )
 def beckmann_furnace() -> Expected:
     """As `ggx_furnace`."""
     return _rough_ball("beckmann")
 
 
-@case("integral of D G (F + (1 - F) / eta^2) times sky", "a rough boundary of glass", MICROFACETS)
+@case(
+    r"$L \int D G (F + \frac{1 - F}{\eta^2}) \frac{v \cdot m}{\cos\theta} dm$",
+    "a rough boundary of glass",
+    MICROFACETS,
+)
 def rough_boundary() -> Expected:
     """As `glass_boundary`, with the masking of the direction that a half vector refracts to."""
 
@@ -291,7 +305,7 @@ def _coat(eta: float, rho: FloatArray) -> Albedo:
     return albedo
 
 
-COAT = "F + (1 - F) rho (1 - F_in) / (1 - rho F_in), times sky"
+COAT = r"$(F + (1 - F) \frac{\rho (1 - F_{in})}{1 - \rho F_{in}}) L$"
 
 
 @case(COAT, "a matte base under a clear coat", "Saunderson 1942")
@@ -307,19 +321,19 @@ def plastic_dense_furnace() -> Expected:
     return _ball(_coat(2.4, RHO))
 
 
-@case("((1 - w) rho + w r) sky", "a blend of a matte base and a mirror")
+@case(r"$((1 - w) \rho + w r) L$", "a blend of a matte base and a mirror")
 def blend_furnace() -> Expected:
     """A mixture of materials is linear in its weight, whatever it is sampled by."""
     return _uniform(0.7 * RHO + 0.3 * np.array([0.2, 0.6, 0.9]))
 
 
-@case("o rho sky + (1 - o) sky", "a mask that is open in part")
+@case(r"$(o \rho + 1 - o) L$", "a mask that is open in part")
 def mask_furnace() -> Expected:
     """A matte disk of opacity 0.4, in front of the sky, both sides alike."""
     return _uniform(0.4 * RHO + 0.6)
 
 
-@case("rho E / (pi d^2) cos, times the opacity", "a mask in the light of a point")
+@case(r"$o \frac{\rho I \cos\theta}{\pi d^2}$, $o$ the opacity", "a mask in the light of a point")
 def mask_in_light() -> Expected:
     """A matte floor of opacity 0.5: half of the light meets it, and is not counted twice."""
     place = level(2.0, 32)
@@ -331,7 +345,7 @@ def mask_in_light() -> Expected:
     return Expected(0.5 * pixel_means(radiance, 32, 32))
 
 
-@case("front or back reflectance times sky", "the sides of a sheet")
+@case(r"$\rho L$ of the front or the back", "the sides of a sheet")
 def two_sides() -> Expected:
     """Of two squares, the right one shows its back."""
     pixels = np.empty((32, 32, 3))
@@ -339,7 +353,7 @@ def two_sides() -> Expected:
     return Expected(pixels)
 
 
-@case("A + T rho (1 - R_out) / (1 - rho R_in), times sky", "a rough clear coat", MICROFACETS)
+@case(r"$(A + T \frac{\rho (1 - R_{out})}{1 - \rho R_{in}}) L$", "a rough clear coat", MICROFACETS)
 def rough_plastic_furnace() -> Expected:
     """As `plastic_furnace` with a rough boundary: A is its albedo, T what it lets pass (of one
     microfacet each), (1 - R_out) the mean of T over a matte light from outside, over the index

@@ -38,13 +38,13 @@ def _point(
     return np.asarray(to @ n / (to**2).sum(axis=-1) ** 1.5)
 
 
-@case("rho I h / (pi d^3)", "the inverse square, and the cosine")
+@case(r"$\frac{\rho I h}{\pi d^3}$", "the inverse square, and the cosine")
 def point_over_floor() -> Expected:
     """Irradiance is I cos / d^2, and the cosine h / d."""
     return _floor(lambda x, y: _point(x, y, (0.5, 0.3, 1.0), (0, 0, 1)), INTENSITY)
 
 
-@case("rho I (n . l) / (pi d^3)", "the cosine at a tilted surface")
+@case(r"$\frac{\rho I (n \cdot l)}{\pi d^3}$", "the cosine at a tilted surface")
 def point_over_slope() -> Expected:
     """As `point_over_floor`, on a plane that is tilted by 40 degrees about the x axis."""
     a = np.radians(40.0)
@@ -52,7 +52,9 @@ def point_over_slope() -> Expected:
     return _floor(lambda x, y: _point(x, y, (0.5, -1.0, 1.5), normal), INTENSITY)
 
 
-@case("sum of rho I h / (pi d^3)", "lights add up, whatever the odds of their choice")
+@case(
+    r"$\sum_k \frac{\rho I_k h_k}{\pi d_k^3}$", "lights add up, whatever the odds of their choice"
+)
 def three_points() -> Expected:
     """Light is linear: three lights of different colour, one 50 times as bright as the others."""
     parts = [
@@ -66,7 +68,7 @@ def three_points() -> Expected:
     return Expected(np.sum(parts, axis=0))
 
 
-@case("rho I s(angle) cos / (pi d^2)", "a spot's beam, fall-off and cut-off")
+@case(r"$\frac{\rho I s(\alpha) \cos\theta}{\pi d^2}$", "a spot's beam, fall-off and cut-off")
 def spot_falloff() -> Expected:
     """s is 1 within the beam (10 degrees), 0 beyond the cut-off (25), and linear in the angle
     between.  Pixels that the two circles may cross are not stated: s has kinks there."""
@@ -84,7 +86,10 @@ def spot_falloff() -> Expected:
     return _floor(irradiance, INTENSITY)
 
 
-@case("rho E / (pi d^2), times the area of the image in the pixel", "a projector's even image")
+@case(
+    r"$\frac{\rho E}{\pi d^2} A$, $A$ the area of the image in the pixel",
+    "a projector's even image",
+)
 def projector() -> Expected:
     """A white image lights a plane across the axis evenly, with E / d^2 at the distance d.  45
     degrees span its width, which is 1.5 times its height."""
@@ -94,7 +99,7 @@ def projector() -> Expected:
     return Expected(mix(drawn_from_above(corners, 4.0, 32), RHO * INTENSITY / 4.0 / np.pi))
 
 
-@case("rho E cos / pi", "a directional light on two slopes")
+@case(r"$\frac{\rho E \cos\theta}{\pi}$", "a directional light on two slopes")
 def directional_on_roof() -> Expected:
     """The slopes of a roof, tilted by 30 degrees about y, have normals (-1/2, 0, sqrt 3 / 2) and
     (1/2, 0, sqrt 3 / 2).  The light comes from (0.5, 0.2, 1)."""
@@ -114,7 +119,7 @@ def disk(r2: FloatArray, height: float, radius: float) -> FloatArray:
 
 
 @case(
-    "rho L / 2 (1 - (h^2 + r^2 - a^2) / sqrt((h^2 + r^2 + a^2)^2 - 4 a^2 r^2))",
+    r"$\frac{\rho L}{2} (1 - \frac{h^2 + r^2 - a^2}{\sqrt{(h^2 + r^2 + a^2)^2 - 4 a^2 r^2}})$",
     "a disk lamp",
     "Howell & Mengüç, A Catalog of Radiation Transfer Configuration Factors, B-13",
 )
@@ -123,7 +128,7 @@ def disk_lamp() -> Expected:
     return _floor(lambda x, y: disk((x - 0.7) ** 2 + y**2, 1.5, 0.9))
 
 
-LAMBERT = "rho L / (2 pi) sum over edges of angle times cosine"
+LAMBERT = r"$\frac{\rho L}{2 \pi} \sum_k \beta_k \cos\gamma_k$, over edges, $\beta$ their angles"
 
 
 @case(LAMBERT, "a rectangle lamp, tilted", "Lambert 1760")
@@ -163,7 +168,7 @@ def box_lamp() -> Expected:
     return _floor(irradiance)
 
 
-@case("rho L (r / d)^2 cos", "a sphere lamp", "Howell & Mengüç, B-42")
+@case(r"$\rho L \frac{r^2}{d^2} \cos\theta$", "a sphere lamp", "Howell & Mengüç, B-42")
 def sphere_lamp() -> Expected:
     """A sphere wholly above the horizon: its projected solid angle is pi (r / d)^2 cos."""
 
@@ -175,7 +180,8 @@ def sphere_lamp() -> Expected:
 
 
 @case(
-    "rho L / pi (pi / 2 - asin(q / (h sin)) + (cos acos(-q cot) - q sqrt(1 - h^2 cos^2)) / h^2)",
+    r"$\frac{\rho L}{\pi} (\frac{\pi}{2} - \arcsin(\frac{q}{h \sin\theta}) + "
+    r"\frac{\cos\theta \arccos(-q \cot\theta) - q \sqrt{1 - h^2 \cos^2\theta}}{h^2})$",
     "a sphere lamp that the floor cuts",
     "Howell & Mengüç, B-43",
 )
@@ -193,7 +199,10 @@ def setting_sphere() -> Expected:
     return _floor(irradiance, width=3.0)
 
 
-@case("rho L / pi times the integral of cos cos' / d^2 over the side that is seen", "a tube lamp")
+@case(
+    r"$\frac{\rho L}{\pi} \int \frac{\cos\theta \cos\theta'}{d^2} dA$ over the side that is seen",
+    "a tube lamp",
+)
 def tube_lamp() -> Expected:
     """A level tube, seen from points below it and between its ends, shows the part of its side
     whose normals point at them, and no cap.  Gauss's rule in angle and length, 32 x 32."""
@@ -229,7 +238,9 @@ def checkered_lamp() -> Expected:
     return Expected(total)
 
 
-@case("sum of the formulas of a sphere, a disk and a triangle", "lamps of different kinds add up")
+@case(
+    r"$\sum_k \rho L_k F_k$ of a sphere, a disk and a triangle", "lamps of different kinds add up"
+)
 def three_lamps() -> Expected:
     """As `sphere_lamp`, `disk_lamp` and `triangle_lamp`, none of which hides another."""
 
@@ -253,7 +264,11 @@ def lamp_back() -> Expected:
     return _floor(lambda x, y: floor_irradiance(corners, x, y))
 
 
-@case("rho (a + b n_y 2/3)", "an environment map over slopes", "Ramamoorthi & Hanrahan 2001")
+@case(
+    r"$\rho (a + \frac{2}{3} b n_y)$",
+    "an environment map over slopes",
+    "Ramamoorthi & Hanrahan 2001",
+)
 def harmonic_sky() -> Expected:
     """A sky of radiance a + b y sends pi a + b n_y 2 pi / 3 to the normal n: the clamped cosine
     scales harmonics of order 1 by 2/3.  Seen on a sphere: n_y = y.  The map's 64 rows are linear

@@ -19,7 +19,7 @@ SECOND = np.array([[0.9, 0.2, -1.0], [1.6, 0.1, -0.4], [1.3, 1.0, -0.8]])
 WARM, COLD = np.array([1.0, 0.5, 0.2]), np.array([0.2, 0.8, 1.5])
 RHO = np.array([0.8, 0.5, 0.2])
 
-AREA = "area of the projected outline in the pixel"
+AREA = r"$L A$, $A$ the area of the projected outline in the pixel"
 
 
 def _triangles(view: View) -> Expected:
@@ -73,7 +73,10 @@ def orthographic() -> Expected:
     return Expected(mix(first, WARM) + mix(second, COLD))
 
 
-@case("area of the outline between the clipping planes", "the near and the far clipping plane")
+@case(
+    r"$L A$, $A$ the area of the outline between the clipping planes",
+    "the near and the far clipping plane",
+)
 def clipped() -> Expected:
     """The plane z = x, seen from z = 4 along -z: depth 4 - x.  Near 3.4 and far 4.75 leave -0.75 <
     x < 0.6, whose images are lines of equal depth."""
@@ -83,7 +86,10 @@ def clipped() -> Expected:
     return Expected(mix(view.drawn(strip), WARM))
 
 
-@case("area of the ellipse in which the tangents' cone meets the film", "spheres: every pixel")
+@case(
+    r"$L A$, $A$ the area of the ellipse in which the tangents' cone meets the film",
+    "spheres: every pixel",
+)
 def sphere_outline() -> Expected:
     """Rays that touch a sphere make a cone with the sine r / d.  Off the axis the film cuts it in
     an ellipse."""
@@ -92,7 +98,7 @@ def sphere_outline() -> Expected:
     return Expected(mix(view.sphere((0.8, 0.5, 0), 0.7), WARM, (0.05, 0.1, 0.2)), 1e-9)
 
 
-@case("area of the convex hull of eight projected corners", "boxes under rotation")
+@case(r"$L A$, $A$ the area of the convex hull of eight projected corners", "boxes under rotation")
 def box_outline() -> Expected:
     """The silhouette of a convex solid is the hull of its corners' images."""
     from scipy.spatial import ConvexHull
@@ -109,7 +115,10 @@ def box_outline() -> Expected:
     return Expected(mix(share, WARM, (0.05, 0.1, 0.2)))
 
 
-@case("rho I cos^3 / (pi h^2)", "depth: the inverse square of the distance, at every pixel")
+@case(
+    r"$\frac{\rho I \cos^3\theta}{\pi h^2}$",
+    "depth: the inverse square of the distance, at every pixel",
+)
 def depth_of_plane() -> Expected:
     """A point light of intensity I at the eye, a plane across the view at distance h: a ray at the
     angle t meets it at h / cos t, at the angle t."""
@@ -122,7 +131,7 @@ def depth_of_plane() -> Expected:
     return Expected(pixel_means(radiance, 32, 32))
 
 
-@case("rho I cos / (pi d^2)", "depth and normal of a sphere")
+@case(r"$\frac{\rho I \cos\theta}{\pi d^2}$", "depth and normal of a sphere")
 def depth_of_sphere() -> Expected:
     """A point light at the eye.  The first hit is the smaller root of the quadratic; the normal is
     radial.  All pixels lie within the outline."""
@@ -145,10 +154,7 @@ def _lit(normal_z: FloatArray) -> FloatArray:
     return np.asarray(normal_z[..., None] * RHO * 4.0 / np.pi)
 
 
-LIT = "rho E n_z / pi"
-
-
-@case("rho E sqrt(1 - r^2) / pi", "normals of a sphere")
+@case(r"$\frac{\rho E}{\pi} \sqrt{1 - r^2}$", "normals of a sphere")
 def sphere_normals() -> Expected:
     """Parallel light along the view: the cosine is that of the sphere's normal.  Pixels within 0.9
     of the radius, where the root is smooth."""
@@ -160,7 +166,7 @@ def sphere_normals() -> Expected:
     return Expected(seen_from_above(radiance, 2.0, 32, 10), 1e-9)
 
 
-@case("rho E sqrt(1 - ((r - R) / a)^2) / pi", "roots and normals of a torus")
+@case(r"$\frac{\rho E}{\pi} \sqrt{1 - (r - R)^2 / a^2}$", "roots and normals of a torus")
 def torus_normals() -> Expected:
     """A torus seen along its axis: at the distance r from it, the tube's circle has this normal.
     Pixels whose distance from the tube's middle is below 0.8 of its radius."""
@@ -172,7 +178,7 @@ def torus_normals() -> Expected:
     return Expected(seen_from_above(radiance, 3.2, 32, 10), 1e-8)
 
 
-@case("rho E / (pi sqrt(1 + (h/R)^-2))", "a cone's slope, and its outline")
+@case(r"$\frac{\rho E}{\pi \sqrt{1 + R^2 / h^2}}$", "a cone's slope, and its outline")
 def cone_normals() -> Expected:
     """A cone seen along its axis has one cosine, R / sqrt(R^2 + h^2), over the disk of its base."""
     c, s = turn()
@@ -180,7 +186,7 @@ def cone_normals() -> Expected:
     return Expected(mix(share, RHO * 4.0 / np.pi * 0.9 / np.hypot(0.9, 1.2)), 1e-9)
 
 
-@case("rho E sqrt(1 - (y / R)^2) / pi", "a cylinder across the view")
+@case(r"$\frac{\rho E}{\pi} \sqrt{1 - y^2 / R^2}$", "a cylinder across the view")
 def cylinder_normals() -> Expected:
     """The cosine depends on the distance from the axis alone.  Rows within 0.9 of the radius."""
 
@@ -191,7 +197,7 @@ def cylinder_normals() -> Expected:
     return Expected(seen_from_above(radiance, 2.0, 32, 10), 1e-9)
 
 
-@case("rho E / (pi sqrt(1 + 4 a^2 r^2))", "a quadric's gradient")
+@case(r"$\frac{\rho E}{\pi \sqrt{1 + 4 a^2 r^2}}$", "a quadric's gradient")
 def paraboloid_normals() -> Expected:
     """z = -a r^2 has the slope 2 a r."""
 
@@ -202,7 +208,7 @@ def paraboloid_normals() -> Expected:
 
 
 @case(
-    "1/2 + (u sqrt(1 - u^2) + asin u) / pi",
+    r"$L (\frac{1}{2} + \frac{u \sqrt{1 - u^2} + \arcsin u}{\pi})$",
     "the circle of confusion",
     "Potmesil & Chakravarty 1981",
 )

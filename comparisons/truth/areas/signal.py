@@ -45,7 +45,7 @@ def _bars(kernel: Kernel, radius: float) -> Expected:
     return Expected(pixels, 5e-4)
 
 
-FILTER = "integral of the kernel over the bars"
+FILTER = r"$L \int k(x) dx$ over the bars, $k$ the filter's kernel"
 
 
 @case(FILTER, "the box filter")
@@ -96,7 +96,10 @@ def lanczos_filter() -> Expected:
     return _bars(lambda t: np.sinc(t) * np.sinc(t / 3.0), 3.0)
 
 
-@case("share of each pixel's width in bright bars", "a grating near the limit of resolution")
+@case(
+    r"$L w$, $w$ the share of each pixel's width in bright bars",
+    "a grating near the limit of resolution",
+)
 def grating() -> Expected:
     """A square wave of 0.45 cycles a pixel: the filter leaves the beat of 0.05 with the grid, and
     its contrast."""
@@ -107,7 +110,7 @@ def grating() -> Expected:
     return Expected(mix(np.repeat(columns[None], PIXELS, axis=0), WARM, 0.2 * WARM))
 
 
-@case("area of wedges in the pixel", "edges of every slope")
+@case(r"$L A$, $A$ the area of wedges in the pixel", "edges of every slope")
 def wedges() -> Expected:
     """Twelve triangles with one corner in common."""
     share = np.zeros((PIXELS, PIXELS))

@@ -22,13 +22,13 @@ def _drawn(*signed: tuple[float, FloatArray], width: float = 2.4) -> Expected:
     return Expected(mix(np.asarray(share), WARM, COLD), 1e-9)
 
 
-@case("area of a square minus a circle", "the difference of solids")
+@case(r"$L A$, $A$ the area of a square minus a circle", "the difference of solids")
 def drilled_box() -> Expected:
     """A box that a cylinder pierces, seen along it."""
     return _drawn((1.0, 0.9 * SQUARE), (-1.0, _circle(0.55, 0.2, 0.1)))
 
 
-@case("area of two circles' lens", "the intersection of solids")
+@case(r"$L A$, $A$ the area of two circles' lens", "the intersection of solids")
 def two_balls_common() -> Expected:
     """Balls with their centres across the view: the outline of what they share is the lens that
     their outlines share, two arcs of acos(d / r)."""
@@ -38,7 +38,7 @@ def two_balls_common() -> Expected:
     return _drawn((1.0, np.concatenate([right, right * [-1.0, -1.0] + [0.0, 0.2]])))
 
 
-@case("area of a square and a circle, minus what they share", "the union of solids")
+@case(r"$L A$, $A$ the area of a square and a circle, minus what they share", "the union of solids")
 def ball_and_box() -> Expected:
     """A ball whose middle is the box's corner: they share a quarter of the disk."""
     c, s = turn()
@@ -49,7 +49,7 @@ def ball_and_box() -> Expected:
     return _drawn((1.0, square), (1.0, _circle(0.5, 0.4, 0.4)), (-1.0, quarter))
 
 
-@case("rho E n_z / pi", "the inner normals of a solid")
+@case(r"$\frac{\rho E n_z}{\pi}$", "the inner normals of a solid")
 def bitten_box() -> Expected:
     """A ball of radius 1.25 whose middle is 0.75 above the top of a box leaves a bowl with a rim of
     radius 1, whose cosine is sqrt(1 - (r / 1.25)^2); the top is level.  Pixels on the rim are not
@@ -64,7 +64,7 @@ def bitten_box() -> Expected:
     return Expected(seen_from_above(radiance, 2.8, 32, 8), 1e-9)
 
 
-@case("(1 - F1) (1 - F2) L at the place where Snell's law sends the ray", "a solid's lens")
+@case(r"$(1 - F_1) (1 - F_2) L$ at the place where Snell's law sends the ray", "a solid's lens")
 def solid_lens() -> Expected:
     """A plano-convex lens, the half of a ball of radius 2 below z = 0, index 1.5: rays along the
     axis pass the plane straight, and the ball bends them towards the axis by the difference of
@@ -89,7 +89,10 @@ def solid_lens() -> Expected:
     return Expected(seen_from_above(radiance, 2.0, 32), 1e-8)
 
 
-@case("area of the ellipse that a matrix makes of a circle", "an instance under a shear")
+@case(
+    r"$L A$, $A$ the area of the ellipse that a matrix makes of a circle",
+    "an instance under a shear",
+)
 def sheared_ball() -> Expected:
     """The outline of the ball A s, seen along z, is the ellipse of the first two rows B of A: the
     root of B B^T takes the unit circle there."""
@@ -97,7 +100,7 @@ def sheared_ball() -> Expected:
     return _drawn((1.0, _circle(1.0) @ np.linalg.cholesky(rows @ rows.T).T + [0.1, -0.1]))
 
 
-@case("area of turned and scaled copies", "instances")
+@case(r"$L A$, $A$ the area of turned and scaled copies", "instances")
 def three_copies() -> Expected:
     """A triangle, three times: each transform is applied from the first step to the last."""
     triangle = np.array([[-0.3, -0.4], [0.5, -0.2], [0.0, 0.6]])
@@ -111,7 +114,7 @@ def three_copies() -> Expected:
     return _drawn(*((1.0, c) for c in copies))
 
 
-@case("rho E (interpolated n)_z / pi", "vertex normals")
+@case(r"$\frac{\rho E n_z}{\pi}$, $n$ interpolated", "vertex normals")
 def mesh_normals() -> Expected:
     """A flat square whose vertex normals lean outwards: on each triangle they are linear, then made
     of length 1."""
@@ -124,7 +127,7 @@ def mesh_normals() -> Expected:
     return Expected(seen_from_above(radiance, 1.9, 32))
 
 
-@case("c E / pi, c linear", "vertex colours")
+@case(r"$\frac{c E}{\pi}$, $c$ linear", "vertex colours")
 def mesh_colours() -> Expected:
     """Barycentric interpolation of colours at corners (0, 0), (1, 0) and (0, 1) is linear in x and
     y.  A mean over a pixel is that at its middle."""
@@ -150,7 +153,7 @@ def _core() -> FloatArray:
     return np.asarray(ratio * np.stack([np.cos(angle), np.sin(angle)], axis=1))
 
 
-@case("area of a pentagram without its core", "the even-odd rule of a polygon")
+@case(r"$L A$, $A$ the area of a pentagram without its core", "the even-odd rule of a polygon")
 def star_even_odd() -> Expected:
     """The line of a star winds around its core twice, so that a signed area counts it twice: it is
     taken away twice."""
@@ -158,7 +161,7 @@ def star_even_odd() -> Expected:
     return Expected(mix(share, WARM, COLD))
 
 
-@case("area of a pentagram with its core", "the non-zero rule of a polygon")
+@case(r"$L A$, $A$ the area of a pentagram with its core", "the non-zero rule of a polygon")
 def star_nonzero() -> Expected:
     """As `star_even_odd`, the core taken away once."""
     share = coverage(_film(_star()), 32, 32) - coverage(_film(_core()), 32, 32)
@@ -169,7 +172,10 @@ def _film(points: FloatArray) -> FloatArray:
     return np.stack([(points[:, 0] / 2.4 + 0.5) * 32, (0.5 - points[:, 1] / 2.4) * 32], axis=1)
 
 
-@case("area of the fields of a checker in the pixel", "surface coordinates and their map")
+@case(
+    r"$L A$, $A$ the area of the fields of a checker in the pixel",
+    "surface coordinates and their map",
+)
 def checker_map() -> Expected:
     """u and v run from 0 to 1 over the square, times (3, 2), plus (0.1, 0): the first colour where
     both are in the same half of their unit intervals."""

@@ -11,20 +11,23 @@ LAMP = np.array([3.0, 2.0, 1.0])
 SHINE = np.array([0.3, 0.5, 1.0])
 
 
-@case("L / (1 - rho)", "a closed room that shines and scatters")
+@case(r"$\frac{L}{1 - \rho}$", "a closed room that shines and scatters")
 def closed_room() -> Expected:
     """Every point sees the same radiance B from everywhere: B = L + rho B."""
     return Expected(np.broadcast_to(SHINE / (1.0 - RHO), (32, 32, 3)).copy())
 
 
-@case("L (1 + rho + rho^2 + rho^3)", "paths by their length")
+@case(r"$L (1 + \rho + \rho^2 + \rho^3)$", "paths by their length")
 def path_lengths() -> Expected:
     """As `closed_room`, cut after 4 edges."""
     total = sum(RHO**k for k in range(4))
     return Expected(np.broadcast_to(SHINE * total, (32, 32, 3)).copy())
 
 
-@case("L1 = L + rho1 L2; L2 = rho2 (F L1 + (1 - F) L2), F = (r / R)^2", "a sphere in a sphere")
+@case(
+    r"$L_1 = L + \rho_1 L_2$, $L_2 = \rho_2 (F L_1 + (1 - F) L_2)$, $F = \frac{r^2}{R^2}$",
+    "a sphere in a sphere",
+)
 def sphere_in_sphere() -> Expected:
     """The inner sphere sees the outer one alone; of the light that leaves the outer one, the share
     F meets the inner one, by reciprocity of the areas."""
@@ -35,7 +38,7 @@ def sphere_in_sphere() -> Expected:
     return Expected(mix(view.sphere((0, 0, 0), 1.0), LAMP + rho1 * outer, outer), 1e-9)
 
 
-@case("L1 = L + rho1 L2; L2 = rho2 L1", "an infinite canyon")
+@case(r"$L_1 = L + \rho_1 L_2$, $L_2 = \rho_2 L_1$", "an infinite canyon")
 def canyon() -> Expected:
     """All light that leaves a wall meets the other one, but for 1e-10: the walls are 2e5 times as
     wide as their distance.  The middle of the picture sees past their ends, by 1e-4 of a column."""
@@ -46,7 +49,9 @@ def canyon() -> Expected:
     return Expected(pixels, 5e-5)
 
 
-@case("rho rho_w E / pi times the wall's form factor", "light of a wall on a floor")
+@case(
+    r"$\rho \frac{\rho_w E}{\pi} F_w$, $F_w$ the wall's form factor", "light of a wall on a floor"
+)
 def wall_to_floor() -> Expected:
     """Parallel light along the floor meets a wall alone, which then is a lamp of one radiance,
     rho_w E / pi.  Paths of three edges."""
@@ -55,7 +60,7 @@ def wall_to_floor() -> Expected:
     return Expected(share[..., None] * RHO * np.array([0.4, 0.6, 0.9]) * LAMP / np.pi**2)
 
 
-@case("rho L / pi (F(lamp) + rho_m F(image))", "the image of a lamp in a mirror")
+@case(r"$\rho L (F_{lamp} + \rho_m F_{image})$", "the image of a lamp in a mirror")
 def mirror_image() -> Expected:
     """A mirror at x = -1 makes of the lamp at x = 0.5 one at x = -2.5, dimmer by its reflectance:
     the caustic of a flat mirror."""
@@ -69,7 +74,7 @@ def mirror_image() -> Expected:
     return Expected(seen_from_above(share, 1.8, 32) * RHO * LAMP / np.pi)
 
 
-@case("rho L h^2 / pi times the integral of (1 - F) / (1 + F) / d^4 over the lamp", "a window")
+@case(r"$\frac{\rho L h^2}{\pi} \int \frac{1 - F}{(1 + F) d^4} dA$ over the lamp", "a window")
 def window() -> Expected:
     """A level lamp through a level pane.  Gauss's rule over the lamp, 16 x 16."""
     nodes, weights = np.polynomial.legendre.leggauss(16)

@@ -17,7 +17,10 @@ def _at(corners: FloatArray, z: float) -> FloatArray:
     return np.column_stack([corners, np.full(len(corners), z)])
 
 
-@case("rho E cos / pi, but for the shadow's area in the pixel", "the shadow of a sphere")
+@case(
+    r"$\frac{\rho E \cos\theta}{\pi} (1 - A)$, $A$ the shadow's area in the pixel",
+    "the shadow of a sphere",
+)
 def shadow_of_sphere() -> Expected:
     """Parallel light makes a cylinder of shadow, which a floor cuts in an ellipse: it is longer by
     1 / cos along the light, and moved by height times tangent."""
@@ -30,7 +33,9 @@ def shadow_of_sphere() -> Expected:
     return Expected(mix(share, 0.0, RHO * LIGHT * cosine / np.pi), 1e-9)
 
 
-@case("rho E / (pi d^2), but for the shadow's area in the pixel", "a shadow from a point")
+@case(
+    r"$\frac{\rho E}{\pi d^2} (1 - A)$, $A$ the shadow's area in the pixel", "a shadow from a point"
+)
 def shadow_of_triangle() -> Expected:
     """A projector at height 2 lights the floor evenly, and shows a triangle at height 0.8 larger by
     2 / 1.2, away from the point below it."""
@@ -39,7 +44,10 @@ def shadow_of_triangle() -> Expected:
     return Expected(mix(share, 0.0, RHO * LIGHT / 4.0 / np.pi))
 
 
-@case("rho L / (2 pi) times Lambert's sum over the part of the lamp that is seen", "a penumbra")
+@case(
+    r"$\frac{\rho L}{2 \pi} \sum_k \beta_k \cos\gamma_k$ over the edges of the part that is seen",
+    "a penumbra",
+)
 def penumbra_of_edge() -> Expected:
     """A square lamp at height 2, a screen x > 0 at height 1: from x the lamp is seen up to -x.
     Umbra and penumbra end at borders of pixels."""
@@ -56,7 +64,7 @@ def penumbra_of_edge() -> Expected:
 
 
 @case(
-    "rho L h^2 / pi times the integral of 1 / d^4 over the segment that is seen",
+    r"$\frac{\rho L h^2}{\pi} \int \frac{1}{d^4} dA$ over the segment that is seen",
     "a penumbra of a disk",
 )
 def penumbra_of_disk() -> Expected:
@@ -82,7 +90,10 @@ def penumbra_of_disk() -> Expected:
     return Expected(share[..., None] * RHO * LIGHT / np.pi, 1e-6)
 
 
-@case("rho sky (1 - Lambert's sum over the wall / pi)", "occlusion at a wall")
+@case(
+    r"$\rho L (1 - \frac{1}{2 \pi} \sum_k \beta_k \cos\gamma_k)$ over the wall's edges",
+    "occlusion at a wall",
+)
 def wall_under_sky() -> Expected:
     """A black wall takes its form factor from the sky: half of the sine of the angle under which
     it is seen, if it is long."""
@@ -93,7 +104,7 @@ def wall_under_sky() -> Expected:
     return Expected(share[..., None] * RHO * SKY)
 
 
-@case("rho sky (1 - r^3 / d^3)", "occlusion by a sphere that stands on the floor")
+@case(r"$\rho L (1 - \frac{r^3}{d^3})$", "occlusion by a sphere that stands on the floor")
 def sphere_under_sky() -> Expected:
     """A black sphere takes (r / d)^2 cos from the sky; its centre is at the height r, so that the
     cosine is r / d."""
@@ -104,7 +115,7 @@ def sphere_under_sky() -> Expected:
     return Expected(seen_from_above(irradiance, 1.0, 32)[..., None] * RHO * SKY)
 
 
-@case("rho sky (1 - screen + hole), form factors by Lambert", "the sky through a hole")
+@case(r"$\rho L (1 - F_{screen} + F_{hole})$, form factors by Lambert", "the sky through a hole")
 def hole_in_screen() -> Expected:
     """A black screen at height 1, 60 wide, with a square hole of 0.8: what is seen of the sky is
     the hole, and the little around the screen."""
@@ -117,7 +128,7 @@ def hole_in_screen() -> Expected:
     return Expected(seen_from_above(seen, 2.0, 32)[..., None] * RHO * SKY)
 
 
-@case("rho E / pi, and 0 below the screen", "a shadow across a gap of 5e-5")
+@case(r"$\frac{\rho E}{\pi}$, and 0 below the screen", "a shadow across a gap of 5e-5")
 def narrow_gap() -> Expected:
     """A screen x > 0 hovers 5e-5 above the floor, and the camera is in the gap.  Rays that start a
     fixed distance off their surface to avoid hitting it start beyond the screen."""

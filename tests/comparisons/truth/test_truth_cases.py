@@ -5,11 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.mathtext import MathTextParser
 
 from comparisons.truth import film, optics
 from comparisons.truth.areas import __path__ as areas
 from comparisons.truth.case import AREAS, cases, chosen
 from comparisons.truth.judge import judge
+from comparisons.truth.outputs import plain_formula
 from comparisons.truth.renderers import load
 
 SCENES = Path(__file__).parents[3] / "scenes" / "truth"
@@ -23,6 +25,19 @@ def test_every_case_has_its_scene_and_every_area_its_cases():
     for case in CASES.values():
         assert min(len(case.formula), len(case.tests), len(case.derivation)) > 2, case.name
         assert (SCENES / f"{case.name}.yaml").read_text().startswith("# "), case.name
+
+
+def test_formulas_can_be_typeset_and_read_without():
+    """Matplotlib's parser, which knows a part of LaTeX, takes what stands between dollars; no page
+    without it shows a command."""
+    parser = MathTextParser("path")
+    for case in CASES.values():
+        assert case.formula.count("$") % 2 == 0, case.name
+        for part in case.formula.split("$")[1::2]:
+            parser.parse(f"${part}$")
+        assert not set("$\\{}") & set(plain_formula(case.formula)), case.name
+    plain = plain_formula(CASES["setting_sphere"].formula)
+    assert "(cos theta arccos(-q cot theta) - q sqrt(1 - h^2 cos^2 theta)) / h^2" in plain
 
 
 def test_formulas_share_nothing_with_renderers():

@@ -74,7 +74,9 @@ def test_truth_writes_its_outputs(run):
     assert document["areas"] == [["rays", "ours", 1, 1], ["photometry", "ours", 2, 2]]
     assert document["false_alarm"] == 1e-4
     assert "truth: 3 of 3" in Path("out/truth-ours.svg").read_text()
-    assert "| `perspective` |" in Path("page.md").read_text()
+    page = Path("page.md").read_text()
+    assert f"(pictures/truth/perspective.png) | `perspective`: {CASE.tests}<br>" in page
+    assert f"{CASE.formula}<br>{CASE.derivation}<br>ours: " in page
 
 
 def test_the_page_in_a_browser(run, check_page):
