@@ -54,6 +54,8 @@ def _inconclusive(case: Case) -> str:
     limit = None if rung is None else rung.numbers.get("limit")
     if rung is None or seen is None or not isinstance(limit, int | float):
         return "too noisy to decide" if rung is None else f"undecided: {_clause(rung.reason)}"
+    if not rung.numbers.get("noise_known", True):
+        return "a single picture does not show its noise here: give more, with other seeds"
     if seen > limit:
         return (
             f"too noisy to decide: only a bias of the image mean above {_percent(seen)} would be "
@@ -124,12 +126,14 @@ def numbers_rows(case: Case) -> list[tuple[str, str, str, str]]:
     found = ", ".join(
         f"{name} {_percent(bias, sign=True)}" for name, bias in biases.items() if bias is not None
     )
-    rows = [("image mean", found, _percent(seen), _within(rung.numbers.get("limit")))]
+    known = rung.numbers.get("noise_known", True)
+    would = _percent(seen) if known else "unknown"
+    rows = [("image mean", found, would, _within(rung.numbers.get("limit")))]
     for key, what in _FAMILIES:
         cells = rung.numbers.get(key)
         if isinstance(cells, Mapping):
             half = cells.get("median_detectable_bias")
-            would = "" if half is None else f"{_percent(half)} in half of them"
+            would = f"{_percent(half)} in half of them" if known and half is not None else ""
             row = (f"{cells['tested']:,} {what}", _worst(cells), would)
             rows.append((*row, _within(cells.get("worst_margin"))))
     return rows

@@ -81,6 +81,10 @@ def test_what_differs_after_its_cause(rung, sides, what):
             "0.10 % is asked for",
         ),
         (
+            case("inconclusive", statistics("inconclusive", limit=0.001, noise_known=False)),
+            "a single picture does not show its noise here: give more, with other seeds",
+        ),
+        (
             case("inconclusive", statistics("inconclusive")),
             "too near to the limit of 0.50 % to decide with so few samples",
         ),
@@ -153,3 +157,8 @@ def test_the_numbers_as_a_table():
         "8 smooth patterns     1 differ; worst -2.0 % ± 0.40 %",
     ]
     assert numbers_table(case("invalid", RungResult("input", "invalid", "why"))) == []
+    unknown = "\n".join(
+        numbers_table(case("inconclusive", statistics(lines=lines, noise_known=False)))
+    )
+    assert " unknown " in unknown
+    assert "in half of them" not in unknown
