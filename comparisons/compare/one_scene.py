@@ -19,7 +19,7 @@ from comparisons.report.thumbnails import BLUE, RED, WHITE, png_url
 from comparisons.report.values import shown
 from comparisons.results.case import Case, FloatArray, Images
 from comparisons.results.files import named
-from comparisons.results.headline import headline
+from comparisons.results.headline import HEAD, headline, numbers_rows
 from comparisons.runs.provenance import provenance
 from comparisons.statistics.metrics import encode, nonfinite_pixels, white_level
 from reference_rt.rendering.render import with_settings
@@ -51,15 +51,26 @@ class NotebookCase(Case):
         sentence = escape(named(headline(self), self.sides))
         rows = "".join(
             f"<tr><td>{escape(rung.name)}</td><td>{SIGNS[rung.status]} {rung.status}</td>"
-            f'<td style="text-align:left">{escape(named(rung.reason, self.sides))}</td></tr>'
+            f'<td style="text-align:left">{folded(named(rung.reason, self.sides))}</td></tr>'
             for rung in self.rungs
         )
         numbers = "" if self.metrics is None else self._numbers()
         return (
             f'<div><p><b style="color:{colour}">{SIGNS[self.verdict]} {self.verdict}</b> '
-            f"<b>{escape(self.scene)}</b>: {sentence}.</p>{self._pictures()}{numbers}"
+            f"<b>{escape(self.scene)}</b>: {sentence}.</p>"
+            f"{self._found()}{self._pictures()}{numbers}"
             f"<table><tr><th>rung</th><th>status</th><th>reason</th></tr>{rows}</table></div>"
         )
+
+    def _found(self) -> str:
+        """The numbers of the statistics as a table."""
+        if not (rows := numbers_rows(self)):
+            return ""
+        head = "".join(f"<th>{name}</th>" for name in HEAD)
+        body = "".join(
+            f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows
+        )
+        return f"<table><tr>{head}</tr>{body}</table>"
 
     def _numbers(self) -> str:
         assert self.metrics is not None
@@ -85,6 +96,14 @@ class NotebookCase(Case):
             f"<figcaption>{escape(title)}</figcaption></figure>"
             for title, pixels in found
         )
+
+
+def folded(reason: str) -> str:
+    """A reason as HTML: its first clause, which unfolds to the whole."""
+    clause, _, rest = reason.partition("; ")
+    if not rest:
+        return escape(reason)
+    return f"<details><summary>{escape(clause)}</summary>{escape(rest)}</details>"
 
 
 def exposed(image: FloatArray, white: float) -> FloatArray:

@@ -75,9 +75,13 @@ def source_digest() -> str:
 
 
 def fingerprint(picture: FloatArray) -> str:
-    """SHA-256 of the values of (height, width, 3) as float32, in which pictures are stored."""
-    with np.errstate(over="ignore"):
-        values = picture.astype("<f4") + np.float32(0.0)  # -0 and 0 are the same radiance
+    """SHA-256 of the values of (height, width, 3) as float32, in which pictures are stored; of a
+    picture as a whole outside its normal numbers as float64, since float32 would round 1e-200 and
+    1.5e-200 to the same number."""
+    largest = float(np.abs(picture[np.isfinite(picture)]).max(initial=0.0))
+    known = np.finfo(np.float32)
+    fits = largest == 0.0 or float(known.tiny) <= largest <= float(known.max)
+    values = picture.astype("<f4" if fits else "<f8") + 0.0  # -0 and 0 are the same radiance
     digest = hashlib.sha256(str(values.shape).encode())
     digest.update(np.ascontiguousarray(values).tobytes())
     return digest.hexdigest()

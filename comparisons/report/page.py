@@ -25,7 +25,7 @@ from comparisons.report.thumbnails import Thumbnail, Thumbnails, flip_map, of_wi
 from comparisons.report.values import shown
 from comparisons.results.case import Case, Images, Metrics, RungResult, Status, how_many
 from comparisons.results.files import named, plain
-from comparisons.results.headline import headline
+from comparisons.results.headline import HEAD, headline, numbers_rows
 from comparisons.results.rungs import RUNGS
 from reference_rt.util.files import replacing
 
@@ -154,6 +154,7 @@ def write_report(
             expanded=len(cases) <= MOST_OPEN,
             signs=SIGNS,
             modes=MODES,
+            head=HEAD,
             provenance=provenance,
             cases=views,
             how_many=how_many(len(cases), len(missing)),
@@ -189,6 +190,7 @@ def _view(case: Case, mapped: bool) -> dict[str, Any]:
         "failed": case.verdict in FAILED,
         "rank": ORDER.index(case.verdict),
         "headline": named(headline(case), case.sides),
+        "found": numbers_rows(case),
         "tiers": sorted(case.rungs, key=lambda rung: _rung(rung.name)),
         "pictures": pictures,
         "figures": _figures(case, pictures, mapped) if pictures else [],

@@ -54,6 +54,8 @@ def _inconclusive(case: Case) -> str:
     limit = None if rung is None else rung.numbers.get("limit")
     if rung is None or seen is None or not isinstance(limit, int | float):
         return "too noisy to decide" if rung is None else f"undecided: {_clause(rung.reason)}"
+    if not rung.numbers.get("noise_known", True):
+        return "a single picture does not show its noise here: give more, with other seeds"
     if seen > limit:
         return (
             f"too noisy to decide: only a bias of the image mean above {_percent(seen)} would be "
@@ -101,9 +103,21 @@ _SENTENCES: Mapping[Status, Callable[[Case], str]] = {
 # ---- the numbers of the statistics, as a table ---------------------------------------------------
 
 
-def numbers_table(case: Case) -> list[str]:
-    """Lines of columns: what the statistics tested, what they found, and the bias that would have
-    been seen; [] for a case without them."""
+HEAD = ("tested", "found", "would have been seen", "limit")
+"""The columns of `numbers_rows`."""
+
+_FAMILIES = (
+    ("tiles", "tiles"),
+    ("pixels", "pixels"),
+    ("lines", "rows and columns"),
+    ("modes", "smooth patterns"),
+)
+"""The numbers of tests of many biases, and what these are called."""
+
+
+def numbers_rows(case: Case) -> list[tuple[str, str, str, str]]:
+    """What the statistics tested, what they found, the bias that would have been seen, and the one
+    that is permitted; [] for a case without them."""
     rung = next((r for r in case.rungs if r.name == "statistics"), None)
     seen = _detectable(rung)
     biases = {} if rung is None else rung.numbers.get("relative_bias")
@@ -112,15 +126,39 @@ def numbers_table(case: Case) -> list[str]:
     found = ", ".join(
         f"{name} {_percent(bias, sign=True)}" for name, bias in biases.items() if bias is not None
     )
-    rows = [("tested", "found", "would have been seen"), ("image mean", found, _percent(seen))]
-    for key, what in (("tiles", "tiles"), ("lines", "rows and columns"), ("pixels", "pixels")):
+    known = rung.numbers.get("noise_known", True)
+    would = _percent(seen) if known else "unknown"
+    rows = [("image mean", found, would, _within(rung.numbers.get("limit")))]
+    for key, what in _FAMILIES:
         cells = rung.numbers.get(key)
         if isinstance(cells, Mapping):
             half = cells.get("median_detectable_bias")
-            would = "" if half is None else f"{_percent(half)} in half of them"
-            rows.append((f"{cells['tested']:,} {what}", f"{cells['differ']:,} differ", would))
-    widths = [max(len(row[k]) for row in rows) for k in range(2)]
-    return [f"{a:<{widths[0]}}  {b:<{widths[1]}}  {c}".rstrip() for a, b, c in rows]
+            would = f"{_percent(half)} in half of them" if known and half is not None else ""
+            row = (f"{cells['tested']:,} {what}", _worst(cells), would)
+            rows.append((*row, _within(cells.get("worst_margin"))))
+    return rows
+
+
+def numbers_table(case: Case) -> list[str]:
+    """`numbers_rows` as lines of columns."""
+    if not (rows := numbers_rows(case)):
+        return []
+    rows = [HEAD, *rows]
+    widths = [max(len(row[k]) for row in rows) for k in range(len(HEAD))]
+    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+
+
+def _worst(cells: Mapping[str, Any]) -> str:
+    """Such as "3 differ; worst -12 % ± 2.1 %"."""
+    bias, half = cells.get("worst_bias"), cells.get("worst_half_width")
+    worst = "" if bias is None else f"; worst {_percent(bias, sign=True)}"
+    width = "" if bias is None or half is None else f" ± {_percent(half)}"
+    count = f"{cells['differ']:,} differ" if cells["differ"] else "none differs"
+    return f"{count}{worst}{width}"
+
+
+def _within(margin: float | None) -> str:
+    return "" if margin is None else f"±{_percent(margin)}"
 
 
 # ---- what differs, by rung ----------------------------------------------------------------------

@@ -139,7 +139,7 @@ def _times(replicates: float, samples: float, whose: str) -> str:
     if not math.isfinite(replicates):
         return _UNKNOWN
     if max(replicates, samples) < LITTLE:
-        return f"slightly more samples{whose} suffice: a tenth of them"
+        return f"slightly more samples{whose} suffice: a tenth more"
     spp = _number(samples)
     if samples > FEW * replicates:
         other = f", or {spp} times the samples per pixel of each" if samples < MOST else ""

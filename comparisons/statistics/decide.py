@@ -39,6 +39,11 @@ ONE_PICTURE = (
     "noise: only replicates show it"
 )
 
+UNKNOWN = (
+    "a single picture does not show its noise here, because few bright pixels make it, or because "
+    "the difference is unlike noise: give more replicates, with other seeds"
+)
+
 NEGATIVE = (
     "the sides differ by less than their replicates' spread says, though no picture of one side "
     "shares noise with one of the other: the replicates of a side make up for each other (negative "
@@ -180,14 +185,16 @@ def _reference(reference: npt.ArrayLike | Known) -> tuple[FloatArray, FloatArray
 def _verdict(
     found: Findings, a: FloatArray, b: FloatArray, limit: float, alone: BiasTest | None
 ) -> RungResult:
-    advice, factor = wanted(found.image, limit, alone, found.level, _least(found, limit))
+    least = _least(found, limit)
+    advice, factor = wanted(found.image, limit, alone, found.level, least)
     status, finding = _decide(found, limit, advice)
+    unknown = status == "inconclusive" and found.single and not np.isfinite(least)
     image = found.image
     reach = image.over_scale(np.abs(image.difference) + image.half_width).max()
+    seen = detectable_words(image, found.tiles, found.tile, found.pixels)
     reason = (
-        f"{finding}; {detectable_words(image, found.tiles, found.tile, found.pixels)}; the means "
-        f"are equivalent within ±{percent(reach)} at "
-        f"{100.0 * (1.0 - found.level * IMAGE_LEVEL):.6g} %"
+        f"{UNKNOWN if unknown else f'{finding}; {seen}'}; the means are equivalent within "
+        f"±{percent(reach)} at {100.0 * (1.0 - found.level * IMAGE_LEVEL):.6g} %"
     )
     if found.unseen is not None and status != "differ":
         reason += f"; {unseen_words(found.unseen)}"
@@ -208,6 +215,7 @@ def _verdict(
         **{key: of_image[key] for key in TOP},
         "equivalent_within": finite(reach),
         "samples_factor": finite(factor),
+        "noise_known": not unknown,
         "unseen_light": unseen_numbers(found.unseen),
         "image": of_image,
         "tiles": {"side": found.tile, **cell_numbers(found.tiles, found.tile)},

@@ -52,7 +52,8 @@ LEAST = 4
 class Uniformity:
     """mean: the mean p-value of the blocks;  expected, error: its expectation and standard
     deviation;  mean_beyond_margin: the mean p-value of the differences minus the margin;  p_wide,
-    p_narrow: chance of a mean as small, or as large;  blocks, replicates: how many were used."""
+    p_narrow: chance of a mean as small, or as large;  p_reversed: p_narrow, if the pictures of one
+    side may be those of the other in reverse order;  blocks, replicates: how many were used."""
 
     mean: float
     expected: float
@@ -60,6 +61,7 @@ class Uniformity:
     mean_beyond_margin: float
     p_wide: float
     p_narrow: float
+    p_reversed: float
     blocks: int
     replicates: int
     shared: bool = False
@@ -75,7 +77,7 @@ class Uniformity:
     @property
     def narrow(self) -> bool:
         """The blocks differ less than independent replicates do."""
-        return self.p_narrow < self.level / 2.0
+        return 2.0 * min(self.p_narrow, self.p_reversed) < self.level / 2.0
 
 
 def uniformity(a: Side, b: Side, margins: Margins, level: float = 1.0) -> Uniformity | None:
@@ -107,27 +109,44 @@ def uniformity(a: Side, b: Side, margins: Margins, level: float = 1.0) -> Unifor
     beyond = np.sqrt(np.maximum(size[difference] ** 2 - permitted, 0.0))
     means = _mean_p_values(size)
     others = np.delete(means, difference)
-    expected, dof = float(others.mean()), len(others) - 2
-    # If the two sides' replicates are correlated in pairs, the functions with equal signs within
-    # pairs have another mean than the rest.
-    halves = others[: half - 1], others[half - 1 :]
-    squares = sum(float(((part - part.mean()) ** 2).sum()) for part in halves)
-    error = math.sqrt(squares / dof * (1.0 + 1.0 / len(others)))
+    expected = float(others.mean())
+    error, dof = _spread(others, size.shape[1], 0)
+    of_reversed = _spread(others, size.shape[1], half - 1)
+    excess = float(means[difference]) - expected
     beyond_mean = float(_p_values(beyond, np.delete(size, difference, axis=0)).mean())
-    # At least the standard deviation of the mean of as many independent uniform numbers.
-    error = max(error, math.sqrt(1.0 / 12.0 / size.shape[1]))
     found = Uniformity(
         mean=float(means[difference]),
         expected=expected,
         error=error,
         mean_beyond_margin=beyond_mean,
         p_wide=float(stats.t.cdf((beyond_mean - expected) / error, dof)),
-        p_narrow=float(stats.t.sf((means[difference] - expected) / error, dof)),
+        p_narrow=float(stats.t.sf(excess / error, dof)),
+        p_reversed=float(stats.t.sf(excess / of_reversed[0], of_reversed[1])),
         blocks=int(noisy.any(axis=-1).sum()),
         replicates=half,
         level=level * UNIFORMITY_LEVEL,
     )
     return replace(found, shared=found.narrow and shared_by_sides(*pictures))
+
+
+def _spread(others: FloatArray, blocks: int, order: int) -> tuple[float, int]:
+    """The standard error of the difference's mean p-value, from those of the other functions, and
+    its degrees of freedom.
+
+    If the two sides' replicates are correlated in pairs, the functions with equal signs within
+    pairs have another mean than the rest. Picture i may be paired with picture i of the other side
+    (order 0), or with the one that is as far from the end (order half - 1): Walsh functions then
+    have equal or opposite signs by the parity of their index.
+    """
+    half = len(others) // 2 + 1
+    index = np.delete(np.arange(1, 2 * half), half - 1)
+    group = 2 * (index >= half) + np.bitwise_count(index & order) % 2
+    means = {k: others[group == k].mean() for k in np.unique(group)}
+    squares = sum(float(((others[group == k] - mean) ** 2).sum()) for k, mean in means.items())
+    dof = len(others) - len(means)
+    error = math.sqrt(squares / dof * (1.0 + 1.0 / len(others)))
+    # At least the standard deviation of the mean of as many independent uniform numbers.
+    return max(error, math.sqrt(1.0 / 12.0 / blocks)), dof
 
 
 def _unmet(a: Side, b: Side) -> FloatArray:

@@ -154,6 +154,7 @@ def uniformity_numbers(found: Uniformity | None) -> dict[str, Any] | None:
         "standard_error": found.error,
         "p_wide": found.p_wide,
         "p_narrow": found.p_narrow,
+        "p_reversed": found.p_reversed,
         "blocks": found.blocks,
         "replicates": found.replicates,
     }

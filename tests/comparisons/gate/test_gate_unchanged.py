@@ -147,6 +147,8 @@ def test_fingerprints() -> None:
     assert fingerprint(picture) != fingerprint(picture.swapaxes(0, 1))
     assert fingerprint(picture) != fingerprint(np.nextafter(picture.astype("f4"), np.float32(9)))
     assert fingerprint(picture) != fingerprint(picture.reshape(16, 64, 3))
+    for size in (1e-200, 1e-42, 1e200):  # which float32 rounds to 0, to few digits, to infinity
+        assert fingerprint(size * picture) != fingerprint(1.001 * size * picture)
     assert len(Copies.of(()).others([Picture(picture)])) == 1
 
 

@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 from report_page import NASTY, PROVENANCE, Page, case, noise
 
+from comparisons.compare.one_scene import NotebookCase
 from comparisons.report import write_report
 from comparisons.report.pictures_data import unpack
 from comparisons.report.values import shown
-from comparisons.results.case import Cause, ImageRegion, Images
+from comparisons.results.case import Case, Cause, ImageRegion, Images
+from comparisons.results.headline import numbers_rows
+from comparisons.statistics import compare
 
 
 @pytest.fixture
@@ -105,6 +108,21 @@ def test_everything_a_case_says_is_there(page):
         "note",
     ):
         assert words in text, words
+
+
+def test_the_numbers_of_the_statistics_are_a_table_and_the_paragraph_is_folded(page):
+    rung = compare(noise((4, 32, 32)), noise((4, 32, 32), 1))
+    told = Case("a", rung.status, rung.reason, (rung,), None, {}, sides=("ours", "Mitsuba's"))
+    _, text = page(told)
+    notebook = NotebookCase("a", rung.status, rung.reason, (rung,), None, {})._repr_html_()
+    for row in numbers_rows(told):
+        for cell in row:
+            assert f">{cell}</t" in text
+            assert f">{cell}</t" in notebook
+    folded = re.search('<details class="reason">(.*?)</details>', text, re.DOTALL)
+    assert folded is not None
+    assert rung.reason in folded[1]
+    assert f"<summary>{rung.reason.partition('; ')[0]}</summary>" in notebook
 
 
 def test_the_difference_is_signed_and_bad_pixels_are_magenta(page):

@@ -81,6 +81,10 @@ def test_what_differs_after_its_cause(rung, sides, what):
             "0.10 % is asked for",
         ),
         (
+            case("inconclusive", statistics("inconclusive", limit=0.001, noise_known=False)),
+            "a single picture does not show its noise here: give more, with other seeds",
+        ),
+        (
             case("inconclusive", statistics("inconclusive")),
             "too near to the limit of 0.50 % to decide with so few samples",
         ),
@@ -141,13 +145,20 @@ def test_every_rung_may_differ_besides(verdict, other):
 
 
 def test_the_numbers_as_a_table():
-    lines = {"tested": 256, "differ": 0, "median_detectable_bias": 0.013}
-    rung = statistics(tiles=3, lines=lines, pixels=1)
+    lines = {"tested": 256, "differ": 0, "median_detectable_bias": 0.013, "worst_margin": 0.01}
+    modes = {"tested": 8, "differ": 1, "worst_bias": -0.02, "worst_half_width": 0.004}
+    rung = statistics(tiles=3, lines=lines, pixels=1, modes=modes)
     assert numbers_table(case("differ", rung)) == [
-        "tested                found                         would have been seen",
-        "image mean            R +1.0 %, G +1.1 %, B +1.2 %  0.35 %",
-        "64 tiles              3 differ",
-        "256 rows and columns  0 differ                      1.3 % in half of them",
-        "16,384 pixels         1 differ",
+        "tested                found                            would have been seen   limit",
+        "image mean            R +1.0 %, G +1.1 %, B +1.2 %     0.35 %                 ±0.50 %",
+        "64 tiles              3 differ; worst -12 %",
+        "16,384 pixels         1 differ; worst +200 %",
+        "256 rows and columns  none differs                     1.3 % in half of them  ±1.0 %",
+        "8 smooth patterns     1 differ; worst -2.0 % ± 0.40 %",
     ]
     assert numbers_table(case("invalid", RungResult("input", "invalid", "why"))) == []
+    unknown = "\n".join(
+        numbers_table(case("inconclusive", statistics(lines=lines, noise_known=False)))
+    )
+    assert " unknown " in unknown
+    assert "in half of them" not in unknown

@@ -297,5 +297,5 @@ def test_hardly_more_samples_are_told_in_words():
     limits = np.geomspace(0.002, 0.02, 60)
     words = [wanted(image, limit, None)[0] for limit in limits]
     assert not any("about 1.0 times" in text for text in words)
-    assert sum(text.startswith("slightly more samples") for text in words) > 2
+    assert sum(text.startswith("slightly more samples suffice: a tenth more") for text in words) > 2
     assert any("it takes about 1.2 times" in text for text in words)

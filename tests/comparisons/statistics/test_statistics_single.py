@@ -22,7 +22,9 @@ def test_a_single_picture_says_what_it_presumes():
         assert result.status == "inconclusive"
         assert "with a single picture on a side the noise is estimated" in result.reason
         assert "assuming that the noise of neighbouring blocks is independent" in result.reason
-        assert "it takes about" in result.reason or "give more replicates" in result.reason
+        known = "it takes about" in result.reason
+        assert known or "give more replicates" in result.reason
+        assert result.numbers["noise_known"] == known == ("the smallest bias" in result.reason)
         assert "such as a contact shadow, is not told from noise" in result.reason
         json.dumps(result.numbers, allow_nan=False)
     assert "single" not in compare(many, many).reason
@@ -160,6 +162,8 @@ def test_a_contact_shadow_in_a_single_picture_asks_for_replicates(place):
     assert result.numbers["samples_factor"] is None
     if result.status == "inconclusive":
         assert "give more replicates" in result.reason
+        assert "the smallest bias" not in result.reason
+        assert not result.numbers["noise_known"]
 
 
 def known_through_a_filter(rng: np.random.Generator, width: float, noise: float = 0.05) -> Known:
