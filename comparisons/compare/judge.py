@@ -7,6 +7,7 @@ import numpy as np
 
 from comparisons import statistics
 from comparisons.compare import diagnosis
+from comparisons.compare.diagnosis.brightness import LITTLE
 from comparisons.compare.looks import Looks
 from comparisons.compare.path_length import Lengths
 from comparisons.cycles.witness import Witness
@@ -194,7 +195,9 @@ def likeliest_cause(
     """The likeliest cause of a difference; single lights, and paths of other lengths, are rendered
     only if needed."""
     plain = diagnosis.likeliest(images)
-    if plain is not None and plain.explained > SURE and plain.name not in diagnosis.FLEXIBLE:
+    is_dark = images.candidate.mean() <= LITTLE * images.reference.mean()
+    is_sure = plain is not None and plain.explained > SURE and not is_dark
+    if plain is not None and is_sure and plain.name not in diagnosis.FLEXIBLE:
         return plain
     if lights is None and lengths is None:
         return plain

@@ -27,9 +27,20 @@ NEAR = 0.01
 """Relative difference up to which a fitted factor counts as a remarkable one."""
 
 
+LITTLE = 0.01
+"""Where no more than this of the light is left, a gain near 0 explains that about as well as a lost
+light does, and says less: it is no rival."""
+
+
 def hypotheses(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hypothesis]:
     """All of them, fitted."""
-    yield from _gains(misfit)
+    for one in _gains(misfit):
+        if (
+            not lights
+            or one.family != "gain"
+            or one.picture.mean() > LITTLE * misfit.reference.mean()
+        ):
+            yield one
     yield from _limits(misfit)
     yield from _lights(misfit, lights)
 
