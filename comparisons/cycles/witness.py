@@ -91,7 +91,8 @@ def vote(
     statuses = {r.status for r in found.values()}
     if statuses == {"agree"}:
         by = _bias_text(replicates[0], replicates[2])
-        reason = f"{names[2]} agrees with both: {names[0]} differs from it by {by} of the image mean"
+        found_by = f"{names[0]} differs from it by {by} of the image mean"
+        reason = f"{names[2]} agrees with both: {found_by}"
         return RungResult("witness", "agree", reason, numbers)
     told = "; ".join(f"{names[a]} and {names[b]}: {found[a, b].status}" for a, b in PAIRS)
     return RungResult("witness", "not-applicable", f"no vote ({told})", numbers)
