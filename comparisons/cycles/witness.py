@@ -11,6 +11,7 @@ from comparisons.cycles.surfaces import IneligibleError
 from comparisons.results.case import RungResult, Status
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
+from reference_rt.util.errors import ReferenceUnavailableError
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
 
@@ -40,8 +41,11 @@ def witness_of(
         except IneligibleError as error:
             reason = f"Cycles has no equal of {error}: it does not vote"
             return RungResult("witness", "not-applicable", reason), None
-        with cycles:
-            pictures = cycles.render(count, scene.resolved_sampler.spp)
+        try:
+            with cycles:
+                pictures = cycles.render(count, scene.resolved_sampler.spp)
+        except ReferenceUnavailableError as error:  # of this scene: others of a suite go on
+            return RungResult("witness", "not-comparable", str(error)), None
         say(f"witness: {count} pictures by Cycles ({sum(cycles.seconds):.1f} s)")
         rung = vote((*replicates, pictures), (*sides, "Cycles'"), limit)
         rung.numbers["version"] = f"Blender {cycles.version}"
@@ -56,10 +60,10 @@ def vote(
 ) -> RungResult:
     """Who of three renderers stands alone.  names: of the candidate, the reference, the witness.
 
-    Each pair is judged as two renderers are, at a third of the level: so the chance that right
-    renderers are said to differ is that of one comparison.  Somebody stands alone if he differs
-    from both others, and these agree; or if their noise hides whether they do, but not a difference
-    half as large as his.
+    Each pair is judged as two renderers are, at a third of the level, so that the chance that any
+    pair of right renderers differs is that of one comparison.  A renderer stands alone if it
+    differs from both others, and these agree; or if their noise hides whether they do, but not a
+    difference half as large as its own.
     """
     found = {
         (a, b): statistics.compare(replicates[a], replicates[b], limit=limit, level=1.0 / 3.0)

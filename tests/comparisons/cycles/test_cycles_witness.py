@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 import reference_rt as rt
 from comparisons.cycles import backend
 from comparisons.cycles.translate import IneligibleError
-from comparisons.cycles.witness import vote
+from comparisons.cycles.witness import vote, witness_of
 from reference_rt.cli.main import app
 from reference_rt.util.errors import ReferenceUnavailableError, UsageError
 
@@ -101,6 +101,11 @@ def test_a_cycles_that_breaks_is_reported(fault, monkeypatch, tmp_path):
     monkeypatch.setattr(backend, "SECONDS", 2.0)
     with pytest.raises(ReferenceUnavailableError, match=said), backend.Cycles(SCENE) as cycles:
         cycles.render(1, 1)
+    heard, picture = witness_of(SCENE, LIMIT, 1, lambda line: None)(
+        (_pictures(0), _pictures(1)), NAMES[:2]
+    )
+    assert (heard.status, picture) == ("not-comparable", None)
+    assert said in heard.reason
 
 
 def test_all_reasons_are_given(monkeypatch, tmp_path):
