@@ -96,6 +96,7 @@ FAULTS = (
     ("canyon", "reflectance: [0.7", "reflectance: [0.705"),
     ("wall_to_floor", "0.6, 0.9]", "0.61, 0.9]"),
     ("mirror_image", "0.8, 0.7]", "0.82, 0.7]"),
+    ("caustic", "-0.64", "-0.6"),
     ("window", "interior_ior: 1.5", "interior_ior: 1.53"),
     # solids, instances, meshes
     ("drilled_box", "radius: 0.55", "radius: 0.551"),
