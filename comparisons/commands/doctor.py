@@ -3,8 +3,8 @@
 import importlib.util
 from collections.abc import Iterable
 
-from comparisons.cycles import backend as cycles
 from comparisons.mitsuba import backend
+from comparisons.renderers import other
 from reference_rt.cli.doctor import Check
 from reference_rt.util.errors import ReferenceUnavailableError
 
@@ -27,7 +27,7 @@ def checks() -> Iterable[Check]:
             "FLIP", "left out: flip-evaluator is not installed", "pip install flip-evaluator"
         )
     try:
-        yield Check("Cycles", f"by {cycles.interpreter()}")
+        yield Check("Cycles", other("cycles").version())
     except ReferenceUnavailableError as error:
         yield Check("Cycles", "left out", str(error))
     missing = [name for name in PACKAGES if importlib.util.find_spec(name) is None]

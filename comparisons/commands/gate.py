@@ -152,6 +152,7 @@ def gate(
         from comparisons.gate.reference import is_noise_free
         from comparisons.gate.request import Request, gated
         from comparisons.gate.rounds import Rounds, gated_renderer
+        from comparisons.renderers import witness_facts
         from comparisons.results.headline import headline, numbers_table
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.console import ProgressLine
@@ -242,6 +243,7 @@ def gate(
     facts = {"limit": limit, "candidates": names}
     facts |= {"baseline": baseline} if baseline else {}
     facts |= {"command": command} if command else {}
+    facts |= witness_facts(witness)
     results, report = outputs.write(case, out, facts)
     outputs.for_ci(case, junit, "" if scene is None else scene.as_posix(), github)
     if failed is not None:

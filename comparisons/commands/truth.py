@@ -54,6 +54,7 @@ def truth(
     """
     with compare_extra("truth"):
         from comparisons.mitsuba.backend import SCALAR
+        from comparisons.renderers import other
         from comparisons.report import templates, terminal
         from comparisons.runs.provenance import ours, provenance
         from comparisons.truth import outputs
@@ -70,6 +71,7 @@ def truth(
         templates.check(markdown, "truth")
     begun = time.perf_counter()
     facts = provenance() if "mitsuba" in who else ours()
+    facts |= {name: other(name).version() for name in who if name not in ("ours", "mitsuba")}
     rows: list[Row] = []
     with ProgressLine() as progress:
         for k, case in enumerate(picked):

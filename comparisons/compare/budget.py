@@ -1,9 +1,10 @@
 """How much work one comparison may take: samples, replicates, rays, and the bias to detect."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
+from comparisons.renderers import WitnessName
 from reference_rt.core.model import Description
 
 PixelSize = tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]]
@@ -37,7 +38,7 @@ class Budget(Description):
     `reference-limited`."""
     limit: Annotated[float, Field(gt=0)] = 0.005
     """The smallest relative bias of the image mean that must be detectable."""
-    witness: Literal["cycles"] | None = None
-    """A third renderer whose pictures say who stands alone (`comparisons.cycles.witness`)."""
+    witness: WitnessName | None = None
+    """A third renderer whose pictures say who stands alone (`comparisons.rungs.witness`)."""
     control: bool = False
     """Compare Mitsuba with itself (another variant, other seeds) instead of ours with Mitsuba."""

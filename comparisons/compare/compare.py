@@ -15,7 +15,6 @@ from comparisons.compare import looks, pictures, ray_starts
 from comparisons.compare.budget import Budget
 from comparisons.compare.judge import Evidence, Rendered, judge, of_replicates, picture_rungs
 from comparisons.compare.path_length import path_lengths
-from comparisons.cycles.witness import witness_of
 from comparisons.geometry.flatten import copies_of
 from comparisons.mitsuba import backend
 from comparisons.mitsuba import scene as mitsuba_scene
@@ -28,6 +27,7 @@ from comparisons.mitsuba.translate.integrators import in_place_of
 from comparisons.mitsuba.translate.moved import with_float32_vertices
 from comparisons.results.case import Case, Images, RungResult
 from comparisons.rungs.layers.rung import applies
+from comparisons.rungs.witness import witness_of
 from reference_rt.cameras.film import BoxFilter, Film
 from reference_rt.cli.explain import explain
 from reference_rt.core.arrays import FloatArray
@@ -185,7 +185,7 @@ def compare_scene(
     witness = None
     if budget.witness is not None:
         scene = budgeted(subject.witness or subject.scene, budget)
-        witness = witness_of(scene, budget.limit, threads, say)
+        witness = witness_of(budget.witness, scene, budget.limit, threads, say)
     evidence = gather(subject, budget, say, threads, rungs)
     return judge(replace(evidence, witness=witness), budget.limit)
 

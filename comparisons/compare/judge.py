@@ -10,7 +10,6 @@ from comparisons.compare import diagnosis
 from comparisons.compare.diagnosis.brightness import LITTLE
 from comparisons.compare.looks import Looks
 from comparisons.compare.path_length import Lengths
-from comparisons.cycles.witness import Witness
 from comparisons.results.case import (
     Case,
     Cause,
@@ -25,6 +24,7 @@ from comparisons.results.rungs import RUNGS
 from comparisons.rungs.images import images_rung
 from comparisons.rungs.input import input_rung
 from comparisons.rungs.limited import limited
+from comparisons.rungs.witness import Witness
 from comparisons.statistics.metrics import image_metrics, nonfinite_pixels
 
 Lights = Callable[[], Mapping[str, FloatArray]]

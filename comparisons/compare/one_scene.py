@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import fields
 from html import escape
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, compare_scene
 from comparisons.compare.looks import FIRST, SECONDS
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.renderers import WitnessName
 from comparisons.report import write_report
 from comparisons.report.page import FAILED, SIGNS
 from comparisons.report.thumbnails import BLUE, RED, WHITE, png_url
@@ -144,7 +144,7 @@ def compare_one(
     time_limit: float | None = SECONDS,
     limit: float = Budget().limit,
     threads: int | None = None,
-    witness: Literal["cycles"] | None = None,
+    witness: WitnessName | None = None,
     say: Callable[[str], None] | None = None,
 ) -> NotebookCase:
     """Render a scene, or a scene file, by reference_rt and by Mitsuba, and judge the difference.

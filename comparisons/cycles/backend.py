@@ -1,21 +1,24 @@
 """Runs Cycles: finds its Python, and has one process of it render all replicates of a scene."""
 
+import functools
 import json
 import os
 import shutil
-import tempfile
-from collections.abc import Callable
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Self
+from typing import NamedTuple
 
 import numpy as np
 
 from comparisons.cycles.translate import write
+from comparisons.renderers import NoCounterpartError, Replicates
 from comparisons.runs.processes import Children
-from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceUnavailableError
+from reference_rt.util.files import temporary_folder
 
 PYTHON = "REFERENCE_RT_CYCLES"
 """The environment variable that names the Python which has Blender.  It is not ours, since Blender
@@ -41,55 +44,65 @@ def interpreter() -> str:
     return str(Path(found).absolute())  # not resolved: a venv is known by the link's name
 
 
+@functools.cache
+def _version(python: str) -> str:
+    """Blender's version there.  Raises ReferenceUnavailableError."""
+    asked = "import importlib.metadata as m; print(m.version('bpy'))"
+    run = subprocess.run([python, "-c", asked], capture_output=True, text=True, check=False)
+    if run.returncode != 0:
+        told = (run.stderr.strip().splitlines() or ["no Blender"])[-1]
+        raise ReferenceUnavailableError(f"{PYTHON}={python}: {told}; expected: {HOW}")
+    return run.stdout.strip()
+
+
+@dataclass(frozen=True)
 class Cycles:
-    """A scene in Cycles.  A context manager: afterwards there is no process.
+    """`comparisons.renderers.Renderer`: one process renders all replicates of a scene."""
 
-    version: Blender's, known after the first picture;  seconds: of each picture, wall clock.
-    """
+    title: str = "Cycles"
 
-    def __init__(self, scene: Scene, threads: int | None = None) -> None:
-        """Raises ReferenceUnavailableError, IneligibleError, SceneError."""
-        self._command = (interpreter(), str(Path(__file__).with_name("worker.py")))
-        self._folder = tempfile.TemporaryDirectory(prefix="reference-rt-cycles-")
-        self._children = Children()
-        self.version, self.seconds = "", list[float]()
-        try:
-            write(scene, Path(self._folder.name), threads)
-        except BaseException:
-            self._folder.cleanup()
-            raise
+    def version(self) -> str:
+        return f"Blender {_version(interpreter())}, CPU"
 
-    def __enter__(self) -> Self:
-        return self
+    @contextmanager
+    def load(self, scene: Scene, threads: int | None = None) -> Iterator["_Loaded"]:
+        command = (interpreter(), str(Path(__file__).with_name("worker.py")))
+        with temporary_folder() as folder:
+            try:
+                write(scene, folder, threads)
+            except NoCounterpartError as error:
+                raise NoCounterpartError(f"Cycles has no equal of {error}") from None
+            children = Children()
+            try:
+                yield _Loaded(command, folder, children)
+            finally:
+                children.close()
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self._children.close()
-        self._folder.cleanup()
+
+class _Loaded(NamedTuple):
+    command: tuple[str, str]
+    folder: Path
+    children: Children
 
     def render(
         self, count: int, spp: int, seed: int = 0, say: Callable[[str], None] = lambda line: None
-    ) -> FloatArray:
-        """Pictures (count, height, width, 3) of independent seeds: linear radiance.  Raises
-        ReferenceUnavailableError if Cycles cannot be run, crashes or hangs."""
-        found = []
+    ) -> Replicates:
+        pictures, seconds = [], []
         for k in range(count):
-            out = Path(self._folder.name, "picture.npy")
+            out = self.folder / "picture.npy"
             request = {
-                "scene": self._folder.name,
+                "scene": str(self.folder),
                 "seed": (seed + k) % 2**31,
                 "spp": spp,
                 "out": str(out),
             }
-            ended = self._children.carry_out(self._command, "", json.dumps(request), SECONDS, say)
+            ended = self.children.carry_out(self.command, "", json.dumps(request), SECONDS, say)
             if ended.failure is not None:
                 raise ReferenceUnavailableError(f"Cycles: {ended.failure}")
             about = json.loads(out.with_name(out.name + ".json").read_text(encoding="utf-8"))
-            self.version = about["version"]
-            self.seconds.append(about["seconds"])
-            found.append(np.load(out).astype(np.float64))
-        return np.stack(found)
+            seconds.append(about["seconds"])
+            pictures.append(np.load(out).astype(np.float64))
+        return Replicates(np.stack(pictures), np.array(seconds), spp)
+
+
+RENDERER = Cycles()

@@ -11,8 +11,8 @@ import numpy as np
 import reference_rt as rt
 from comparisons.geometry import affine
 from comparisons.mitsuba.second import described
+from comparisons.renderers import NoCounterpartError
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.util.errors import ReferenceRtError
 
 FINE = 256
 """Cells of a full turn.  Points are on the surface, and the middle of a cell's side is
@@ -44,12 +44,6 @@ class Surface(NamedTuple):
         return {"vertices": affine.apply_points(m, self.vertices), "faces": faces, **flat_columns}
 
 
-class IneligibleError(ReferenceRtError):
-    """A part of a scene that Cycles does not compute, or computes otherwise."""
-
-    exit_code = 4
-
-
 def name_of(shape: Any) -> str:
     """The type of a shape, as scene files name it."""
     return str(shape.type)
@@ -57,8 +51,8 @@ def name_of(shape: Any) -> str:
 
 @singledispatch
 def surface_of(shape: Any, folder: Path) -> Surface:
-    """The mesh of a shape.  Raises IneligibleError."""
-    raise IneligibleError(f"the shape {name_of(shape)}")
+    """The mesh of a shape.  Raises NoCounterpartError."""
+    raise NoCounterpartError(f"the shape {name_of(shape)}")
 
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])

@@ -1,4 +1,4 @@
-"""Scene -> Cycles: one `singledispatch` function for each kind, which raises `IneligibleError` for
+"""Scene -> Cycles: one `singledispatch` function for each kind, which raises NoCounterpartError for
 what Cycles does not compute exactly.
 
 Contract: the functions return plain data that `worker` reads: numbers, lists, names of .npy and
@@ -19,13 +19,14 @@ from typing import Any
 import numpy as np
 
 import reference_rt as rt
-from comparisons.cycles.surfaces import IneligibleError, Surface, name_of, surface_of
+from comparisons.cycles.surfaces import Surface, name_of, surface_of
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import copies_of, place_of
 from comparisons.geometry.frame import SHARE, round32
 from comparisons.mitsuba.second import described_image
 from comparisons.mitsuba.translate.cameras import focus_of
 from comparisons.mitsuba.translate.moved import frame_of, moved
+from comparisons.renderers import NoCounterpartError
 from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
 from reference_rt.cameras.film import BoxFilter
 from reference_rt.core.arrays import FloatArray
@@ -68,10 +69,10 @@ class Writing:
 
     @contextmanager
     def collected(self) -> Iterator[None]:
-        """Collects the reason of an IneligibleError, so that all of a scene are known."""
+        """Collects the reason of an NoCounterpartError, so that all of a scene are known."""
         try:
             yield
-        except IneligibleError as error:
+        except NoCounterpartError as error:
             if str(error) not in self.reasons:
                 self.reasons.append(str(error))
 
@@ -89,7 +90,7 @@ class Writing:
 
 def write(scene: Scene, folder: Path, threads: int | None = None) -> None:
     """Write a scene for `worker` into a folder, in the coordinates that suit float32 best.  Raises
-    IneligibleError with all reasons, SceneError for a file that cannot be used."""
+    NoCounterpartError with all reasons, SceneError for a file that cannot be used."""
     writing = Writing(moved(scene, frame_of(scene)), folder)
     scene = writing.scene
     found: Data = {"threads": threads or 0, "lights": [], "materials": writing.named}
@@ -99,7 +100,7 @@ def write(scene: Scene, folder: Path, threads: int | None = None) -> None:
         if found["bounces"] > MOST_MIRRORINGS and any(
             isinstance(m, rt.Mirror | rt.Conductor) for m in scene.materials.values()
         ):
-            raise IneligibleError(f"mirrors along paths of more than {MOST_MIRRORINGS} edges")
+            raise NoCounterpartError(f"mirrors along paths of more than {MOST_MIRRORINGS} edges")
     with writing.collected():
         found["camera"] = camera_of(scene.camera, scene.film)
     for light in scene.lights:
@@ -113,7 +114,7 @@ def write(scene: Scene, folder: Path, threads: int | None = None) -> None:
     with writing.collected():
         _check_places(writing)
     if writing.reasons:
-        raise IneligibleError("; ".join(writing.reasons))
+        raise NoCounterpartError("; ".join(writing.reasons))
     (folder / "scene.json").write_text(json.dumps(found), encoding="utf-8")
 
 
@@ -123,7 +124,7 @@ def obstacles(scene: Scene) -> list[str]:
     with tempfile.TemporaryDirectory() as folder:
         try:
             write(scene.changed(film=film), Path(folder))
-        except IneligibleError as error:
+        except NoCounterpartError as error:
             return str(error).split("; ")
     return []
 
@@ -131,16 +132,16 @@ def obstacles(scene: Scene) -> list[str]:
 def bounces_of(integrator: Any) -> int:
     """Cycles' bounces: edges of a path without the first and the last one."""
     if getattr(integrator, "hide_emitters", False):
-        raise IneligibleError("lamps that cameras do not see")
+        raise NoCounterpartError("lamps that cameras do not see")
     if isinstance(integrator, Direct):
         if not (integrator.light_samples and integrator.bsdf_samples):
-            raise IneligibleError("direct light by one strategy alone")
+            raise NoCounterpartError("direct light by one strategy alone")
         return 0
     if not isinstance(integrator, PathTracing):
-        raise IneligibleError(f"the integrator {integrator.type}")
+        raise NoCounterpartError(f"the integrator {integrator.type}")
     edges = integrator.max_depth
     if edges is not None and edges < 2:
-        raise IneligibleError("emission alone (max_depth below 2)")
+        raise NoCounterpartError("emission alone (max_depth below 2)")
     return MOST_BOUNCES if edges is None else min(edges - 2, MOST_BOUNCES)
 
 
@@ -152,9 +153,9 @@ def camera_of(camera: Any, film: Any) -> Data:
     orthographic view;  shift: of that rectangle, in widths;  aspect: width over height of a
     pixel."""
     if not isinstance(camera, Perspective | ThinLens | Pinhole | Orthographic):
-        raise IneligibleError(f"the camera {camera.type}")
+        raise NoCounterpartError(f"the camera {camera.type}")
     if not isinstance(film.filter, BoxFilter):
-        raise IneligibleError(f"the filter {film.filter.type}")
+        raise NoCounterpartError(f"the filter {film.filter.type}")
     eye, target = np.array(camera.eye), np.array(camera.target)
     back = eye - target
     right = np.cross(camera.up, back)
@@ -206,7 +207,7 @@ def _edges(camera: Any, film: Any) -> tuple[float, float, float, float]:
 @singledispatch
 def light_of(light: Any) -> Data:
     """A light of Blender: watts of points are 4 pi times their radiant intensity."""
-    raise IneligibleError(f"the light {light.type}")
+    raise NoCounterpartError(f"the light {light.type}")
 
 
 @light_of.register
@@ -248,7 +249,7 @@ def _number(value: Any, writing: Writing) -> Any:
 @singledispatch
 def texture_of(texture: Any, writing: Writing) -> Data:
     """A texture's data."""
-    raise IneligibleError(f"the texture {texture.type}")
+    raise NoCounterpartError(f"the texture {texture.type}")
 
 
 @texture_of.register
@@ -276,7 +277,7 @@ def _(texture: Bitmap, writing: Writing) -> Data:
 @singledispatch
 def shader_of(material: Any, writing: Writing) -> Data:
     """The shader of a material: black from behind where the material is."""
-    raise IneligibleError(f"the material {material.type}")
+    raise NoCounterpartError(f"the material {material.type}")
 
 
 def _front(shader: Data) -> Data:
@@ -306,7 +307,7 @@ def _(material: rt.RoughConductor, writing: Writing) -> Data:
     alphas = {material.alpha} if isinstance(material.alpha, str) else set(material.alpha)
     (alpha, *others) = alphas
     if others or isinstance(alpha, str) or alpha > MOST_ALPHA:
-        raise IneligibleError(
+        raise NoCounterpartError(
             f"the material {material.type}, but for one alpha of at most {MOST_ALPHA:g}: Cycles' "
             "masking is height-correlated"
         )
@@ -332,7 +333,7 @@ def _only(material: Any, **values: Any) -> None:
     for name, expected in values.items():
         found = getattr(material, name)
         if not np.all(np.asarray(found) == expected):
-            raise IneligibleError(
+            raise NoCounterpartError(
                 f"the material {material.type} with another {name} than {expected}"
             )
 
@@ -340,7 +341,7 @@ def _only(material: Any, **values: Any) -> None:
 @shader_of.register
 def _(material: Emissive, writing: Writing) -> Data:
     if isinstance(material.radiance, str):
-        raise IneligibleError("a textured lamp")
+        raise NoCounterpartError("a textured lamp")
     emission = {"type": "emission", "radiance": _rgb(material.radiance)}
     if material.base is None:
         return _front(emission)
@@ -359,7 +360,7 @@ def _bare(shader: Data) -> Data:
     if shader["type"] == "sides" and shader["back"] == BLACK:
         return _bare(shader["front"])
     if shader["type"] in ("sum", "mix", "sides", "glass"):
-        raise IneligibleError("two_sided of a material that is made of others, or of glass")
+        raise NoCounterpartError("two_sided of a material that is made of others, or of glass")
     return shader
 
 
@@ -387,17 +388,17 @@ def _meshes(writing: Writing) -> list[Data]:
             for leaf in member.leaves:
                 with writing.collected():
                     if member.tree is not None:
-                        raise IneligibleError("solids (CSG)")
+                        raise NoCounterpartError("solids (CSG)")
                     key = id(leaf.shape)
                     if key not in made:
                         made[key] = surface_of(leaf.shape, scene.folder)
                     surface, name = made[key], _material(leaf.material, writing)
                     if surface.uv is None and _has_texture(writing.named[name]["shader"]):
-                        raise IneligibleError(f"the shape {name_of(leaf.shape)} under a texture")
+                        raise NoCounterpartError(f"the shape {name_of(leaf.shape)} under a texture")
                     m = affine.map_in(leaf.shape, place_of(scene, leaf, copy.outer))
                     vertices = affine.apply_points(m, surface.vertices)
                     if not _holds(vertices[surface.faces[:MEASURED]]):
-                        raise IneligibleError(
+                        raise NoCounterpartError(
                             f"the shape {name_of(leaf.shape)}, too small for float32"
                         )
                     _note_place(leaf.shape, writing.named[name], vertices, writing)
@@ -428,7 +429,9 @@ def _note_place(shape: Any, material: Data, vertices: FloatArray, writing: Writi
     if "'glass'" in str(material["shader"]):
         is_closed = isinstance(shape, CLOSED) or getattr(shape, "capped", False)
         if not is_closed:
-            raise IneligibleError(f"glass on the shape {name_of(shape)}, which may not be closed")
+            raise NoCounterpartError(
+                f"glass on the shape {name_of(shape)}, which may not be closed"
+            )
         writing.glass.append(box)
 
 
@@ -443,9 +446,9 @@ def _check_places(writing: Writing) -> None:
     for box in (np.array([camera.eye] * 2), *points, *writing.lamps):
         for glass in writing.glass:
             if np.all(box[0] <= glass[1]) and np.all(glass[0] <= box[1]):
-                raise IneligibleError("a camera or a lamp in glass")
+                raise NoCounterpartError("a camera or a lamp in glass")
     if math.dist(camera.eye, camera.target) < VIEW * writing.reach:
-        raise IneligibleError("a view of less than a thousandth of the scene")
+        raise NoCounterpartError("a view of less than a thousandth of the scene")
 
 
 VIEW = 1e-3

@@ -6,7 +6,7 @@ nothing of this package.  It keeps to the protocol of `comparisons.runs.processe
     {"scene": "folder", "seed": 3, "spp": 64, "out": "picture.npy"}
 
 renders `folder/scene.json`, as `translate` writes it, into an array (height, width, 3) of linear
-radiance, and `picture.npy.json` with the seconds and Blender's version.
+radiance, and `picture.npy.json` with the seconds.
 """
 
 import json
@@ -300,8 +300,7 @@ def render(seed: int, spp: int, out: str) -> None:
     np.save(out, pixels.reshape(h, w, image.channels)[::-1, :, :3])
     bpy.data.images.remove(image)
     Path(path).unlink()
-    about = {"seconds": seconds, "version": bpy.app.version_string}
-    Path(out + ".json").write_text(json.dumps(about), encoding="utf-8")
+    Path(out + ".json").write_text(json.dumps({"seconds": seconds}), encoding="utf-8")
 
 
 def main() -> None:

@@ -10,7 +10,6 @@ from comparisons.compare import diagnosis
 from comparisons.compare.judge import Lights, despite, likeliest_cause, with_vote
 from comparisons.compare.looks import Looks, level_of
 from comparisons.compare.path_length import Lengths
-from comparisons.cycles.witness import Witness
 from comparisons.gate.digest import Copies
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes, size_of, stacked
@@ -28,6 +27,7 @@ from comparisons.results.case import (
 )
 from comparisons.rungs.images import images_rung
 from comparisons.rungs.input import input_rung
+from comparisons.rungs.witness import Witness
 from comparisons.statistics.metrics import image_metrics
 from comparisons.statistics.scales import TILE, cell_pixels, cell_sums
 from reference_rt.rendering.image import srgb

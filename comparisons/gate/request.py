@@ -4,19 +4,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal
 
 from comparisons.compare.compare import single_lights
 from comparisons.compare.judge import Lights
 from comparisons.compare.path_length import path_lengths
-from comparisons.cycles.witness import Witness, witness_of
 from comparisons.gate import baselines, reference
 from comparisons.gate.digest import scene_digest
 from comparisons.gate.gate import LIMIT, gate_pictures
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes
 from comparisons.gate.rim import check_rim
+from comparisons.renderers import WitnessName
 from comparisons.results.case import Case
+from comparisons.rungs.witness import Witness, witness_of
 from comparisons.statistics import Margins
 from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
@@ -47,7 +47,7 @@ class Request:
     threads: int | None = None
     rim: int = 0
     name: str = "candidate"
-    witness: Literal["cycles"] | None = None
+    witness: WitnessName | None = None
 
     def __post_init__(self) -> None:
         if self.references and self.baseline:
@@ -105,7 +105,9 @@ class Judge:
         if self.request.witness is None or self.request.scene is None:
             return None
         limit, threads = self.request.limit, self.request.threads
-        return witness_of(self.request.scene, limit, threads, lambda line: None)
+        return witness_of(
+            self.request.witness, self.request.scene, limit, threads, lambda line: None
+        )
 
 
 def prepared(

@@ -189,21 +189,23 @@ def variant(name: str) -> Iterator[Any]:
     """A context with Mitsuba in another variant, our plugins registered there too."""
     mi = mitsuba()
     chosen = mi.variant()
-    _set_variant(mi, name)
     try:
-        _register_once(name)
+        switch(name)
         yield mi
     finally:
-        _set_variant(mi, chosen)
+        switch(chosen)
 
 
-def _set_variant(mi: Any, name: str) -> None:
-    """Set the variant without Dr.Jit's warnings: Mitsuba defines all of its plugins again, and
-    after a thousand definitions Dr.Jit warns each time that this is slow."""
+def switch(name: str) -> None:
+    """Set the variant, our plugins registered there too; without Dr.Jit's warnings: Mitsuba defines
+    all of its plugins again, and after a thousand definitions Dr.Jit warns each time that this is
+    slow."""
+    mi = mitsuba()
     if mi.variant() != name:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
             mi.set_variant(name)
+    _register_once(name)
 
 
 @functools.cache

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.renderers import Replicates
 from reference_rt.core.arrays import FloatArray, IntArray
 
 _SHAPE = "shape_"
@@ -27,14 +28,6 @@ def shape_id(i: int) -> str:
 def light_id(i: int) -> str:
     """Mitsuba's id of entry i of our scene's lights."""
     return f"{_LIGHT}{i}"
-
-
-class Replicates(NamedTuple):
-    """Independent pictures (replicates, height, width, 3), row 0 on top, and the wall-clock seconds
-    (replicates,) of each."""
-
-    pictures: FloatArray
-    seconds: FloatArray
 
 
 def for_rays(
@@ -172,7 +165,7 @@ def render(mi_scene: Any, replicates: int, spp: int, seed: int = 0) -> Replicate
         start = time.perf_counter()
         pictures.append(picture(mi_scene, spp, seed + k))
         seconds.append(time.perf_counter() - start)
-    return Replicates(np.stack(pictures), np.array(seconds))
+    return Replicates(np.stack(pictures), np.array(seconds), spp)
 
 
 _APART = 1 << 20

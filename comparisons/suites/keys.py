@@ -11,6 +11,7 @@ from urllib.parse import unquote
 from comparisons.compare.budget import Budget
 from comparisons.mitsuba.backend import Backend
 from comparisons.mitsuba.reading.reference import file_of
+from comparisons.renderers import witness_facts
 from comparisons.runs import provenance
 from comparisons.runs.engine import key_of
 from reference_rt.rendering.scene import Scene
@@ -32,6 +33,7 @@ def case_key(scene: Scene, budget: Budget, rungs: tuple[str, ...], backend: Back
         versions=provenance.package_versions(),
         variant=backend.variant,
         llvm=backend.llvm_path,
+        witness=witness_facts(budget.witness),
     )
 
 

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 from rich.text import Text
 
 from comparisons.mitsuba.backend import Backend, backend
+from comparisons.renderers import witness_facts
 from comparisons.report import terminal, write_report, write_results
 from comparisons.report.ci import ranked
 from comparisons.results.case import PASSING, WARNING, Case, RungResult, how_many
@@ -250,6 +251,11 @@ def run_suite(source: Source, plan: Plan, options: Options) -> Run:
     return run_cases(plan._replace(work=work), options, seconds, source.name, facts)
 
 
+def _witnesses(plan: Plan) -> dict[str, str]:
+    """Versions of the renderers that may vote in some case."""
+    return {k: v for w in plan.work for k, v in witness_facts(w.budget.witness).items()}
+
+
 def run_cases(
     plan: Plan,
     options: Options,
@@ -269,7 +275,7 @@ def run_cases(
     """
     check_writable(options.results, options.report, options.out / "cases" / "a case")
     chosen = backend()
-    told = provenance(**(facts or {}))
+    told = provenance(**(facts or {}), **_witnesses(plan))
     found: dict[str, Case] = {}
     run = Run((), {}, dict(plan.skipped))
 

@@ -5,12 +5,10 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, Protocol, Self
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 
-from comparisons.cycles.backend import Cycles
-from comparisons.cycles.surfaces import IneligibleError
 from comparisons.experiments.convergence.estimates import Accumulator, against
 from comparisons.experiments.convergence.store import (
     FIRST,
@@ -21,10 +19,11 @@ from comparisons.experiments.convergence.store import (
     size_within,
     weights,
 )
-from comparisons.geometry.flatten import copies_of
-from comparisons.mitsuba.backend import LLVM, SCALAR, backend, mitsuba, variant
+from comparisons.mitsuba.backend import LLVM, SCALAR
+from comparisons.mitsuba.native import Native
 from comparisons.mitsuba.notes import notes_of
-from comparisons.mitsuba.translate import MOST_INSTANCES, UntranslatableError, to_mitsuba
+from comparisons.renderers import NoCounterpartError, other
+from comparisons.renderers import Renderer as Other
 from comparisons.runs.elsewhere import cool_down
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.render import Progress, render
@@ -48,9 +47,6 @@ class Renderer(Protocol):
     def __call__(self, spp: int, replicate: int) -> Shot:
         """A picture of about `spp` samples per pixel; different replicates are independent."""
 
-
-MOST_TOLD = 200
-"""Characters of a renderer's message that a reason quotes."""
 
 BEST = "best"
 """Placeholder for the best sampler, which a trial determines."""
@@ -114,13 +110,13 @@ class AbsentError(Exception):
 
 
 @contextmanager
-def failing(what: str) -> Iterator[None]:
-    """Turn exceptions of Mitsuba and Dr.Jit into AbsentError: a method that fails must not stop the
+def _absent() -> Iterator[None]:
+    """Turn what another renderer raises into AbsentError: a method that fails must not stop the
     others."""
     try:
         yield
-    except (RuntimeError, MemoryError) as error:
-        raise AbsentError(f"{what}: {' '.join(str(error).split())[:MOST_TOLD]}") from None
+    except (NoCounterpartError, ReferenceUnavailableError) as error:
+        raise AbsentError(str(error)) from None
 
 
 def remarks(scene: Scene) -> list[str]:
@@ -135,47 +131,36 @@ def remarks(scene: Scene) -> list[str]:
 
 
 class Stable:
-    """Prepares methods and keeps what they share.  A context manager: it restores Mitsuba's variant
-    at its end, and ends the process of Cycles."""
+    """Prepares methods and keeps what they share.  A context manager: at its end nothing is loaded,
+    and Mitsuba is in the variant that it was in."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._entered, self._others = ExitStack(), ExitStack()
+        self._loaded = ExitStack()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._entered.close()
-        self._others.close()
-
-    def _in(self, side: str) -> Any:
-        """Mitsuba in this variant, until another is needed: a switch defines its plugins again."""
-        mi = mitsuba()
-        if mi.variant() != side:
-            self._entered.close()
-            if mi.variant() != side:
-                self._entered.enter_context(variant(side))
-        return mi
+        self._loaded.close()
 
     def ready(self, method: Method, progress: Progress | None = None) -> Renderer:
-        """Load and compile.  Raises SceneError, ReferenceUnavailableError, AbsentError."""
+        """Load and compile.  Raises SceneError, AbsentError."""
         if method.side == "ours":
             return self._ours(method, progress)
-        if method.side == CYCLES:
-            try:
-                return self._cycles()
-            except (ReferenceUnavailableError, IneligibleError) as error:
-                raise AbsentError(str(error)) from None
-        if method.side == LLVM and backend().variant != LLVM:
-            raise AbsentError(f"Mitsuba's variant {LLVM} does not run here: {backend().reason}")
-        copies = copies_of(self._scene)
-        if any(member.tree is not None for copy in copies for member in copy.members):
-            raise AbsentError("Mitsuba has no set operations")
-        try:
-            return self._mitsubas(method)
-        except UntranslatableError as error:
-            raise AbsentError(str(error)) from None
+        renderer: Other = (
+            other(CYCLES) if method.side == CYCLES else Native(method.side, method.sampler)
+        )
+        with _absent():
+            loaded = self._loaded.enter_context(renderer.load(self._scene))
+
+        def shot(spp: int, replicate: int) -> Shot:
+            cool_down()
+            with _absent():
+                found = loaded.render(1, spp, seed_of(replicate))
+            return Shot(found.pictures[0], found.spp, float(found.seconds[0]))
+
+        return shot
 
     def _ours(self, method: Method, progress: Progress | None) -> Renderer:
         scene = self._scene
@@ -197,45 +182,6 @@ class Stable:
         render(small, tables=tables, progress=progress, specialised=True)
         return shot
 
-    def _cycles(self) -> Renderer:
-        cycles = self._others.enter_context(Cycles(self._scene))
-
-        def shot(spp: int, replicate: int) -> Shot:
-            cool_down()
-            try:
-                (picture,) = cycles.render(1, spp, seed_of(replicate))
-            except ReferenceUnavailableError as error:
-                raise AbsentError(str(error)) from None
-            return Shot(picture, spp, cycles.seconds[-1])
-
-        return shot
-
-    def _mitsubas(self, method: Method) -> Renderer:
-        mi = self._in(method.side)
-        description = to_mitsuba(self._scene, native=True)
-        description["sensor"]["sampler"] = {"type": method.sampler}
-        parts = [part for part in description.values() if isinstance(part, dict)]
-        instances = sum(part.get("type") == "instance" for part in parts)
-        if method.side == LLVM and instances > MOST_INSTANCES:
-            raise AbsentError(
-                f"{instances} instances, for which Mitsuba's llvm variant takes minutes to compile"
-            )
-        with failing("Mitsuba cannot load the scene"):
-            mi_scene = mi.load_dict(description)
-        sampler = mi_scene.sensors()[0].sampler()
-
-        def shot(spp: int, replicate: int) -> Shot:
-            mi = self._in(method.side)
-            cool_down()
-            start = time.perf_counter()
-            with failing(f"Mitsuba cannot render {spp} samples per pixel"):
-                # The array is what forces the lazy rendering to happen.
-                found = np.array(mi.render(mi_scene, spp=spp, seed=seed_of(replicate)))
-            seconds = time.perf_counter() - start
-            return Shot(_three(found), int(sampler.sample_count()), seconds)
-
-        return shot
-
 
 FIRST_SEED = 1 << 40
 
@@ -244,10 +190,6 @@ def seed_of(replicate: int) -> int:
     """Mitsuba's 32-bit seeds, spread as multiples of the golden ratio: it adds the pixel index to
     the seed, so that close seeds would give different pixels the same random numbers."""
     return (1 + replicate) * 0x9E3779B1 % (1 << 32)
-
-
-def _three(picture: Any) -> FloatArray:
-    return np.asarray(picture, dtype=np.float64)[..., :3]
 
 
 # ---- the plan -----------------------------------------------------------------------------------

@@ -32,7 +32,6 @@ from comparisons.experiments.convergence.methods import (
     chosen,
     climb,
     estimate,
-    failing,
     merits,
     remarks,
     rungs,
@@ -52,7 +51,9 @@ from comparisons.experiments.convergence.store import (
     weights,
 )
 from comparisons.mitsuba.backend import SCALAR, backend
+from comparisons.mitsuba.native import failing
 from comparisons.mitsuba.translate import UntranslatableError, load
+from comparisons.renderers import NoCounterpartError
 from comparisons.suites.suite import Changes, read
 from reference_rt.cameras.film import BoxFilter
 from reference_rt.core.arrays import FloatArray
@@ -61,7 +62,7 @@ from reference_rt.rendering.image import display
 from reference_rt.rendering.render import Progress, render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
-from reference_rt.util.errors import SceneError
+from reference_rt.util.errors import ReferenceUnavailableError, SceneError
 
 # ---- scenes without chance ----------------------------------------------------------------------
 
@@ -136,7 +137,7 @@ def _made(scene: Scene, settings: Settings, say: Progress) -> tuple[Grids, list[
     try:
         with failing("Mitsuba cannot render the scene"):
             points.append(_mitsubas(scene))
-    except (UntranslatableError, AbsentError) as error:
+    except (NoCounterpartError, ReferenceUnavailableError) as error:
         left_out.append(f"Mitsuba: {error}")
     return Grids(tuple(steps), tuple(points), across * across, finest), left_out
 

@@ -12,22 +12,17 @@ import numpy as np
 from comparisons.geometry import affine
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.second import described_image
+from comparisons.renderers import NoCounterpartError
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.materials.material import Material
 from reference_rt.rendering.scene import Scene
 from reference_rt.textures import Bitmap, Checker, Texture, VertexColours
 from reference_rt.textures.texture import UvMap
-from reference_rt.util.errors import ReferenceRtError
 
 
-class UntranslatableError(ReferenceRtError):
-    """A part of a scene has no counterpart in Mitsuba: the scene is `not-comparable`.
-
-    The exit code is the same as if the reference could not run.
-    """
-
-    exit_code = 4
+class UntranslatableError(NoCounterpartError):
+    """A part of a scene has no counterpart in Mitsuba."""
 
     def __init__(self, part: Any, kind: str) -> None:
         name = part if isinstance(part, str) else type(part).__name__

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import reference_rt as rt
-from comparisons.cycles.surfaces import FINE, IneligibleError, surface_of
+from comparisons.cycles.surfaces import FINE, surface_of
 from comparisons.geometry import affine
+from comparisons.renderers import NoCounterpartError
 from reference_rt.core.transform import Matrix, Rotate, Scale, Translate
 
 SHAPES = {
@@ -92,5 +93,5 @@ def test_volumes(name, volume):
     "shape", [rt.Plane(), rt.Quadric(coefficients=(1,) * 10, lower=(-1,) * 3, upper=(1,) * 3)]
 )
 def test_others_do_not_vote(shape):
-    with pytest.raises(IneligibleError, match=shape.type):
+    with pytest.raises(NoCounterpartError, match=shape.type):
         surface_of(shape, Path())

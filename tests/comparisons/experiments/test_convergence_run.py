@@ -17,7 +17,6 @@ from comparisons.experiments import convergence
 from comparisons.experiments.convergence.findings import Curves, findings_of
 from comparisons.experiments.convergence.methods import (
     METHODS,
-    AbsentError,
     Climb,
     Stable,
     chosen,
@@ -195,12 +194,6 @@ def test_times_to_an_error(own_cache, counted_time):
     assert times == {name: one.seconds.value for name, one in found.items()}
     with pytest.raises(ValueError, match="deterministic"):
         convergence.time_to_error(Scene.load(SCENES / "whitted_classic.yaml"), 0.1, 1.0)
-
-
-def test_solids_have_no_mitsuba():
-    scene = Scene.load(SCENES / "csg_dice.yaml")
-    with Stable(scene) as stable, pytest.raises(AbsentError, match="set operations"):
-        stable.ready(next(c for c in METHODS if c.name == "mitsuba_llvm"))
 
 
 # ---- parts --------------------------------------------------------------------------------------

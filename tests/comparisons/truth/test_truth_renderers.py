@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from comparisons.renderers import other
 from comparisons.truth.case import cases
 from comparisons.truth.judge import judge
-from comparisons.truth.renderers import NoCounterpartError, by_mitsuba, load, ours
+from comparisons.truth.renderers import by, load, ours
 from reference_rt.rendering.scene import Scene
 
 SCENES = Path(__file__).parents[3] / "scenes" / "truth"
@@ -145,9 +146,9 @@ def test_a_planted_fault_is_seen(name, right, wrong):
 
 def test_mitsuba():
     """Right where it is exact; its own plugins and integrators are judged, whose path tracer takes
-    the opacity of a mask twice, and whose blends lose light of mirrors; it has no solids."""
+    the opacity of a mask twice, and whose blends lose light of mirrors."""
     found = {
-        name: judge(CASES[name].compute(), by_mitsuba(load(SCENES / f"{name}.yaml", 64)))
+        name: judge(CASES[name].compute(), by(other("mitsuba"), load(SCENES / f"{name}.yaml", 64)))
         for name in ("perspective", "point_over_floor", "mask_in_light", "blend_furnace")
     }
     assert {name: one.verdict for name, one in found.items()} == {
@@ -157,5 +158,3 @@ def test_mitsuba():
         "blend_furnace": "off",
     }
     assert -51.0 < found["mask_in_light"].percent < -49.0
-    with pytest.raises(NoCounterpartError, match="solids"):
-        by_mitsuba(load(SCENES / "drilled_box.yaml"))

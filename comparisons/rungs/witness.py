@@ -1,13 +1,12 @@
-"""The rung `witness`: with Cycles' pictures a difference of two renderers is one of three, and says
-who stands alone."""
+"""The rung `witness`: a third renderer's pictures turn a difference of two into one of three, and
+say who stands alone."""
 
 from collections.abc import Callable
 
 import numpy as np
 
 from comparisons import statistics
-from comparisons.cycles.backend import Cycles, interpreter
-from comparisons.cycles.surfaces import IneligibleError
+from comparisons.renderers import NoCounterpartError, WitnessName, other
 from comparisons.results.case import RungResult, Status
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
@@ -23,34 +22,34 @@ picture."""
 
 
 def witness_of(
+    name: WitnessName,
     scene: Scene,
     limit: float,
     threads: int | None,
     say: Callable[[str], None],
 ) -> Witness:
-    """The witness of a scene's pictures.  limit: as in `statistics.compare`;  threads: of Cycles,
-    None for all cores.  Raises ReferenceUnavailableError where there is no Cycles."""
-    interpreter()
+    """The witness of a scene's pictures.  limit: as in `statistics.compare`;  threads: its own,
+    None for all cores.  Raises ReferenceUnavailableError where it is not installed."""
+    witness = other(name)
+    version = witness.version()
 
     def hear(
         replicates: tuple[FloatArray, FloatArray], sides: tuple[str, str]
     ) -> tuple[RungResult, FloatArray | None]:
         count = max(2, *(len(side) for side in replicates))
         try:
-            cycles = Cycles(scene, threads)
-        except IneligibleError as error:
-            reason = f"Cycles has no equal of {error}: it does not vote"
+            with witness.load(scene, threads) as loaded:
+                found = loaded.render(count, scene.resolved_sampler.spp)
+        except NoCounterpartError as error:
+            reason = f"{error}: it does not vote"
             return RungResult("witness", "not-applicable", reason), None
-        try:
-            with cycles:
-                pictures = cycles.render(count, scene.resolved_sampler.spp)
         except ReferenceUnavailableError as error:  # of this scene: others of a suite go on
             return RungResult("witness", "not-comparable", str(error)), None
-        say(f"witness: {count} pictures by Cycles ({sum(cycles.seconds):.1f} s)")
-        rung = vote((*replicates, pictures), (*sides, "Cycles'"), limit)
-        rung.numbers["version"] = f"Blender {cycles.version}"
-        rung.numbers["seconds"] = float(np.median(cycles.seconds))
-        return rung, pictures.mean(axis=0)
+        say(f"witness: {count} pictures by {witness.title} ({found.seconds.sum():.1f} s)")
+        rung = vote((*replicates, found.pictures), (*sides, f"{witness.title}'"), limit)
+        rung.numbers["version"] = version
+        rung.numbers["seconds"] = float(np.median(found.seconds))
+        return rung, found.pictures.mean(axis=0)
 
     return hear
 

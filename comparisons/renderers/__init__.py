@@ -1,0 +1,78 @@
+"""Other renderers: what each must provide, and which there are.
+
+Contract: a `Renderer` says its version, and translates and loads a scene; what it loaded renders
+replicates.  The commands truth and converge and the option --witness need no more.  To add one: a
+folder of `comparisons` with a module that has such a `RENDERER`, its place in `PLACES`, and its
+name in `WitnessName` and `comparisons.commands.options.Witness` if it may vote.
+"""
+
+import importlib
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import Literal, NamedTuple, Protocol, cast
+
+from reference_rt.core.arrays import FloatArray
+from reference_rt.rendering.scene import Scene
+from reference_rt.util.errors import ReferenceRtError
+
+
+class Replicates(NamedTuple):
+    """Independent pictures (replicates, height, width, 3) of linear radiance, row 0 on top; the
+    wall-clock seconds (replicates,) of each; and the samples per pixel that they really have."""
+
+    pictures: FloatArray
+    seconds: FloatArray
+    spp: int
+
+
+class NoCounterpartError(ReferenceRtError):
+    """A part of a scene that another renderer does not compute, or computes otherwise: the scene is
+    `not-comparable`.  The exit code is the same as if that renderer could not run."""
+
+    exit_code = 4
+
+
+class Loaded(Protocol):
+    """A scene that another renderer has loaded."""
+
+    def render(
+        self, count: int, spp: int, seed: int = 0, say: Callable[[str], None] = lambda line: None
+    ) -> Replicates:
+        """Pictures with the seeds seed, seed + 1, ...; the first one's seconds may have compiling
+        in them.  say: called with each line that the renderer prints.  Raises
+        ReferenceUnavailableError if the renderer refuses, crashes or hangs."""
+
+
+class Renderer(Protocol):
+    """Another renderer."""
+
+    @property
+    def title(self) -> str:
+        """Its name, for people."""
+
+    def version(self) -> str:
+        """Version and variant, for provenance.  Raises ReferenceUnavailableError, which says how to
+        get the renderer, if it is not installed."""
+
+    def load(self, scene: Scene, threads: int | None = None) -> AbstractContextManager[Loaded]:
+        """Translate a scene and load it; after the context nothing of it is left.  threads: None
+        for all cores.  Raises NoCounterpartError with all reasons, ReferenceUnavailableError,
+        SceneError for a file that cannot be used."""
+
+
+PLACES = {"mitsuba": "comparisons.mitsuba.native", "cycles": "comparisons.cycles.backend"}
+"""The modules of the other renderers, by name.  Imported when one is needed."""
+
+WitnessName = Literal["cycles"]
+"""Those that are no party to a comparison, and may be asked who is right."""
+
+
+def other(name: str) -> Renderer:
+    """The renderer with a name of PLACES."""
+    return cast(Renderer, importlib.import_module(PLACES[name]).RENDERER)
+
+
+def witness_facts(name: WitnessName | None) -> dict[str, str]:
+    """The witness's version and variant, for provenance; {} without a witness.  Raises
+    ReferenceUnavailableError if it is not installed."""
+    return {} if name is None else {name: other(name).version()}
