@@ -355,8 +355,11 @@ def _deterministic_rungs(
             scene, tables, counterpart, budget.pixels, resolved=budget.resolution
         ),
         "direct": lambda: ladder.direct(scene, tables, counterpart, budget.light_pixels),
+        "sampling": lambda: ladder.sampling(scene, tables),
         "whitted": lambda: ladder.whitted(scene, tables, counterpart, budget.pixels),
     }
+    if isinstance(scene.integrator, RayCast | Whitted):  # they sample no light
+        del climbs["sampling"]
     if any(not isinstance(film_filter, BoxFilter) for film_filter in film_filters):
         climbs = {"film": lambda: ladder.film(*film_filters), **climbs}
     climbs = {"files": lambda: ladder.files(written), **climbs}

@@ -2,10 +2,11 @@
 
 A rung is one test of the ladder `comparisons.results.rungs.RUNGS`.  `files` holds our tables
 against second sources of what the scene's files and descriptions say.  `film`, `geometry`, `direct`
-and `whitted` compare without noise, ray by ray; `layers` compares what is written beside the
-colour; `input` checks the pictures themselves, `images` compares them by metrics,
-`comparisons.statistics` their means.  `limited` changes `differ` to
-`reference-limited` above a rung that shows that Mitsuba's precision is too low.
+and `whitted` compare without noise, ray by ray; `sampling` holds our light samples against their
+densities; `layers` compares what is written beside the colour; `input` checks the pictures
+themselves, `images` compares them by metrics, `comparisons.statistics` their means; `witness` asks
+a third renderer.  `limited` changes `differ` to `reference-limited` above a rung that shows that
+Mitsuba's precision is too low.
 
 Contract: a rung takes the scene, our tables and Mitsuba's counterpart (or pictures, or nothing else
 but the scene), and returns a
@@ -23,6 +24,7 @@ from comparisons.rungs.files import files
 from comparisons.rungs.film import film
 from comparisons.rungs.geometry import geometry
 from comparisons.rungs.layers import layers
+from comparisons.rungs.sampling import sampling
 from comparisons.rungs.whitted import whitted
 
-__all__ = ["direct", "files", "film", "geometry", "layers", "whitted"]
+__all__ = ["direct", "files", "film", "geometry", "layers", "sampling", "whitted"]

@@ -92,6 +92,99 @@ def dark_tile(fraction: float) -> PictureFault:
     return PictureFault(f"one tile {100.0 * fraction:g} % dark", SCENE, change)
 
 
+def _sampled(pictures: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Pictures at the pixel positions x, y, with bilinear interpolation and repeated edges."""
+    out = np.empty_like(pictures)
+    for k, picture in enumerate(pictures):
+        for c in range(3):
+            out[k, ..., c] = ndimage.map_coordinates(
+                picture[..., c], [y, x], order=1, mode="nearest"
+            )
+    return out
+
+
+def radial(name: str, strength: float, zoom: float = 1.0) -> PictureFault:
+    """A lens that moves pixels along the radius: barrel distortion, or a zoom."""
+
+    def change(pictures: FloatArray) -> FloatArray:
+        height, width = pictures.shape[1:3]
+        y, x = np.mgrid[0:height, 0:width]
+        dx, dy = x - (width - 1) / 2, y - (height - 1) / 2
+        factor = zoom * (1.0 + strength * (dx * dx + dy * dy) / (0.25 * width * width))
+        return _sampled(pictures, dx * factor + (width - 1) / 2, dy * factor + (height - 1) / 2)
+
+    return PictureFault(name, SCENE, change)
+
+
+def _fringes(pictures: FloatArray) -> FloatArray:
+    """Chromatic aberration: red 0.4 % larger, blue 0.4 % smaller."""
+    larger, smaller = (radial("", 0.0, zoom).change(pictures) for zoom in (1 / 1.004, 1.004))
+    return np.stack([larger[..., 0], pictures[..., 1], smaller[..., 2]], axis=-1)
+
+
+def colours(name: str, *rows: tuple[float, float, float]) -> PictureFault:
+    """Colours by a matrix."""
+    matrix = np.array(rows)
+    return PictureFault(name, SCENE, lambda pictures: pictures @ matrix.T)
+
+
+GREY = (0.2126, 0.7152, 0.0722)
+"""The luminance of linear sRGB (BT.709)."""
+
+
+def _less_saturated(pictures: FloatArray) -> FloatArray:
+    return 0.9 * pictures + 0.1 * (pictures @ np.array(GREY))[..., None]
+
+
+def _filmic(pictures: FloatArray) -> FloatArray:
+    """Hable's curve (2010), white at 11.2."""
+
+    def curve(x: FloatArray) -> FloatArray:
+        return (x * (0.15 * x + 0.05) + 0.004) / (x * (0.15 * x + 0.5) + 0.06) - 0.02 / 0.3
+
+    return np.asarray(curve(2.0 * np.maximum(pictures, 0.0)) / curve(np.array(11.2)))
+
+
+def _history(pictures: FloatArray) -> FloatArray:
+    """Temporal accumulation: each picture is 0.9 of the one before and 0.1 new."""
+    pictures = pictures.copy()
+    for k in range(1, len(pictures)):
+        pictures[k] = 0.9 * pictures[k - 1] + 0.1 * pictures[k]
+    return pictures
+
+
+def _prefixes(pictures: FloatArray) -> FloatArray:
+    """The states of one accumulation."""
+    count = np.arange(1, len(pictures) + 1)[:, None, None, None]
+    return np.asarray(np.cumsum(pictures, axis=0) / count)
+
+
+def _copies(pictures: FloatArray) -> FloatArray:
+    """The second picture is 0.95 of the first."""
+    pictures = pictures.copy()
+    pictures[1] = 0.95 * pictures[0] + 0.05 * pictures[1]
+    return pictures
+
+
+def _column(pictures: FloatArray) -> FloatArray:
+    pictures = pictures.copy()
+    pictures[:, :, pictures.shape[2] // 3] *= 0.98
+    return pictures
+
+
+def mean_kept_vignette(fraction: float) -> PictureFault:
+    """Corners darker by a fraction and the middle brighter, so that the mean stays."""
+
+    def change(pictures: FloatArray) -> FloatArray:
+        height, width = pictures.shape[1:3]
+        y, x = np.mgrid[0:height, 0:width]
+        r2 = (2.0 * (x + 0.5) / width - 1.0) ** 2 + (2.0 * (y + 0.5) / height - 1.0) ** 2
+        changed = pictures * (1.0 - 0.5 * fraction * r2[..., None])
+        return np.asarray(changed * (pictures.mean() / changed.mean()))
+
+    return PictureFault(f"corners {100.0 * fraction:g} % dark, mean kept", SCENE, change)
+
+
 def black_level(radiance: float) -> PictureFault:
     """A constant radiance added to every pixel."""
     name = f"black level {radiance:+g} W/sr/m²"
@@ -156,4 +249,38 @@ FAULTS = (
     PictureFault("replicates share noise", SCENE, _shared_noise),
     PictureFault("all replicates the same", SCENE, lambda p: np.repeat(p[:1], len(p), axis=0)),
     PictureFault("black", SCENE, np.zeros_like),
-)
+    PictureFault("green, blue and red for red, green and blue", SCENE, lambda p: p[..., [1, 2, 0]]),
+    PictureFault("grey", SCENE, lambda p: np.repeat((p @ np.array(GREY))[..., None], 3, axis=-1)),
+    PictureFault("tinted", SCENE, lambda pictures: pictures * (1.02, 1.0, 0.98)),
+    PictureFault("saturation 0.9", SCENE, _less_saturated),
+    colours(
+        "primaries of Rec. 2020", (0.6274, 0.3293, 0.0433), (0.0691, 0.9195, 0.0114),
+        (0.0164, 0.0880, 0.8956),
+    ),
+    colours(
+        "primaries of Display P3", (0.8225, 0.1774, 0.0), (0.0332, 0.9669, 0.0),
+        (0.0171, 0.0724, 0.9108),
+    ),
+    colours(
+        "XYZ for RGB", (0.4124, 0.3576, 0.1805), (0.2126, 0.7152, 0.0722), (0.0193, 0.1192, 0.9505)
+    ),
+    colours(
+        "ACEScg for sRGB", (0.6131, 0.3395, 0.0474), (0.0702, 0.9164, 0.0134),
+        (0.0206, 0.1096, 0.8698),
+    ),
+    radial("barrel distortion of 0.003", 0.003),
+    radial("barrel distortion of 0.01", 0.01),
+    radial("zoom of 1 %", 0.0, 1.01),
+    PictureFault("chromatic aberration of 0.4 %", SCENE, _fringes),
+    PictureFault("Reinhard's tone curve", SCENE, lambda pictures: pictures / (1.0 + pictures)),
+    PictureFault("a filmic tone curve", SCENE, _filmic),
+    PictureFault("sRGB decoded by 2.2", SCENE, lambda p: srgb(np.maximum(p, 0.0)) ** 2.2),
+    PictureFault("sRGB decoded by 2", SCENE, lambda p: srgb(np.maximum(p, 0.0)) ** 2.0),
+    PictureFault("a ghost of 0.5 %", SCENE, lambda p: p + 0.005 * p[:, ::-1, ::-1]),
+    PictureFault("a history of nine tenths", SCENE, _history),
+    PictureFault("states of one accumulation", SCENE, _prefixes),
+    PictureFault("one picture nearly another's copy", SCENE, _copies),
+    PictureFault("one column 2 % dark", SCENE, _column),
+    mean_kept_vignette(0.02),
+    mean_kept_vignette(0.008),
+)  # fmt: skip

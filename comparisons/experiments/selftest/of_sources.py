@@ -253,4 +253,39 @@ FAULTS = (
         "light of the back of lamps", BOX, "lights/emitters/area.py",
         "    if q.light < 0 or dot(q.n, w) <= 0.0:\n", "    if q.light < 0:\n",
     ),
+    SourceFault(
+        "another probability at the root of the light tree", "many_lights",
+        "lights/selection/choice.py",
+        "            u /= left\n            probability *= left\n",
+        "            u /= left\n            probability *= left if i > 1 else 0.9 * left\n",
+    ),
+    SourceFault(
+        "lights below a grazing cosine left out", "soft_shadows", "integrators/direct_light.py",
+        "    wi = to_local(shading.frame, light.wi)\n    scattered",
+        "    wi = to_local(shading.frame, light.wi)\n    if abs(wi.z) < 0.05:\n"
+        "        black = Vec3(0.0, 0.0, 0.0)\n        return Direct(light, black, black, 0.0)\n"
+        "    scattered",
+    ),
+    SourceFault(
+        "roulette without compensation beyond edge 8", "white_room", "integrators/path.py",
+        "        throughput = throughput * (1.0 / survival)\n",
+        "        throughput = throughput * (1.0 if depth > 8 else 1.0 / survival)\n",
+    ),
+    SourceFault(
+        "the numbers of the third edge again for the fourth", "white_room", "integrators/path.py",
+        "    point, dimension = shading.point, sampling.PER_BOUNCE * depth\n"
+        "    ended = Step(False, Ray(point.p, point.n, 0.0), state)\n",
+        "    point, dimension = shading.point, sampling.PER_BOUNCE * (2 if depth == 3 else depth)\n"
+        "    ended = Step(False, Ray(point.p, point.n, 0.0), state)\n",
+    ),
+    SourceFault(
+        "repeated images clamped at their last texel", IMAGES, "textures/bitmap.py",
+        "        return min(i, 2 * n - 1 - i)\n    return i % n\n",
+        "        return min(i, 2 * n - 1 - i)\n    return n - 1 if i == n else i % n\n",
+    ),
+    SourceFault(
+        "a sky clamped at its seam", SKY, "lights/emitters/environment_map.py",
+        "    left, beside = column % width, (column + 1) % width\n",
+        "    left, beside = max(column, 0), min(column + 1, width - 1)\n",
+    ),
 )  # fmt: skip

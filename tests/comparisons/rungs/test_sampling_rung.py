@@ -1,0 +1,56 @@
+"""The rung of light samples: scenes of every light agree, and wrong tables of lights are found."""
+
+import pytest
+from builders import SCENES
+
+import reference_rt as rt
+from comparisons.rungs import sampling
+
+
+def _scaled(tables, field, factor):
+    """The tables with a probability by power that is not the one that lights are picked with."""
+    choice = tables.lights.choice
+    values = getattr(choice, field).copy()
+    values[0] *= factor
+    lights = tables.lights._replace(choice=choice._replace(**{field: values}))
+    return tables._replace(lights=lights)
+
+
+def _other_leaf(tables):
+    """The tables of a light tree in which two lights have each other's way from the root."""
+    tree = tables.lights.tree
+    trail = tree.trail.copy()
+    trail[[0, -1]] = trail[[-1, 0]]
+    leaf = tree.leaf.copy()
+    leaf[[0, -1]] = leaf[[-1, 0]]
+    return tables._replace(lights=tables.lights._replace(tree=tree._replace(trail=trail, leaf=leaf)))
+
+
+def _bright_sky(tables):
+    """The tables of a sky whose texels, and so densities, are 5 % larger than the sums that samples
+    are drawn from."""
+    sky = tables.lights.environment
+    sky = sky._replace(texels=sky.texels * 1.05)
+    return tables._replace(lights=tables.lights._replace(environment=sky))
+
+
+FAULTS = {
+    "probability by power": ("light_shapes", lambda t: _scaled(t, "probability", 1.01)),
+    "share of the tree": ("regressions/many_lamps", _other_leaf),
+    "density of a sky": ("environment", _bright_sky),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_faults_are_found(name):
+    source, change = FAULTS[name]
+    scene = rt.Scene.load(SCENES / f"{source}.yaml")
+    assert sampling(scene, scene.tables).status == "agree"
+    found = sampling(scene, change(scene.tables))
+    assert found.status == "differ"
+    assert "light" in found.reason
+
+
+def test_without_lights():
+    scene = rt.Scene(shapes=(rt.Sphere(center=(0, 0, -3)),))
+    assert sampling(scene, scene.tables).status == "not-applicable"
