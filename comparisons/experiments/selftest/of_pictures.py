@@ -133,7 +133,7 @@ GREY = (0.2126, 0.7152, 0.0722)
 
 
 def _less_saturated(pictures: FloatArray) -> FloatArray:
-    return 0.9 * pictures + 0.1 * (pictures @ np.array(GREY))[..., None]
+    return np.asarray(0.9 * pictures + 0.1 * (pictures @ np.array(GREY))[..., None])
 
 
 def _filmic(pictures: FloatArray) -> FloatArray:
