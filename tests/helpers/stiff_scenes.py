@@ -8,7 +8,7 @@ FOLDER = Path(__file__).parents[2] / "scenes"
 STIFF = (
     *("planet", "needle", "far_origin", "tiny", "slivers", "grazing", "nested_glass"),
     *("csg_coincident", "index_matched", "bright_and_dim", "deep_mirrors", "near_delta"),
-    *("tiny_light", "white_room"),
+    *("tiny_light", "white_corridor"),
 )
 
 

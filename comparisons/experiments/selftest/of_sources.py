@@ -267,12 +267,12 @@ FAULTS = (
         "    scattered",
     ),
     SourceFault(
-        "roulette without compensation beyond edge 8", "white_room", "integrators/path.py",
+        "roulette without compensation beyond edge 8", "white_corridor", "integrators/path.py",
         "        throughput = throughput * (1.0 / survival)\n",
         "        throughput = throughput * (1.0 if depth > 8 else 1.0 / survival)\n",
     ),
     SourceFault(
-        "the numbers of the third edge again for the fourth", "white_room", "integrators/path.py",
+        "the numbers of the third edge again for the fourth", "white_corridor", "integrators/path.py",
         "    point, dimension = shading.point, sampling.PER_BOUNCE * depth\n"
         "    ended = Step(False, Ray(point.p, point.n, 0.0), state)\n",
         "    point, dimension = shading.point, sampling.PER_BOUNCE * (2 if depth == 3 else depth)\n"
