@@ -12,6 +12,7 @@ import typer
 from comparisons.commands.options import (
     ClusterFile,
     Fresh,
+    Plots,
     Scenes,
     Scheduler,
     compare_extra,
@@ -83,12 +84,14 @@ def methods(
         bool, typer.Option("--full/--quick", help="More rays and runs: minutes instead of one.")
     ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random shapes and rays.")] = 1,
+    plots: Plots = None,
 ) -> None:
     """Time the textbook's intersection methods, in nanoseconds per ray."""
     with compare_extra("measuring"):
-        from comparisons.experiments.methods.outputs import table, write, write_page
+        from comparisons.experiments.methods.outputs import plots_of, table, write, write_page
         from comparisons.experiments.methods.run import FULL, QUICK, run
         from comparisons.experiments.methods.trials import FAMILIES
+        from comparisons.report.plots import save
         from comparisons.runs.provenance import ours
 
         import_module("matplotlib")  # before minutes of measuring that the page then cannot show
@@ -100,6 +103,8 @@ def methods(
     if unknown := [name for name in names if name not in FAMILIES]:
         raise UsageError(f"--family: expected one of {', '.join(FAMILIES)}, got '{unknown[0]}'")
     page = out / "methods.html"
+    if plots is not None:
+        check_writable(plots / "a plot")
     check_writable(out / "results.json", out / "results.csv", page)
     effort, about = FULL if full else QUICK, ours()
     rows = []
@@ -109,6 +114,8 @@ def methods(
             write(out, rows, effort, seed, about)
         progress("page", 0.0)
         write_page(page, rows, effort, seed, about)
+        if plots is not None:
+            save(plots, plots_of(rows), about)
         progress("page", 1.0)
     console = terminal.console()
     for name in names:
@@ -163,6 +170,8 @@ def converge(
     scheduler: Scheduler = None,
     cluster: ClusterFile = None,
     define: Defaults = None,
+    markdown: Annotated[Path | None, table_in("convergence")] = None,
+    plots: Plots = None,
 ) -> None:
     """Measure error against run time of reference_rt and of Mitsuba.
 
@@ -173,13 +182,17 @@ def converge(
         from comparisons.experiments.convergence.methods import chosen
         from comparisons.experiments.convergence.outputs import (
             again,
+            command_of,
             lines_of,
             write_results,
             write_table,
         )
-        from comparisons.experiments.convergence.page import write_page
+        from comparisons.experiments.convergence.page import markdown as tables
+        from comparisons.experiments.convergence.page import plots_of, write_page
         from comparisons.experiments.convergence.run import INVALID, curves_of
         from comparisons.experiments.convergence.store import Settings
+        from comparisons.report import templates
+        from comparisons.report.plots import save
         from comparisons.results.case import INTERRUPTED
         from comparisons.runs.elsewhere import run_elsewhere
         from comparisons.runs.provenance import provenance
@@ -204,7 +217,11 @@ def converge(
     if double := [name for name in names if names.count(name) > 1]:
         raise UsageError(f"two scenes have the name '{double[0]}'; expected different names")
     files = [out / name for name in ("results.json", "results.csv", "report.html")]
+    if plots is not None:
+        check_writable(plots / "a plot")
     check_writable(*files, out / "rungs" / "a rung")
+    if markdown is not None:
+        templates.check(markdown, "convergence")
     facts = provenance()
     found = [Curves(name, problem=INTERRUPTED) for name in names]
 
@@ -234,6 +251,11 @@ def converge(
         write_page(files[2], found, settings, facts)
         for line in lines_of(found[k]):
             say(line)
+    if markdown is not None:
+        text = tables(found, command_of(scenes, out, settings), facts)
+        templates.rewrite(markdown, "convergence", text)
+    if plots is not None:
+        save(plots, plots_of(found), facts)
     say(", ".join(map(str, files)), err=True)
     if any(curves.problem.startswith(INVALID) for curves in found):
         raise typer.Exit(SceneError.exit_code)

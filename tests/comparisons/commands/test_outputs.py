@@ -81,13 +81,17 @@ FILES = {
     ("report", "out"): [""],
     ("selftest", "out"): ["selftest.json", "selftest.md"],
     ("converge", "out"): ["results.json", "results.csv", "report.html", "rungs/x"],
+    ("converge", "markdown"): [""],
+    ("converge", "plots"): ["x"],
     ("methods", "out"): ["results.json", "results.csv", "methods.html"],
+    ("methods", "plots"): ["x"],
     ("bench", "out"): ["results.json", "bench.md", "rows/x"],
     ("bench", "markdown"): [""],
     ("stability", "out"): [
         "results.json", "results.csv", "stability.html", "settings/x", "pictures/x"
     ],
     ("stability", "markdown"): [""],
+    ("stability", "plots"): ["x"],
     ("truth", "out"): ["results.json", "report.html"],
     ("truth", "markdown"): [""],
 }  # fmt: skip
