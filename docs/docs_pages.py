@@ -40,7 +40,7 @@ def blocks_of(page: Path) -> list[Block]:
     return [Block(*each) for each in found]
 
 
-def run(page: Path, shell: Callable[[str], str]) -> Iterator[tuple[str, str]]:
+def run(page: Path, shell: Callable[[str], object]) -> Iterator[tuple[str, str]]:
     """Run what a page of the course shows, in the current folder: YAML with a title becomes a file,
     Python without one runs in a namespace of the page, and `shell` takes each command.  Yields what
     each block printed, and what the page says that it prints: the block of text after it.
@@ -54,6 +54,6 @@ def run(page: Path, shell: Callable[[str], str]) -> Iterator[tuple[str, str]]:
             with redirect_stdout(printed):
                 exec(compile(block.text, str(page), "exec"), names)
         elif block.language == "sh":
-            printed.write("".join(shell(line) for line in block.text.splitlines()))
+            list(map(shell, block.text.splitlines()))
         after = blocks[k + 1] if k + 1 < len(blocks) else Block("", "", "")
         yield printed.getvalue(), after.text if after.language == "text" else ""

@@ -195,7 +195,7 @@ def course() -> None:
     with temporary_folder() as folder, chdir(folder):
         Path("scenes").symlink_to(SCENES.absolute())
         for path in sorted((DOCS / "course").glob("*.md")):
-            list(run(path, lambda command: ""))
+            list(run(path, lambda command: None))
         for path in Path().glob("*.png"):
             shutil.copy(path, PICTURES / "course")
 

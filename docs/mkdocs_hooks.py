@@ -1,15 +1,16 @@
-"""What the site has beside the pages: the repository's link, and the scene files that pages name.
+"""What the site has beside the pages: the repository's link, and the scene files.
 
 Pages link to `../scenes/NAME.yaml`, as the repository has them; the site has a copy.
 """
 
 import re
 import subprocess
+from pathlib import Path
 from typing import Any
 
 from mkdocs.structure.files import File
 
-SCENES = re.compile(r"\]\((?:\.\./)+(scenes/[\w/]+\.yaml)\)")
+SCENES = re.compile(r"\]\((?:\.\./)+(scenes/\w+\.yaml)\)")
 
 
 def on_config(config: Any) -> None:
@@ -21,13 +22,9 @@ def on_config(config: Any) -> None:
         config.repo_url = url
 
 
-def on_files(files: Any, config: Any) -> Any:
-    named = {
-        name for page in files.documentation_pages() for name in SCENES.findall(page.content_string)
-    }
-    for name in sorted(named):
-        files.append(File(name, ".", config.site_dir, use_directory_urls=False))
-    return files
+def on_files(files: Any, config: Any) -> None:
+    for path in Path("scenes").glob("*.yaml"):
+        files.append(File(str(path), ".", config.site_dir, use_directory_urls=False))
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:

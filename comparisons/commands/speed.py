@@ -84,14 +84,12 @@ def methods(
         bool, typer.Option("--full/--quick", help="More rays and runs: minutes instead of one.")
     ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random shapes and rays.")] = 1,
-    plots: Plots = None,
 ) -> None:
     """Time the textbook's intersection methods, in nanoseconds per ray."""
     with compare_extra("measuring"):
-        from comparisons.experiments.methods.outputs import plots_of, table, write, write_page
+        from comparisons.experiments.methods.outputs import table, write, write_page
         from comparisons.experiments.methods.run import FULL, QUICK, run
         from comparisons.experiments.methods.trials import FAMILIES
-        from comparisons.report.plots import save
         from comparisons.runs.provenance import ours
 
         import_module("matplotlib")  # before minutes of measuring that the page then cannot show
@@ -103,8 +101,6 @@ def methods(
     if unknown := [name for name in names if name not in FAMILIES]:
         raise UsageError(f"--family: expected one of {', '.join(FAMILIES)}, got '{unknown[0]}'")
     page = out / "methods.html"
-    if plots is not None:
-        check_writable(plots / "a plot")
     check_writable(out / "results.json", out / "results.csv", page)
     effort, about = FULL if full else QUICK, ours()
     rows = []
@@ -114,8 +110,6 @@ def methods(
             write(out, rows, effort, seed, about)
         progress("page", 0.0)
         write_page(page, rows, effort, seed, about)
-        if plots is not None:
-            save(plots, plots_of(rows), about)
         progress("page", 1.0)
     console = terminal.console()
     for name in names:
@@ -182,7 +176,6 @@ def converge(
         from comparisons.experiments.convergence.methods import chosen
         from comparisons.experiments.convergence.outputs import (
             again,
-            command_of,
             lines_of,
             write_results,
             write_table,
@@ -252,8 +245,7 @@ def converge(
         for line in lines_of(found[k]):
             say(line)
     if markdown is not None:
-        text = tables(found, command_of(scenes, out, settings), facts)
-        templates.rewrite(markdown, "convergence", text)
+        templates.rewrite(markdown, "convergence", tables(found, facts))
     if plots is not None:
         save(plots, plots_of(found), facts)
     say(", ".join(map(str, files)), err=True)

@@ -323,16 +323,18 @@ def _inline(svg: str, title: str) -> str:
 _SIZE = re.compile(r'height="[^"]*pt" viewBox="0 0 ([0-9.]+) ([0-9.]+)"')
 
 
-def save(folder: Path, plots: Mapping[str, str], facts: Mapping[str, Any]) -> None:
-    """Write plots as SVG files that name their source: the command of this process, the machine and
-    the date of `facts`, a provenance.
-
-    plots: <svg> elements by the names of their files, without suffix;  a picture has no text colour
-    of a page, so that they are black on white.
-    """
+def source_of(facts: Mapping[str, Any]) -> str:
+    """The command of this process, and the machine and the date of a provenance."""
     command = shlex.join(["reference-rt", *sys.argv[1:]])
-    source = f"{command}; {facts['machine']}, {facts['cores']} cores, {str(facts['date'])[:10]}"
-    lines = textwrap.wrap(source, 90, break_on_hyphens=False)
+    return f"{command}; {facts['machine']}, {facts['cores']} cores, {str(facts['date'])[:10]}"
+
+
+def save(folder: Path, plots: Mapping[str, str], facts: Mapping[str, Any]) -> None:
+    """Write plots as SVG files, black on white, with their `source_of` below.
+
+    plots: <svg> elements by the names of their files, without suffix.
+    """
+    lines = textwrap.wrap(source_of(facts), 90, break_on_hyphens=False)
     for name, svg in plots.items():
         if (size := _SIZE.search(svg)) is None:
             raise ValueError(f"{name}: expected a plot of `log_log`")

@@ -43,14 +43,13 @@ def test_what_is_shown_runs(page: Path, tmp_path: Path, monkeypatch: pytest.Monk
     Path("examples").symlink_to(ROOT / "examples")
     _add_commands()
 
-    def shell(line: str) -> str:
+    def shell(line: str) -> None:
         words = line.partition("#")[0].split()
         assert words[0] == "reference-rt", line
         help_only = ["--help"] if MEASURING.match(line) else []
         result = CliRunner().invoke(app, [*words[1:], *help_only], catch_exceptions=False)
         expected = re.search(r"# exit (\d)", line)
         assert result.exit_code == int(expected[1] if expected else 0), result.output
-        return ""
 
     for printed, said in run(page, shell):
         assert printed == said

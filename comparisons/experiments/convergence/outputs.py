@@ -70,13 +70,7 @@ def _against(ratio: Ratio) -> str:
 
 def again(path: Path, out: Path, settings: Settings) -> str:
     """The command that repeats one scene alone."""
-    return command_of([path], out / "again", settings)
-
-
-def command_of(paths: Sequence[Path], out: Path, settings: Settings) -> str:
-    """The command that measures scenes with these settings."""
-    command = ["reference-rt", "converge", *(path.as_posix() for path in paths)]
-    command += ["-o", out.as_posix()]
+    command = ["reference-rt", "converge", path.as_posix(), "-o", (out / "again").as_posix()]
     command += ["--time-limit", f"{settings.time_limit:g}", "--max-spp", str(settings.max_spp)]
     command += ["--replicates", str(settings.replicates)]
     command += ["--targets", ",".join(f"{target:g}" for target in settings.targets)]

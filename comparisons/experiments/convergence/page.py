@@ -12,7 +12,7 @@ from comparisons.experiments.convergence.estimates import Bias, Line
 from comparisons.experiments.convergence.findings import Crops, Curves, Ratio, Target
 from comparisons.experiments.convergence.starts import STAGES
 from comparisons.experiments.convergence.store import Settings
-from comparisons.report.plots import Curve, log_log
+from comparisons.report.plots import Curve, log_log, source_of
 from comparisons.report.templates import template, write
 from comparisons.report.thumbnails import png_url
 from comparisons.report.values import percent, shown
@@ -298,11 +298,10 @@ def _png(picture: FloatArray, white: float) -> str:
 # ---- Markdown: times to each error, for docs/results/convergence.md ------------------------------
 
 
-def markdown(curves: Sequence[Curves], command: str, provenance: Mapping[str, Any]) -> str:
+def markdown(curves: Sequence[Curves], provenance: Mapping[str, Any]) -> str:
     """A table for each scene, with the command, the machine and the date."""
-    facts = provenance["machine"], f"{provenance['cores']} cores", str(provenance["date"])[:10]
     mitsuba = str(provenance["mitsuba"]).partition(":")[0]
-    lines = [f"Measured: `{command}`; {', '.join(facts)}, Mitsuba {mitsuba}."]
+    lines = [f"Measured: {source_of(provenance)}, Mitsuba {mitsuba}."]
     for one in curves:
         width, height = one.size
         lines += ["", f"{one.scene}, {width} × {height} pixels:", ""]

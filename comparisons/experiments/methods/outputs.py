@@ -181,26 +181,26 @@ def _family(name: str, rows: Sequence[Row]) -> dict[str, Any]:
             }
             for method, times in cells.items()
         ],
-        "plots": [Markup(svg) for svg in plots_of(rows).values()],  # our own, not from outside
+        "plots": [Markup(svg) for svg in _plots(rows)],  # our own, not from outside
     }
 
 
-def plots_of(rows: Sequence[Row]) -> dict[str, str]:
-    """By series of several settings: times against x, and those of building hierarchies."""
-    plots = {}
+def _plots(rows: Sequence[Row]) -> list[str]:
+    """Of each series of several settings: times against x, and those of building hierarchies."""
+    plots = []
     for series, axis in dict.fromkeys((row.series, row.axis) for row in rows if row.axis):
         of = [row for row in rows if row.series == series]
         names = dict.fromkeys(row.method for row in of)
         by = {name: [row for row in of if row.method == name] for name in names}
         times = [_times(name, some) for name, some in by.items()]
-        plots[series] = log_log(times, axis, "ns per ray", series)
+        plots.append(log_log(times, axis, "ns per ray", series))
         built = {name: some for name, some in by.items() if some[0].build}
         if built:
             curves = [
                 Curve(short(name), [r.x for r in some], [r.build or 0.0 for r in some])
                 for name, some in built.items()
             ]
-            plots[f"{series}: to build"] = log_log(curves, axis, "seconds", f"{series}: to build")
+            plots.append(log_log(curves, axis, "seconds", f"{series}: to build"))
     return plots
 
 

@@ -84,7 +84,6 @@ FILES = {
     ("converge", "markdown"): [""],
     ("converge", "plots"): ["x"],
     ("methods", "out"): ["results.json", "results.csv", "methods.html"],
-    ("methods", "plots"): ["x"],
     ("bench", "out"): ["results.json", "bench.md", "rows/x"],
     ("bench", "markdown"): [""],
     ("stability", "out"): [

@@ -54,7 +54,7 @@ def test_png_by_pillow_with_filters_and_a_palette(tmp_path: Path) -> None:
 def test_the_package_is_called(tmp_path: Path, picture: FloatArray) -> None:
     """With arrays, files, or a list of both; a dark copy differs by its gain."""
     np.save(tmp_path / "b.npy", picture)
-    for given in (picture, tmp_path / "b.npy", [picture]):
+    for given in (picture, tmp_path / "b.npy", [tmp_path / "b.npy"]):
         same = comparisons.gate(given, reference=str(tmp_path / "b.npy"), noise_free=True)
         assert same.verdict == "unchanged"
     dark = comparisons.gate(0.5 * picture, reference=picture, noise_free=True)
