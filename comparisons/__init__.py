@@ -7,6 +7,11 @@
     case.write_page("report.html")
 
 `compare` takes a scene or a scene file; see `comparisons.compare.one_scene.compare_one`.
+
+    case = comparisons.gate(pictures, scene="scenes/cornell_box.yaml")
+
+`gate` takes the pictures of another renderer, and needs no Mitsuba; see
+`comparisons.gate.request.gate`.
 """
 
 import importlib
@@ -14,7 +19,7 @@ from typing import Any
 
 
 def __getattr__(name: str) -> Any:
-    """Import `compare` when it is first used: importing Mitsuba takes a second."""
-    if name != "compare":
+    """Import `compare` and `gate` when they are first used: importing Mitsuba takes a second."""
+    if name not in ("compare", "gate"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return importlib.import_module("comparisons.compare")
+    return importlib.import_module(f"comparisons.{name}")

@@ -1,17 +1,22 @@
 """Makes docs/pictures/ and docs/gallery.md: `python docs/make_pictures.py [NAME...]`.
 
 The gallery has every scene of scenes/; the first picture of README.md is a comparison with Mitsuba;
-the pictures of docs/truth.md are the formulas' own.  NAME: only the pictures of these scenes, or
-`compare`, or `truth`; the page is always written.
+the pictures of docs/truth.md are the formulas' own; those of docs/course are what its Python
+writes.  NAME: only the pictures of these scenes, or `compare`, `truth` or `course`; the gallery is
+always written.
 """
 
+import json
+import re
+import shutil
 import sys
 from collections.abc import Iterable
+from contextlib import chdir
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
-from docs_pages import DOCS, save
+from docs_pages import DOCS, run, save
 from PIL import Image
 
 from comparisons.compare.budget import Budget
@@ -22,13 +27,13 @@ from comparisons.truth.outputs import formula_picture
 from reference_rt import Scene, render
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.image import display, srgb
-from reference_rt.util.files import read_text, replacing
+from reference_rt.util.files import read_text, replacing, temporary_folder
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
 SCENES = DOCS.parent / "scenes"
-PICTURES = DOCS / "pictures"
+PICTURES = DOCS.absolute() / "pictures"
 
 LARGE = (
     "cornell_box",
@@ -57,7 +62,7 @@ def main() -> None:
     """Write all pictures and the page."""
     (PICTURES / "scenes").mkdir(parents=True, exist_ok=True)
     paths = sorted(SCENES.glob("*.yaml"))
-    wanted = sys.argv[1:] or [*(path.stem for path in paths), "compare", "truth"]
+    wanted = sys.argv[1:] or [*(path.stem for path in paths), "compare", "truth", "course"]
     for path in paths:
         if path.stem in wanted:
             picture_of(path)
@@ -67,6 +72,8 @@ def main() -> None:
         comparison()
     if "truth" in wanted:
         formulas()
+    if "course" in wanted:
+        course()
 
 
 def picture_of(path: Path) -> None:
@@ -89,8 +96,10 @@ def page(paths: Iterable[Path]) -> Iterable[str]:
     rest = list(paths)
     yield "# Gallery"
     yield ""
-    yield "All scenes of the repository, each in `scenes/NAME.yaml`. `reference-rt render` makes"
-    yield "the pictures, and `reference-rt compare` judges them against Mitsuba."
+    yield "All scenes of the repository. `reference-rt render` makes the pictures; the verdict"
+    yield "against Mitsuba is that of `reference-rt suite smoke`, where that has one: it leaves out"
+    yield "light on solids, which takes long, and is too noisy for a few. The page of"
+    yield "[truth](truth.md) has the scenes whose pixels are known by formula."
     stress = [path for path in rest if read_text(path).startswith("# Stiff")]
     large = [path for path in rest if path.stem in LARGE]
     yield from section("A few large ones", "", large)
@@ -105,14 +114,30 @@ def page(paths: Iterable[Path]) -> Iterable[str]:
 
 
 def section(title: str, text: str, paths: Iterable[Path]) -> Iterable[str]:
-    """A heading, and a table of pictures."""
+    """A heading, and a card for each scene: its picture, words, file and verdict."""
     yield from ("", f"## {title}", "")
     if text:
         yield from (text, "")
-    yield from ("| picture | scene |", "|---|---|")
+    yield '<div class="grid cards" markdown>'
+    known = verdicts()
     for path in paths:
-        link = f"![{path.stem}](pictures/scenes/{path.stem}.jpg)"
-        yield f"| {link} | **{path.stem}**: {words(path)} |"
+        name = path.stem
+        verdict = f" · {known[name]}" if name in known else ""
+        yield ""
+        yield f"-   ![{name}](pictures/scenes/{name}.jpg)"
+        yield ""
+        yield f"    **{name}**: {words(path)} [scene](../scenes/{name}.yaml){verdict}"
+    yield from ("", "</div>")
+
+
+def verdicts() -> dict[str, str]:
+    """By scene, of the last `reference-rt suite smoke`; without one, those on the page."""
+    results = DOCS.parent / "out" / "smoke" / "results.json"
+    if not results.exists():
+        page = read_text(DOCS / "gallery.md")
+        return dict(re.findall(r"/(\w+)\.yaml\) · (\[.*?\]\(verdict\.md\))$", page, re.MULTILINE))
+    cases = {case["scene"]: case["verdict"] for case in json.loads(read_text(results))["cases"]}
+    return {k: f"[{v}](verdict.md)" for k, v in cases.items() if v != "inconclusive"}
 
 
 def words(path: Path) -> str:
@@ -162,6 +187,17 @@ def formulas() -> None:
         image = Image.fromarray(values.repeat(size, axis=0).repeat(size, axis=1))
         with replacing(PICTURES / "truth" / f"{case.name}.png") as temporary:
             image.save(temporary, "PNG", optimize=True)
+
+
+def course() -> None:
+    """What the Python of the course writes; it may load scenes of the repository."""
+    (PICTURES / "course").mkdir(exist_ok=True)
+    with temporary_folder() as folder, chdir(folder):
+        Path("scenes").symlink_to(SCENES.absolute())
+        for path in sorted((DOCS / "course").glob("*.md")):
+            list(run(path, lambda command: None))
+        for path in Path().glob("*.png"):
+            shutil.copy(path, PICTURES / "course")
 
 
 def shown(image: FloatArray) -> FloatArray:

@@ -9,6 +9,8 @@ from PIL import Image
 
 from reference_rt import Scene, SceneError
 
+if len(sys.argv) != 3:
+    sys.exit(__doc__)
 folder, out = Path(sys.argv[1]), sys.argv[2]
 sheet = []
 for path in sorted(folder.glob("*.yaml")):

@@ -20,6 +20,8 @@ def render_to(path: Path, out: Path) -> str:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
     folder, out = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
     out.mkdir(parents=True, exist_ok=True)
     with Client(*sys.argv[3:], **({} if sys.argv[3:] else {"threads_per_worker": 1})) as client:

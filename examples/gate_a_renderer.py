@@ -1,12 +1,13 @@
-"""Gate a renderer of your own: ambient occlusion under a white sky, in NumPy."""
+"""Gate a renderer of your own: ambient occlusion under a white sky, in NumPy.
+
+`python examples/gate_a_renderer.py 0.4` has the wrong cosine, and fails.
+"""
 
 import sys
 
 import numpy as np
 
-from comparisons.gate.gate import gate_pictures
-from comparisons.gate.pictures_in import from_array
-from comparisons.gate.reference import of_scene
+import comparisons
 from reference_rt import Scene
 
 SCENE = """
@@ -44,5 +45,5 @@ def my_renderer(seed, samples=64, power=0.5):
 
 power = float(sys.argv[1]) if len(sys.argv) > 1 else 0.5
 pictures = np.stack([my_renderer(seed, power=power) for seed in range(8)])
-case = gate_pictures(from_array(pictures), of_scene(scene, 0.02), limit=0.02)
+case = comparisons.gate(pictures, scene=scene, limit=0.02)
 print(case.verdict, "-", case.reason)

@@ -92,6 +92,11 @@ def out_folder(what: str, metavar: str | None = None) -> Any:
     return typer.Option("--out", "-o", metavar=metavar, help=f"Folder for {what}.")
 
 
+Plots = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Also write the plots as .svg files.")
+]
+
+
 def table_in(name: str) -> Any:
     """`--markdown`, a file in which the table between two comments is rewritten."""
     comments = f"'<!-- {name} -->' and '<!-- end -->'"

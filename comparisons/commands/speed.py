@@ -12,6 +12,7 @@ import typer
 from comparisons.commands.options import (
     ClusterFile,
     Fresh,
+    Plots,
     Scenes,
     Scheduler,
     compare_extra,
@@ -163,6 +164,8 @@ def converge(
     scheduler: Scheduler = None,
     cluster: ClusterFile = None,
     define: Defaults = None,
+    markdown: Annotated[Path | None, table_in("convergence")] = None,
+    plots: Plots = None,
 ) -> None:
     """Measure error against run time of reference_rt and of Mitsuba.
 
@@ -177,9 +180,12 @@ def converge(
             write_results,
             write_table,
         )
-        from comparisons.experiments.convergence.page import write_page
+        from comparisons.experiments.convergence.page import markdown as tables
+        from comparisons.experiments.convergence.page import plots_of, write_page
         from comparisons.experiments.convergence.run import INVALID, curves_of
         from comparisons.experiments.convergence.store import Settings
+        from comparisons.report import templates
+        from comparisons.report.plots import save
         from comparisons.results.case import INTERRUPTED
         from comparisons.runs.elsewhere import run_elsewhere
         from comparisons.runs.provenance import provenance
@@ -204,7 +210,11 @@ def converge(
     if double := [name for name in names if names.count(name) > 1]:
         raise UsageError(f"two scenes have the name '{double[0]}'; expected different names")
     files = [out / name for name in ("results.json", "results.csv", "report.html")]
+    if plots is not None:
+        check_writable(plots / "a plot")
     check_writable(*files, out / "rungs" / "a rung")
+    if markdown is not None:
+        templates.check(markdown, "convergence")
     facts = provenance()
     found = [Curves(name, problem=INTERRUPTED) for name in names]
 
@@ -234,6 +244,10 @@ def converge(
         write_page(files[2], found, settings, facts)
         for line in lines_of(found[k]):
             say(line)
+    if markdown is not None:
+        templates.rewrite(markdown, "convergence", tables(found, facts))
+    if plots is not None:
+        save(plots, plots_of(found), facts)
     say(", ".join(map(str, files)), err=True)
     if any(curves.problem.startswith(INVALID) for curves in found):
         raise typer.Exit(SceneError.exit_code)

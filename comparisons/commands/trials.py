@@ -18,6 +18,7 @@ from comparisons.commands.options import (
     Fresh,
     JUnit,
     NumberOfWorkers,
+    Plots,
     Scenes,
     Scheduler,
     compare_extra,
@@ -140,6 +141,7 @@ def stability(
     ] = True,
     fresh: Fresh = False,
     markdown: Annotated[Path | None, table_in("stability")] = None,
+    plots: Plots = None,
 ) -> None:
     """Find where reference_rt and Mitsuba fail as scenes become extreme.
 
@@ -156,6 +158,7 @@ def stability(
             shoot,
         )
         from comparisons.report import templates, terminal
+        from comparisons.report.plots import save
         from comparisons.runs.provenance import ours, provenance
 
         import_module("matplotlib")  # before minutes of measuring that the page then cannot show
@@ -176,6 +179,8 @@ def stability(
         raise UsageError("--at: expected a --series with it")
     page = out / "stability.html"
     kept = out / "settings" / "a setting", out / "pictures" / "a picture"
+    if plots is not None:
+        check_writable(plots / "a plot")
     check_writable(out / "results.json", out / "results.csv", page, *kept)
     if markdown is not None:
         templates.check(markdown, "stability")
@@ -198,6 +203,8 @@ def stability(
     console.print(outputs.terminal(found, console.width))
     if markdown is not None:
         templates.rewrite(markdown, "stability", outputs.markdown(found, effort, seed, facts))
+    if plots is not None:
+        save(plots, outputs.failures(found), facts)
     holds = True
     for one in (s for some in summaries(found).values() for s in some):
         holds &= one.holds

@@ -1,5 +1,11 @@
 """The gate: another renderer's pictures against our rendering of a scene, or other pictures.
 
+    import comparisons
+
+    case = comparisons.gate(pictures, scene="scenes/cornell_box.yaml")   # a Case, as of `compare`
+
+This package can be called: see `request.gate`.
+
 `pictures_in` reads candidates, `driver` runs a renderer to make them, `request` finds what they are
 compared with (`reference`: our rendering or files; `baselines`: accepted pictures), `copies` finds
 those that are unchanged, `gate` returns a `comparisons.results.case.Case`, `outputs` writes it.
@@ -14,3 +20,20 @@ ImageError that names it.
 To read another file format, add its first bytes to `pictures_in` and a reader to
 `reference_rt.core.image_files`.
 """
+
+import sys
+from types import ModuleType
+from typing import Any
+
+
+class _Callable(ModuleType):
+    """A package that is called as `request.gate`: `comparisons.gate` is both the name of this
+    folder and of what a user wants."""
+
+    def __call__(self, pictures: Any, **settings: Any) -> Any:
+        from comparisons.gate.request import gate
+
+        return gate(pictures, **settings)
+
+
+sys.modules[__name__].__class__ = _Callable

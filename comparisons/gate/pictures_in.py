@@ -1,7 +1,9 @@
 """Candidates from files and arrays: EXR, PNG, PFM, HDR and NPY as linear radiance."""
 
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -155,6 +157,16 @@ def from_array(array: npt.ArrayLike, name: str = "array") -> tuple[Picture, ...]
         )
         for k, picture in enumerate(pictures)
     )
+
+
+def pictures_of(given: Any) -> tuple[Picture, ...]:
+    """The pictures in an array as `from_array` takes it, in a file, or in a list of these.  Raises
+    ImageError."""
+    found: list[Picture] = []
+    for one in given if isinstance(given, list | tuple) else [given]:
+        is_file = isinstance(one, str | os.PathLike)
+        found += read_candidates(Path(one)) if is_file else from_array(one)
+    return tuple(found)
 
 
 def variance_of(path: Path) -> FloatArray:

@@ -84,6 +84,7 @@ class ImageGate:
         self._calls += 1
         missing, failed = "", ""
         try:
+            from comparisons.gate.pictures_in import pictures_of
             from comparisons.gate.request import Request, gated
             from reference_rt.rendering.scene import Scene
             from reference_rt.util.errors import ReferenceRtError
@@ -99,7 +100,7 @@ class ImageGate:
             given = _pictures(candidate, folder)
             judge = Request(
                 scene=None if scene is None else Scene.load(self._root / scene, defaults),
-                references=tuple(p for p, _ in _pictures(reference)),
+                references=() if reference is None else pictures_of(reference),
                 variance=None if variance is None else Path(variance),
                 baseline=baseline,
                 baselines=self._baselines,
@@ -151,18 +152,17 @@ class ImageGate:
         return passed
 
 
-def _pictures(given: Any, folder: Path = Path()) -> "list[tuple[Picture, Path | None]]":
+def _pictures(given: Any, folder: Path) -> "list[tuple[Picture, Path | None]]":
     """The pictures in `given`; for those from arrays also the file in `folder` that they are saved
     to if they fail, so that they can be inspected and accepted.  Raises ImageError."""
-    from comparisons.gate.pictures_in import from_array, read_candidates
+    from comparisons.gate.pictures_in import pictures_of
 
-    several = isinstance(given, Sequence) and not isinstance(given, str)
     found: list[tuple[Picture, Path | None]] = []
-    for one in given if several else [] if given is None else [given]:
-        if isinstance(one, str | Path):
-            found += [(picture, None) for picture in read_candidates(Path(one))]
-            continue
-        for picture in from_array(one):
+    for one in given if isinstance(given, list | tuple) else [given]:
+        for picture in pictures_of(one):
+            if isinstance(one, str | Path):
+                found.append((picture, None))
+                continue
             path = folder / f"candidate-{len(found):02d}.exr"
             found.append((replace(picture, name=str(path)), path))
     return found

@@ -1,17 +1,20 @@
 """A gate's request: what the candidates are compared with."""
 
+import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from comparisons.compare.compare import single_lights
 from comparisons.compare.judge import Lights
+from comparisons.compare.one_scene import NotebookCase
 from comparisons.compare.path_length import path_lengths
 from comparisons.gate import baselines, reference
 from comparisons.gate.digest import scene_digest
 from comparisons.gate.gate import LIMIT, gate_pictures
-from comparisons.gate.pictures_in import Picture
+from comparisons.gate.pictures_in import Picture, pictures_of
 from comparisons.gate.reference import Reference, check_sizes
 from comparisons.gate.rim import check_rim
 from comparisons.renderers import WitnessName
@@ -79,6 +82,35 @@ def gated(
     BaselineEditedError."""
     judge = prepared(request, candidates, say)
     return judge.case(partial(gate_pictures, candidates, judge.reference))
+
+
+def gate(
+    pictures: Any,
+    *,
+    scene: Scene | str | os.PathLike[str] | None = None,
+    reference: Any = None,
+    limit: float = LIMIT,
+    noise_free: bool = False,
+    rim: int = 0,
+    threads: int | None = None,
+) -> NotebookCase:
+    """Judge the pictures of another renderer; Mitsuba takes no part.
+
+    pictures: linear radiance, an array (height, width, 3), with opacity (height, width, 4), or
+    (replicates, height, width, 3 or 4), or a file (EXR, PNG, PFM, HDR, NPY), or a list of these,
+    which are replicates with different seeds;  scene: a scene or a scene file, which reference_rt
+    renders;  reference: in its place, pictures that are right;  limit: the smallest relative bias
+    of the image mean that must be detectable;  noise_free: they were rendered without random
+    numbers;  rim: how many of the outermost pixels are left out;  threads: ours, None for all.
+
+    The case has `verdict`, `reason`, `cause` and `write_page`.  Raises ImageError, SceneError,
+    UsageError.
+    """
+    known = scene if scene is None or isinstance(scene, Scene) else Scene.load(os.fspath(scene))
+    others = () if reference is None else pictures_of(reference)
+    request = Request(known, others, limit=limit, noise_free=noise_free, threads=threads, rim=rim)
+    case = gated(request, pictures_of(pictures))
+    return NotebookCase(**{field.name: getattr(case, field.name) for field in fields(case)})
 
 
 @dataclass(frozen=True)

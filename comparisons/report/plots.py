@@ -4,14 +4,19 @@ import hashlib
 import io
 import math
 import re
+import shlex
+import sys
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from comparisons.report.templates import write
 from comparisons.report.values import percent, power_of_ten, shown
 from comparisons.results.case import FloatArray, Images
 
@@ -313,3 +318,35 @@ def _inline(svg: str, title: str) -> str:
     style = "max-width: 100%; height: auto; stroke-linejoin: round; stroke-linecap: butt"
     attributes = f'role="img" aria-label="{escape(title)}" style="{style}"'
     return svg.replace("<svg ", f"<svg {attributes} ", 1)
+
+
+_SIZE = re.compile(r'height="[^"]*pt" viewBox="0 0 ([0-9.]+) ([0-9.]+)"')
+
+
+def source_of(facts: Mapping[str, Any]) -> str:
+    """The command of this process, and the machine and the date of a provenance."""
+    command = shlex.join(["reference-rt", *sys.argv[1:]])
+    return f"{command}; {facts['machine']}, {facts['cores']} cores, {str(facts['date'])[:10]}"
+
+
+def save(folder: Path, plots: Mapping[str, str], facts: Mapping[str, Any]) -> None:
+    """Write plots as SVG files, black on white, with their `source_of` below.
+
+    plots: <svg> elements by the names of their files, without suffix.
+    """
+    lines = textwrap.wrap(source_of(facts), 90, break_on_hyphens=False)
+    for name, svg in plots.items():
+        if (size := _SIZE.search(svg)) is None:
+            raise ValueError(f"{name}: expected a plot of `log_log`")
+        width, height = size[1], float(size[2])
+        text = "".join(
+            f'<text x="8" y="{height + 8 + 12 * k}" style="font: 9px sans-serif">'
+            f"{escape(line)}</text>"
+            for k, line in enumerate(lines)
+        )
+        below = f'height="{height + 12 * len(lines)}pt" viewBox="0 0 {width} '
+        svg = svg.replace(size[0], f'{below}{height + 12 * len(lines)}"', 1)
+        svg = svg.replace('style="', 'style="background: white; ', 1).replace(
+            "</svg>", f"{text}</svg>"
+        )
+        write(folder / f"{re.sub('[^a-zA-Z0-9_]+', '-', name)}.svg", svg)

@@ -51,6 +51,11 @@ def test_example_of_arrays() -> None:
     assert names["found"].tolist() == [0]
 
 
+def test_example_of_the_gate(capsys: pytest.CaptureFixture[str]) -> None:
+    exec(compile(block("docs/python.md", "python", "comparisons.gate"), "docs", "exec"), {})
+    assert capsys.readouterr().out.startswith("differ - constant gain of ")
+
+
 def scenes() -> list[Any]:
     """The scenes that pages show: blocks of YAML with shapes."""
     return [

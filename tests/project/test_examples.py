@@ -25,6 +25,24 @@ def run(monkeypatch, capsys):
     return run
 
 
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_uses_public_names(path):
+    """Of a package itself, not of its modules."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    froms = {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    names = {a.name for node in ast.walk(tree) if isinstance(node, ast.Import) for a in node.names}
+    ours = {n for n in froms | names if n.startswith(("reference_rt", "comparisons"))}
+    assert ours <= {"reference_rt", "comparisons"}
+
+
+@pytest.mark.parametrize("name", ["batch", "cluster"])
+def test_an_example_without_arguments_says_how_it_is_used(run, name):
+    if name == "cluster":
+        pytest.importorskip("distributed")
+    with pytest.raises(SystemExit, match=rf"`python examples/{name}.py FOLDER OUT"):
+        run(name)
+
+
 def test_every_example_is_tested():
     tests = Path(__file__).read_text(encoding="utf-8")
     assert [path.stem for path in EXAMPLES if f'run("{path.stem}"' not in tests] == []
@@ -92,9 +110,14 @@ NOTEBOOK = json.loads((ROOT / "examples/tour.ipynb").read_text(encoding="utf-8")
 CODE = ["".join(c["source"]) for c in NOTEBOOK["cells"] if c["cell_type"] == "code"]
 
 
-def test_the_notebook_is_stored_without_outputs():
-    """They would be large, and change with every run."""
-    assert [c["outputs"] for c in NOTEBOOK["cells"] if c["cell_type"] == "code"] == [[]] * len(CODE)
+def test_the_notebook_is_stored_with_its_outputs():
+    """Readers of the repository see them; what they hold is what `test_tour` computes."""
+    cells = [c for c in NOTEBOOK["cells"] if c["cell_type"] == "code"]
+    assert [c["execution_count"] for c in cells] == [1, 2, 3, 4, 5]
+    kinds = [{kind for output in c["outputs"] for kind in output["data"]} for c in cells[1:]]
+    assert ["text/html" in kind for kind in kinds] == [True, False, False, True]
+    assert "agree" in "".join(cells[-1]["outputs"][0]["data"]["text/html"])
+    assert (ROOT / "examples/tour.ipynb").stat().st_size < 100_000
 
 
 def cells_run(code):

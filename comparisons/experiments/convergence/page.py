@@ -12,7 +12,7 @@ from comparisons.experiments.convergence.estimates import Bias, Line
 from comparisons.experiments.convergence.findings import Crops, Curves, Ratio, Target
 from comparisons.experiments.convergence.starts import STAGES
 from comparisons.experiments.convergence.store import Settings
-from comparisons.report.plots import Curve, log_log
+from comparisons.report.plots import Curve, log_log, source_of
 from comparisons.report.templates import template, write
 from comparisons.report.thumbnails import png_url
 from comparisons.report.values import percent, shown
@@ -32,6 +32,17 @@ class Cell(NamedTuple):
     text: str
     small: str = ""
     look: str = ""
+
+
+def plots_of(curves: Sequence[Curves]) -> dict[str, str]:
+    """The plots of relative MSE against time and against samples, by name."""
+    found: dict[str, str] = {}
+    for one in curves:
+        plots = ladder_plots(one) if one.reference is not None else []
+        if one.grids is not None:
+            plots = grid_plots(one)
+        found |= {f"{one.scene}-{k}": p for k, p in zip(("time", "samples"), plots, strict=False)}
+    return found
 
 
 def write_page(
@@ -110,7 +121,7 @@ def _view(one: Curves) -> dict[str, Any]:
     if one.reference is not None:
         white = white_level(one.reference.mean)
         view["picture"] = _png(one.reference.mean, white)
-        view["plots"] = _ladder_plots(one)
+        view["plots"] = [Markup(svg) for svg in ladder_plots(one)]  # our own
         view["crops"] = [_crops(one, crops, white) for crops in one.crops]
         view["reference"] = (
             f"{one.reference.count} pictures of {one.reference.spp:,} samples per pixel; its own "
@@ -119,7 +130,7 @@ def _view(one: Curves) -> dict[str, Any]:
         )
     if one.grids is not None:
         view["picture"] = _png(one.grids.picture, white_level(one.grids.picture))
-        view["plots"] = _grid_plots(one)
+        view["plots"] = [Markup(svg) for svg in grid_plots(one)]
     ratios = one.ratios()
     view["targets"] = [
         (
@@ -149,7 +160,8 @@ def _view(one: Curves) -> dict[str, Any]:
 # ---- plots --------------------------------------------------------------------------------------
 
 
-def _ladder_plots(one: Curves) -> list[Markup]:
+def ladder_plots(one: Curves) -> list[str]:
+    """Relative and absolute MSE, each against seconds and samples."""
     levels = {
         percent(t.error): t.error**2 for found in one.findings.values() for t in found.targets
     }
@@ -170,11 +182,12 @@ def _ladder_plots(one: Curves) -> list[Markup]:
                         colour=number,
                     )
                 )
-            plots.append(Markup(log_log(curves, x_label, text, levels=marks)))
+            plots.append(log_log(curves, x_label, text, levels=marks))
     return plots
 
 
-def _grid_plots(one: Curves) -> list[Markup]:
+def grid_plots(one: Curves) -> list[str]:
+    """The same of a deterministic scene."""
     assert one.grids is not None
     steps = one.grids.steps
     plots = []
@@ -191,7 +204,7 @@ def _grid_plots(one: Curves) -> list[Markup]:
                     continue  # the table has it
                 title = f"Mitsuba {point.variant}, against ours on the same grid"
                 curves.append(Curve(title, [at], [error], colour=number))
-            plots.append(Markup(log_log(curves, x_label, text)))
+            plots.append(log_log(curves, x_label, text))
     return plots
 
 
@@ -280,3 +293,24 @@ def _crops(one: Curves, crops: Crops, white: float) -> dict[str, Any]:
 def _png(picture: FloatArray, white: float) -> str:
     """The data: URL of a picture, exposed for `white`."""
     return png_url(255.0 * encode(np.nan_to_num(picture), white))
+
+
+# ---- Markdown: times to each error, for docs/results/convergence.md ------------------------------
+
+
+def markdown(curves: Sequence[Curves], provenance: Mapping[str, Any]) -> str:
+    """A table for each scene, with the command, the machine and the date."""
+    mitsuba = str(provenance["mitsuba"]).partition(":")[0]
+    lines = [f"Measured: {source_of(provenance)}, Mitsuba {mitsuba}."]
+    for one in curves:
+        width, height = one.size
+        lines += ["", f"{one.scene}, {width} × {height} pixels:", ""]
+        if not one.findings:
+            lines.append(one.problem or "no method has two rungs of samples")
+            continue
+        errors = [percent(target.error) for target in next(iter(one.findings.values())).targets]
+        lines += [f"| renderer, sampler | {' | '.join(errors)} |", "|---" * (len(errors) + 1) + "|"]
+        for name, found in one.findings.items():
+            cells = [one.methods[name].title, *(_reached(target).text for target in found.targets)]
+            lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"

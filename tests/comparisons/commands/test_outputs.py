@@ -81,6 +81,8 @@ FILES = {
     ("report", "out"): [""],
     ("selftest", "out"): ["selftest.json", "selftest.md"],
     ("converge", "out"): ["results.json", "results.csv", "report.html", "rungs/x"],
+    ("converge", "markdown"): [""],
+    ("converge", "plots"): ["x"],
     ("methods", "out"): ["results.json", "results.csv", "methods.html"],
     ("bench", "out"): ["results.json", "bench.md", "rows/x"],
     ("bench", "markdown"): [""],
@@ -88,6 +90,7 @@ FILES = {
         "results.json", "results.csv", "stability.html", "settings/x", "pictures/x"
     ],
     ("stability", "markdown"): [""],
+    ("stability", "plots"): ["x"],
     ("truth", "out"): ["results.json", "report.html"],
     ("truth", "markdown"): [""],
 }  # fmt: skip

@@ -126,8 +126,14 @@ def test_scenes_with_chance_and_without(tmp_path, own_cache):
     assert not re.search(r'(?:src|href)="(?!data:|#)', page)
     assert "<script" not in page
 
-    again = program(*scenes, "-o", tmp_path, *FAST, *only)
+    text = tmp_path / "page.md"
+    text.write_text("<!-- convergence -->\n<!-- end -->\n")
+    more = "--markdown", text, "--plots", tmp_path / "plots"
+    again = program(*scenes, "-o", tmp_path, *FAST, *only, *more)
     assert again.exit_code == 0
+    assert "| ours, Sobol' (default and best) | " in text.read_text()
+    expected = [f"{path.stem}-{over}.svg" for path in scenes for over in ("samples", "time")]
+    assert sorted(file.name for file in (tmp_path / "plots").iterdir()) == expected
     same = json.loads((tmp_path / "results.json").read_text())
     assert [r["seconds"] for r in same["scenes"][0]["contestants"]["ours"]["rungs"]] == [
         r["seconds"] for r in ours["rungs"]

@@ -9,7 +9,7 @@ import pytest
 from skimage import color
 
 from comparisons import report
-from comparisons.report.plots import PALETTE, Curve, log_log
+from comparisons.report.plots import PALETTE, Curve, log_log, save
 from comparisons.report.values import power_of_ten, typeset
 
 X = 2.0 ** np.arange(2, 8)
@@ -33,6 +33,23 @@ def test_is_one_element_that_names_nothing_outside():
     assert not re.search(r'(?:href|src)="(?!#)', text)
     assert "<style" not in text  # which would reach the whole page
     assert "currentColor" in text
+
+
+def test_a_file_names_the_command_the_machine_and_the_date(tmp_path, monkeypatch):
+    """Below the plot: the picture is higher by as many lines."""
+    monkeypatch.setattr("sys.argv", ["x", "stability", "--series", "a, b & c", "--at", "1" * 60])
+    facts = {"machine": "a <machine>", "cores": 2, "date": "2026-11-26T02:02:02"}
+    plot = log_log([curve()], "s", "MSE")
+    save(tmp_path, {"F1-a, b": plot}, facts)
+    (file,) = tmp_path.iterdir()
+    root = ET.parse(file).getroot()
+    assert file.name == "F1-a-b.svg"
+    texts = [each.text for each in root.findall("{*}text")]
+    words = "reference-rt stability --series 'a, b & c' --at " + "1" * 60
+    assert " ".join(texts) == words + "; a <machine>, 2 cores, 2026-11-26"
+    heights = [float(each.get("viewBox").split()[3]) for each in (root, ET.fromstring(plot))]
+    assert heights[0] == heights[1] + 12 * len(texts)
+    assert "background: white" in root.get("style")
 
 
 def test_ids_are_unique_among_plots():

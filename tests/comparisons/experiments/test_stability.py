@@ -54,8 +54,10 @@ def stability(out, *options):
 
 
 def test_limits_and_ratios(fakes, tmp_path):
-    code, told = stability(tmp_path, "--family", "T1", "--full")
+    plots = tmp_path / "plots"
+    code, told = stability(tmp_path, "--family", "T1", "--full", "--plots", str(plots))
     assert code == 0, told
+    assert [file.name for file in plots.iterdir()] == ["T1-far.svg"]  # the other has one point
     results = json.loads((tmp_path / "results.json").read_text())
     (one,) = results["families"]
     assert (one["id"], one["limit_ours"], one["limit_mitsuba"]) == ("T1", 1e9, 1e4)

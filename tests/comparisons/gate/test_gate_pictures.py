@@ -9,6 +9,7 @@ import pytest
 from picture_writers import exr, hdr, rgbe
 from PIL import Image
 
+import comparisons
 from comparisons.gate.gate import _is_dithered, gate_pictures
 from comparisons.gate.pictures_in import (
     Picture,
@@ -22,7 +23,7 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.exr import write_exr
 from reference_rt.rendering.image import srgb
 from reference_rt.textures.image_file import linear
-from reference_rt.util.errors import ImageError
+from reference_rt.util.errors import ImageError, UsageError
 
 HEIGHT, WIDTH = 5, 9
 
@@ -48,6 +49,19 @@ def test_png_by_pillow_with_filters_and_a_palette(tmp_path: Path) -> None:
     few.save(tmp_path / "b.png")
     shown = np.asarray(few.convert("RGB")) / 255.0
     np.testing.assert_allclose(read_candidate(tmp_path / "b.png").radiance, linear(shown))
+
+
+def test_the_package_is_called(tmp_path: Path, picture: FloatArray) -> None:
+    """With arrays, files, or a list of both; a dark copy differs by its gain."""
+    np.save(tmp_path / "b.npy", picture)
+    for given in (picture, tmp_path / "b.npy", [tmp_path / "b.npy"]):
+        same = comparisons.gate(given, reference=str(tmp_path / "b.npy"), noise_free=True)
+        assert same.verdict == "unchanged"
+    dark = comparisons.gate(0.5 * picture, reference=picture, noise_free=True)
+    assert dark.verdict == "differ"
+    assert "<img" in dark._repr_html_()
+    with pytest.raises(UsageError, match="expected a scene, reference or baseline"):
+        comparisons.gate(picture)
 
 
 def test_arrays_of_several_pictures(tmp_path: Path, picture: FloatArray) -> None:

@@ -272,7 +272,7 @@ def of_series(one: SeriesSummary) -> list[str]:
         ends["float64 ends"] = one.series.holds_to
     plots = []
     axis = typeset(one.series.axis)
-    if any(some.failures for f in one.found for some in f.outcomes.values()):
+    if _any_fails(one):
         seen = _least(one)
         curves = [_rates(one, name, k) for k, name in enumerate(names)]
         level = {"none seen": seen}
@@ -281,6 +281,20 @@ def of_series(one: SeriesSummary) -> list[str]:
         curves = [_errors(one, name, k) for k, name in enumerate(names)]
         plots.append(log_log(curves, axis, _error(one), "Worst error", None, SIZE, ends))
     return plots
+
+
+def failures(found: Sequence[Found]) -> dict[str, str]:
+    """The plots of failures of all series that somebody fails, by name."""
+    return {
+        f"{name}-{one.series.name}": plots[0]
+        for name, series in summaries(found).items()
+        for one in series
+        if _any_fails(one) and (plots := of_series(one))
+    }
+
+
+def _any_fails(one: SeriesSummary) -> bool:
+    return any(some.failures for f in one.found for some in f.outcomes.values())
 
 
 def _error(one: SeriesSummary) -> str:
