@@ -31,8 +31,10 @@ class Events:
 
         The size of events is taken relative to the other side's radiance: the edge of a bright lamp
         has larger ones than any other place. So an event in a cell has the cell's brightness,
-        weighted by itself as the energy of events is. Below the picture's mean, events may be as
-        large as there, as of light that leaks into the dark, or smaller: the larger size counts.
+        weighted by itself as the energy of events is. Pixels without noise, such as those of a
+        lamp, do not count: their light does not arrive by chance. Below the picture's mean, events
+        may be as large as there, as of light that leaks into the dark, or smaller: the larger size
+        counts.
         The side with fewer replicates has seen fewer rare paths: its events count as at least as
         large as the other's.
         """
@@ -54,11 +56,14 @@ class Events:
 
 def _in_cells(side: Side, seen: FloatArray, sums: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """The energy of an event of `side` in each cell of one picture;  seen: the other's radiance."""
-    mean = float(seen.mean())
+    mean, noisy = float(seen.mean()), side.variance > (HALF * side.mean) ** 2
     found = []
     for least in (DARK, 1.0):
         scale = np.maximum(seen, least * mean) if mean else np.ones_like(seen)
-        found.append(side.event(scale) * sums(scale**2) / sums(scale))
+        lit = sums(scale * noisy)
+        whole = sums(scale**2) / sums(scale)
+        own = sums(scale**2 * noisy) / np.where(lit > 0.0, lit, 1.0)
+        found.append(side.event(scale) * np.where(lit > 0.0, own, whole))
     return np.maximum(*found)
 
 

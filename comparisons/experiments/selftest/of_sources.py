@@ -272,7 +272,8 @@ FAULTS = (
         "        throughput = throughput * (1.0 if depth > 8 else 1.0 / survival)\n",
     ),
     SourceFault(
-        "the numbers of the third edge again for the fourth", "white_corridor", "integrators/path.py",
+        "the numbers of the third edge again for the fourth", "white_corridor",
+        "integrators/path.py",
         "    point, dimension = shading.point, sampling.PER_BOUNCE * depth\n"
         "    ended = Step(False, Ray(point.p, point.n, 0.0), state)\n",
         "    point, dimension = shading.point, sampling.PER_BOUNCE * (2 if depth == 3 else depth)\n"

@@ -23,7 +23,8 @@ def _other_leaf(tables):
     trail[[0, -1]] = trail[[-1, 0]]
     leaf = tree.leaf.copy()
     leaf[[0, -1]] = leaf[[-1, 0]]
-    return tables._replace(lights=tables.lights._replace(tree=tree._replace(trail=trail, leaf=leaf)))
+    tree = tree._replace(trail=trail, leaf=leaf)
+    return tables._replace(lights=tables.lights._replace(tree=tree))
 
 
 def _bright_sky(tables):
