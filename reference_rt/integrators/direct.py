@@ -2,6 +2,9 @@
 
 L = L_e + the integral of f |cos| L_e over directions, estimated at the first hit by n light samples
 and m BSDF samples with multiple importance sampling (`path` says which integral each one is).
+
+On a `grid`, which has no random numbers, the integral is a sum over all lights.  It is exact, for
+the scene is then checked to have no lights but points and directions, which no BSDF sample finds.
 """
 
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self
@@ -19,15 +22,20 @@ from reference_rt.core.vec3 import Vec3, max_component, to_world
 from reference_rt.integrators.direct_light import (
     behind_lamps,
     direct,
+    fixed_lights,
     light_selection_normal,
     power_heuristic,
 )
 from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
 from reference_rt.integrators.shading import place, shade
-from reference_rt.jit.kernel import kernel, local_floats
+from reference_rt.jit.kernel import ByClass, kernel, local_floats
 from reference_rt.materials import Shading
 from reference_rt.materials.textured import evaluate_textures, lookup_cache_size
 from reference_rt.sampling import Sample, draw_pair
+from reference_rt.sampling.blocks import BlockSample
+from reference_rt.sampling.grid import GridSample
+from reference_rt.sampling.independent import IndependentSample
+from reference_rt.sampling.sobol import SobolSample
 
 _Count = Annotated[int, Field(ge=0, le=1024)]
 
@@ -82,7 +90,15 @@ def radiance(setup: DirectSetup, scene: SceneTables, ray: Ray, sampler: Sample) 
         return behind
     kept = local_floats(any_material.scratch_floats(scene.materials))
     shading = shade(scene, ray, hit, kept)
-    total = any_light.emitted(lights, shading.point, shading.at, -ray.d)
+    emitted = any_light.emitted(lights, shading.point, shading.at, -ray.d)
+    scattered: Vec3 = _scattered(sampler, setup, scene, shading)
+    return emitted + scattered
+
+
+@kernel
+def _of_samples(sampler: Sample, setup: DirectSetup, scene: SceneTables, shading: Shading) -> Vec3:
+    """The scattered light, by samples of lights and of the material."""
+    total = Vec3(0.0, 0.0, 0.0)
     normal = light_selection_normal(scene, shading)
     if any_material.is_smooth(scene.materials, shading.point.material):
         for k in range(setup.light_samples):
@@ -91,6 +107,25 @@ def radiance(setup: DirectSetup, scene: SceneTables, ray: Ray, sampler: Sample) 
     for k in range(setup.bsdf_samples):
         total = total + _bsdf_sample(setup, scene, shading, normal, sampler, k, elsewhere)
     return total
+
+
+@kernel
+def _of_all_lights(
+    sampler: GridSample, setup: DirectSetup, scene: SceneTables, shading: Shading
+) -> Vec3:
+    """The same without random numbers."""
+    smooth = any_material.is_smooth(scene.materials, shading.point.material)
+    if setup.light_samples == 0 or not smooth:
+        return Vec3(0.0, 0.0, 0.0)
+    light: Vec3 = fixed_lights(scene, scene.lights.choice, shading, 0.5, 0.5)
+    return light
+
+
+_choice = ByClass("scattered")
+for _sample in (SobolSample, BlockSample, IndependentSample):
+    _choice.register(_sample, _of_samples)
+_choice.register(GridSample, _of_all_lights)
+_scattered = _choice.function
 
 
 @kernel

@@ -75,6 +75,26 @@ def test_deterministic_lights(name):
     assert (np.abs(direct - expected) <= 1e-12 * np.maximum(expected, 1e-3 * scale)).all()
 
 
+def test_direct_on_a_grid():
+    """`direct` has the light of all lights at once, at the grid's points, in two samples a side."""
+    scene = rt.Scene(
+        camera=rt.Orthographic(eye=(0, 5, 0), target=(0, 0, 0), up=(0, 0, -1), width=4.0),
+        film=rt.Film(width=16, height=16),
+        integrator=rt.Direct(),
+        sampler=rt.Grid(spp=4),
+        materials={"floor": rt.Diffuse(reflectance=tuple(RHO))},
+        shapes=(FLOOR,),
+        lights=tuple(LIGHTS.values()),
+    )
+    along = (np.arange(32) + 0.5) / 8.0 - 2.0
+    z, x = np.meshgrid(along, along, indexing="ij")
+    p = np.stack([x, 0.0 * x, z], axis=-1).reshape(-1, 3)
+    exact = RHO / math.pi * sum(arriving(light, p) for light in LIGHTS.values())
+    expected = exact.reshape(16, 2, 16, 2, 3).mean(axis=(1, 3))
+    # The angle at a spot's rim, as above, counts relative to the brightest pixel.
+    assert np.abs(rt.render(scene).colour - expected).max() <= 1e-12 * expected.max()
+
+
 @pytest.mark.parametrize("half_vector", [False, True])
 def test_phong(half_vector):
     """k_a I_a + the sum over lights of (k_d l·n + k_s (e·r or h·n)^p) E, written out."""
