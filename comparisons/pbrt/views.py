@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from comparisons.pbrt.surfaces import Params, UnwritableError, Writing, words
+from comparisons.mitsuba.writing.files import UnwritableError
+from comparisons.pbrt.surfaces import Params, Writing, words
 from reference_rt import lights
 from reference_rt.cameras import Orthographic, Pinhole, ThinLens, film
 from reference_rt.cameras.view_rectangle import by_width
