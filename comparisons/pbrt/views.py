@@ -80,6 +80,8 @@ def integrator_of(integrator: Any) -> str:
     if getattr(integrator, "hide_emitters", False):
         raise UnwritableError("lamps that cameras do not see")
     match integrator:
+        case Direct(shadows=False):
+            raise UnwritableError("direct light without shadows")
         case Direct(light_samples=0) | Direct(bsdf_samples=0):
             raise UnwritableError("direct light by one strategy alone")
         case Direct():

@@ -21,10 +21,11 @@ from reference_rt.core.ray import Ray, ray_from
 from reference_rt.core.vec3 import Vec3, max_component, to_world
 from reference_rt.integrators.direct_light import (
     behind_lamps,
-    direct,
+    direct_from,
     fixed_lights,
     light_selection_normal,
     power_heuristic,
+    unshadowed,
 )
 from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
 from reference_rt.integrators.shading import place, shade
@@ -54,9 +55,14 @@ class Direct(Description):
     hide_emitters: bool = False
     """Whether lamps are not seen directly, and the background is black: camera rays pass through
     surfaces that emit.  Their light, mirrors that show them, and `layers` do not change."""
+    shadows: bool = True
+    """Whether surfaces block light.  Without shadows, as in rasterisers that compute none,
+    directions are not sampled from materials, so that mirrors are black."""
 
     @model_validator(mode="after")
     def _any(self) -> Self:
+        if not self.shadows and self.light_samples == 0:
+            raise ValueError("no shadows and no samples of lights; expected light_samples above 0")
         if self.light_samples + self.bsdf_samples == 0:
             raise ValueError("no samples at all; expected light_samples or bsdf_samples above 0")
         return self
@@ -64,16 +70,18 @@ class Direct(Description):
     @property
     def follows_scattered(self) -> bool:
         """Whether BSDF-sampled rays collect emission that light sampling can sample, too."""
-        return self.bsdf_samples > 0
+        return self.shadows and self.bsdf_samples > 0
 
     def setup(self) -> "DirectSetup":
-        return DirectSetup(self.light_samples, self.bsdf_samples, self.hide_emitters)
+        bsdf_samples = self.bsdf_samples if self.shadows else 0
+        return DirectSetup(self.light_samples, bsdf_samples, self.hide_emitters, self.shadows)
 
 
 class DirectSetup(NamedTuple):
     light_samples: int
     bsdf_samples: int
     hides_lamps: bool
+    shadows: bool
 
 
 @kernel
@@ -117,7 +125,7 @@ def _of_all_lights(
     smooth = any_material.is_smooth(scene.materials, shading.point.material)
     if setup.light_samples == 0 or not smooth:
         return Vec3(0.0, 0.0, 0.0)
-    light: Vec3 = fixed_lights(scene, scene.lights.choice, shading, 0.5, 0.5)
+    light: Vec3 = fixed_lights(scene, scene.lights.choice, shading, 0.5, 0.5, setup.shadows)
     return light
 
 
@@ -142,7 +150,12 @@ def _light_sample(
     if picked.probability == 0.0:
         return black
     u0, u1 = draw_pair(sampler, dimension + sampling.LIGHT_POINT)
-    sample = direct(scene, shading, picked.light, u0, u1)
+    shapes, p = shapes_of(scene), shading.point.p
+    light = any_light.sample_one(scene.lights, picked.light, shapes, scene.textures, p, u0, u1)
+    if setup.shadows:
+        sample = direct_from(scene, shading, light)
+    else:
+        sample = unshadowed(scene, shading, light)
     if max_component(sample.contribution) == 0.0:
         return black
     pdf = sample.light.pdf * picked.probability

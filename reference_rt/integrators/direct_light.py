@@ -105,10 +105,15 @@ def unshadowed(scene: SceneTables, shading: Shading, light: LightSample) -> Dire
 
 @kernel
 def fixed_lights(
-    scene: SceneTables, choice: LightSampler | None, shading: Shading, u0: float, u1: float
+    scene: SceneTables,
+    choice: LightSampler | None,
+    shading: Shading,
+    u0: float,
+    u1: float,
+    shadows: bool,
 ) -> Vec3:
     """Direct light without random numbers: of every point, spot and directional light, and of the
-    point (u0, u1) of every area light."""
+    point (u0, u1) of every area light.  shadows: whether surfaces block it."""
     total = Vec3(0.0, 0.0, 0.0)
     if choice is None:
         return total
@@ -116,7 +121,10 @@ def fixed_lights(
     for k in range(len(choice.kind)):
         if choice.kind[k] != ENVIRONMENT and choice.probability[k] > 0.0:
             light = any_light.sample_fixed(scene.lights, k, shapes, scene.textures, p, u0, u1)
-            sample = direct_from(scene, shading, light)
+            if shadows:
+                sample = direct_from(scene, shading, light)
+            else:
+                sample = unshadowed(scene, shading, light)
             if sample.light.pdf > 0.0:
                 total = total + sample.contribution * (1.0 / sample.light.pdf)
     return total

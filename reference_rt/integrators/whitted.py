@@ -93,7 +93,8 @@ def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: Sampl
         ambient = any_material.ambient(scene.materials, shading) * any_light.ambient(scene.lights)
         total = total + weight * ambient
         if any_material.is_smooth(scene.materials, point.material):
-            light = fixed_lights(scene, scene.lights.choice, shading, whitted.u0, whitted.u1)
+            u0, u1 = whitted.u0, whitted.u1
+            light = fixed_lights(scene, scene.lights.choice, shading, u0, u1, True)
             total = total + weight * light
         if depth == whitted.max_depth:
             continue

@@ -77,6 +77,8 @@ SCENES = [
      "materials.a.base", "'a' is emissive itself; expected"),
     ("integrator: {type: path}\nsampler: {type: grid}", 2, "sampler.type",
      "'path' needs random numbers, which 'grid' does not have; expected"),
+    ("integrator: {type: direct, light_samples: 0, shadows: false}", 1, "integrator",
+     "no shadows and no samples of lights; expected light_samples above 0"),
     ("integrator: {type: direct}\nsampler: {type: grid}\n"
      "lights:\n  - {type: constant, radiance: 1}",
      4, "lights[0]", "'direct' needs random numbers for the light 'constant'"),
