@@ -472,3 +472,11 @@ def test_command(arguments: list[str], tmp_path: Path, monkeypatch: pytest.Monke
     else:
         assert "note: numbers are float32" in result.output
         assert File(Path("s.glb").read_bytes()).json["asset"]["version"] == "2.0"
+
+
+def test_float32_is_of_json(tmp_path: Path) -> None:
+    arguments = [str(SCENES / "cornell_box.yaml"), "--float32", "-o", f"{tmp_path}/s.glb"]
+    result = CliRunner().invoke(APP, arguments)
+    assert result.exit_code == 2
+    assert "--float32: is of --to json" in result.output
+    assert not (tmp_path / "s.glb").exists()
