@@ -23,9 +23,18 @@ from comparisons.report.plots import histograms
 from comparisons.report.templates import encoded, template, write
 from comparisons.report.thumbnails import Thumbnail, Thumbnails, flip_map, of_witness, thumbnails
 from comparisons.report.values import shown
-from comparisons.results.case import Case, Images, Metrics, RungResult, Status, how_many
+from comparisons.results.case import (
+    INTERRUPTED,
+    PASSING,
+    Case,
+    Images,
+    Metrics,
+    RungResult,
+    Status,
+    how_many,
+)
 from comparisons.results.files import named, plain
-from comparisons.results.headline import HEAD, headline, numbers_rows
+from comparisons.results.headline import headline, in_short, numbers_rows
 from comparisons.results.rungs import RUNGS
 from reference_rt.util.files import replacing
 
@@ -123,21 +132,35 @@ def write_report(
     cases: Sequence[Case],
     provenance: Mapping[str, Any],
     *,
+    title: str = "",
+    walls: Mapping[str, float] | None = None,
     most_bytes: int = MOST_BYTES,
+    not_run: Mapping[str, str] | None = None,
     missing: Sequence[str] = (),
 ) -> None:
     """Write the page about `cases`, whole or not at all.
 
-    missing: names of requested cases that were not run, because the run was interrupted;
-    provenance: facts by name, shown as they are: versions, Mitsuba's variant and why it was chosen,
-    machine and date;  most_bytes: a page that would be larger stores its float pictures at lower
-    resolution, those of passing cases first, and says so; text and thumbnails are never cut.
+    title: the suite's name, by default those of the scenes;  walls: seconds of each case in all, by
+    name;  not_run: why other cases were not run, by name;  missing: names of requested cases that
+    were not run, because the run was interrupted;  provenance: facts by name, shown as they are:
+    versions, Mitsuba's variant and why it was chosen, machine and date;  most_bytes: a page that
+    would be larger stores its float pictures at lower resolution, those of passing cases first, and
+    says so; text and thumbnails are never cut.
 
     In the numbers of a rung, a name that ends in `_bias` means a fraction and is shown in percent.
     """
     ranked = sorted(cases, key=lambda case: ORDER.index(case.verdict))
     mapped = len(cases) <= MOST_MAPPED
-    views = [_view(case, mapped or case.verdict in FAILED) for case in ranked]
+    views = [_view(case, mapped or case.verdict in FAILED, walls or {}) for case in ranked]
+    named = title or ", ".join(case.scene for case in cases[:MOST_OPEN])
+    failing = sum(case.verdict not in PASSING for case in cases)
+    idle = [(name, "missing", INTERRUPTED) for name in missing]
+    idle += [(name, "not run", why) for name, why in (not_run or {}).items()]
+    verdict = how_many(len(cases), len(missing))
+    if cases:
+        verdict += f": {f'{failing} fail' if failing else 'all pass'}"
+    if not_run:
+        verdict += f"; {len(not_run)} not run"
     filled = template("page.html.jinja").render
     script = Markup(_script())  # trusted: part of this package
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
@@ -154,11 +177,13 @@ def write_report(
             expanded=len(cases) <= MOST_OPEN,
             signs=SIGNS,
             modes=MODES,
-            head=HEAD,
             provenance=provenance,
             cases=views,
-            how_many=how_many(len(cases), len(missing)),
+            title=named or "no case",
+            verdict=verdict,
             missing=missing,
+            not_run=not_run,
+            idle=idle,
             coarser=sum(view["factor"] > 1 for view in views),
             most_megabytes=most_bytes / 1e6,
             script=script,
@@ -179,8 +204,9 @@ def _script() -> str:
     return "\n" + "\n".join((folder / name).read_text(encoding="utf-8") for name in SCRIPTS)
 
 
-def _view(case: Case, mapped: bool) -> dict[str, Any]:
+def _view(case: Case, mapped: bool, walls: Mapping[str, float]) -> dict[str, Any]:
     """A case as the template takes it.  mapped: whether it has a map of FLIP."""
+    short, seen = in_short(case)
     stages = dict.fromkeys(stage for times in case.seconds.values() for stage in times)
     pictures = _thumbnails(case)
     seconds = {_side(who, case): times for who, times in case.seconds.items()}
@@ -190,6 +216,9 @@ def _view(case: Case, mapped: bool) -> dict[str, Any]:
         "failed": case.verdict in FAILED,
         "rank": ORDER.index(case.verdict),
         "headline": named(headline(case), case.sides),
+        "short": named(short, case.sides),
+        "seen": seen,
+        "seconds_in_all": walls.get(case.scene, ""),
         "found": numbers_rows(case),
         "tiers": sorted(case.rungs, key=lambda rung: _rung(rung.name)),
         "pictures": pictures,

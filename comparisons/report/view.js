@@ -72,6 +72,14 @@ class CaseView {
     this.section.dataset.drawn = JSON.stringify(look);
   }
 
+  /** The candidate alone, on a canvas in place of what is in `element`. */
+  async drawInto(element, look) {
+    const { candidate } = this.pictures ?? (await unpack(this.data));
+    const canvas = document.createElement("canvas");
+    paintKind(canvas, "candidate", candidate, { ...look, white: this.white, span: this.span });
+    element.replaceChildren(canvas);
+  }
+
   /** Give the memory back; what is drawn stays. */
   forget() {
     this.pictures = null;

@@ -43,7 +43,7 @@ def write_page(
         settings=settings,
         targets=[percent(target) for target in settings.targets],
         summary=_summary(curves, settings),
-        scenes=[_view(one) for one in curves],
+        scenes=[{**_view(one), "number": k} for k, one in enumerate(curves, 1)],
         stages=STAGES,
     )
     write(path, page)
@@ -53,7 +53,8 @@ def _summary(curves: Sequence[Curves], settings: Settings) -> dict[str, Any]:
     """Ours against each other method at one target, scene by scene, and the medians."""
     targets = list(settings.targets)
     if not targets:
-        return {"target": "", "columns": [], "rows": [], "medians": [], "absent": []}
+        none: dict[str, Any] = {key: [] for key in ("columns", "rows", "medians", "absent")}
+        return {"target": "", "verdict": "How the error falls with time", **none}
     place = targets.index(0.01) if 0.01 in targets else len(targets) - 1
     titles = {name: c.title for one in curves for name, c in one.methods.items()}
     names = [name for name in titles if name != "ours"]
@@ -65,11 +66,19 @@ def _summary(curves: Sequence[Curves], settings: Settings) -> dict[str, Any]:
         rows.append((number, one.scene, _instead(one), cells))
         for name, ratio in found.items():
             known[name].append(ratio)
+    medians = [_median(ratios) for ratios in known.values()]
+    each = [
+        f"{cell.text} times that of {titles[name]} ({cell.small})"
+        for name, cell in zip(names, medians, strict=True)
+        if cell.small
+    ]
+    told = f"is, as a median, {'; '.join(each)}" if each else "cannot be compared"
     return {
         "target": percent(targets[place]),
+        "verdict": f"Our time to {percent(targets[place])} relative error {told}",
         "columns": [titles[name] for name in names],
         "rows": rows,
-        "medians": [_median(ratios) for ratios in known.values()],
+        "medians": medians,
         "absent": [f"{one.scene}: {line}" for one in curves for line in one.missing],
     }
 

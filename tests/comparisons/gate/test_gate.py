@@ -49,7 +49,7 @@ def test_one_percent_more_fails(right: FloatArray) -> None:
     result, found = run(*replicates, "--scene", "ball.yaml", "--junit", "junit.xml")
     assert result.exit_code == 1, result.output
     assert "ball: differ: likeliest cause: constant gain of 1.0" in result.stdout
-    assert "\n  statistics: the image mean differs: " in result.stdout
+    assert "\n  limit  " in result.stdout
     assert "gain" in found["cases"][0]["cause"]["name"]
     assert found["cases"][0]["worst"]
     assert JUnitXml.fromfile("junit.xml").failures == 1
@@ -70,7 +70,7 @@ def test_a_single_noisy_picture_is_inconclusive() -> None:
     result, found = run(*files(noisy), "--scene", "ball.yaml")
     assert result.exit_code == 1, result.output
     assert "ball: inconclusive: a single picture does not show its noise" in result.stdout
-    assert "\n  statistics: a single picture does not show its noise here, " in result.stdout
+    assert "\n  would have been seen  unknown  " in result.stdout
     assert status(found, "statistics") == "inconclusive"
     assert status(found, "images") == "not-applicable"
 
