@@ -155,6 +155,7 @@ def gate(
         from comparisons.gate.request import Request, gated
         from comparisons.gate.rounds import Rounds, gated_renderer
         from comparisons.report import terminal
+        from comparisons.results.case import trace_command
         from comparisons.results.headline import headline
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.console import ProgressLine
@@ -240,7 +241,8 @@ def gate(
         case, failed = not_run(name, error), error
     else:
         case = replace(case, seconds={"candidate": {"render": driver.seconds}} if driver else {})
-    case = replace(case, again=shlex.join(["reference-rt", *sys.argv[1:]]))
+    trace = "" if scene is None else trace_command(scene, size, by_name(define))
+    case = replace(case, again=shlex.join(["reference-rt", *sys.argv[1:]]), trace=trace)
     names = [str(path) for path in candidates or (driver.made if driver else ())]
     facts = {"limit": limit, "candidates": names}
     facts |= {"baseline": baseline} if baseline else {}

@@ -18,7 +18,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from comparisons.report.pictures_data import as_json, pack
+from comparisons.report.pictures_data import COARSE, EXACT, Bits, as_json, pack
 from comparisons.report.plots import histograms
 from comparisons.report.templates import encoded, template, write
 from comparisons.report.thumbnails import Thumbnail, Thumbnails, flip_map, of_witness, thumbnails
@@ -55,33 +55,39 @@ class Fitted:
 
     data: str
     factor: int
+    bits: Bits = COARSE
 
 
 def fitted(
-    pictures: Sequence[Images | None], failed: Sequence[bool], most_bytes: int
+    pictures: Sequence[Images | None],
+    failed: Sequence[bool],
+    most_bytes: int,
+    bits: Bits = COARSE,
 ) -> list[Fitted | None]:
     """The pictures of all cases within `most_bytes`; None where a case has none.
 
-    The largest pictures of cases that did not fail are reduced first; those of failed cases only
-    when no others are left.
+    bits: of pictures that are not reduced.  The largest pictures of cases that did not fail are
+    reduced first; those of failed cases only when no others are left.
     """
-    kept = {i: _packed(p, 1, most_bytes) for i, p in enumerate(pictures) if p is not None}
+    kept = {i: _packed(p, 1, most_bytes, bits) for i, p in enumerate(pictures) if p is not None}
     while sum(len(one.data) for one in kept.values()) > most_bytes:
         _, _, coarse = max((not failed[i], len(one.data), i) for i, one in kept.items() if one.data)
         images = pictures[coarse]
         assert images is not None
-        kept[coarse] = _packed(images, 2 * kept[coarse].factor, most_bytes)
+        by = 1 if kept[coarse].bits == EXACT else 2
+        kept[coarse] = _packed(images, by * kept[coarse].factor, most_bytes)
     return [kept.get(i) for i in range(len(pictures))]
 
 
-def _packed(images: Images, factor: int, most_bytes: int) -> Fitted:
+def _packed(images: Images, factor: int, most_bytes: int, bits: Bits = COARSE) -> Fitted:
     pixels = images.candidate[..., 0].size + images.reference[..., 0].size
     # Packing takes seconds for a picture that cannot fit anyway.
     while factor <= COARSEST and FEWEST_BYTES * pixels > most_bytes * factor**2:
         factor *= 2
     if factor > COARSEST:
         return Fitted("", factor)
-    return Fitted(as_json(pack(images, factor)), factor)
+    bits = bits if factor == 1 else COARSE
+    return Fitted(as_json(pack(images, factor, bits)), factor, bits)
 
 
 MOST_BYTES = 15_000_000
@@ -117,8 +123,9 @@ MODES = (
     ("blink", "blink"),
     ("slider", "slider"),
     ("single", "single"),
+    ("onion", "onion skin"),
 )
-"""Ways of viewing the pictures, in the order of their keys 1 to 5."""
+"""Ways of viewing the pictures, in the order of their keys 1 to 6."""
 
 SCRIPTS = (
     *("unpack.js", "colour.js", "crop.js", "view.js"),
@@ -195,7 +202,8 @@ def write_report(
     left -= 4000 * len(views)
     failed = [case.verdict in FAILED for case in ranked]
     pictures = [view["case"].images if view["pictures"] else None for view in views]
-    page = rendered(fitted(pictures, failed, max(left, 0)))
+    bits = EXACT if len(cases) <= MOST_OPEN else COARSE
+    page = rendered(fitted(pictures, failed, max(left, 0), bits))
     write(path, page)
 
 

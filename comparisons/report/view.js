@@ -2,7 +2,6 @@
 
 /** Pixels of the screen within which a drag of a zoomed picture moves the slider. */
 const NEAR_SLIDER = 24;
-const SIGNIFICANT = { candidate: 3, reference: 3, difference: 2, z: 2 };
 
 /** A value with as many digits as were kept of it. */
 function reading(value, digits) {
@@ -22,6 +21,9 @@ class CaseView {
     this.row = this.box.querySelector(".row");
     this.data = JSON.parse(this.box.querySelector("script.data").textContent);
     this.factor = this.data.factor;
+    /** Of what is read. */
+    const digits = this.data.digits;
+    this.digits = { candidate: digits, reference: digits, difference: digits > 3 ? digits : 2, z: 2 };
     this.white = Number(this.box.dataset.white);
     this.span = Number(this.box.dataset.span);
     this.figures = [...this.row.querySelectorAll("figure")].map((element) => this.figure(element));
@@ -35,6 +37,8 @@ class CaseView {
     this.region = null;
     this.pictures = null;
     this.row.tabIndex = 0;
+    this.trace = this.box.querySelector(".trace");
+    this.command = this.trace?.querySelector("code").textContent;
     this.listen();
   }
 
@@ -120,7 +124,7 @@ class CaseView {
 
   /** Whether a drag moves the slider: near it, or anywhere if there is nothing to pan. */
   moves(figure, event) {
-    if (document.body.dataset.mode !== "slider") return false;
+    if (!["slider", "onion"].includes(document.body.dataset.mode)) return false;
     const box = figure.frame.getBoundingClientRect();
     const far = Math.abs(event.clientX - box.left - (box.width * Number(this.wipe.value)) / 100);
     return this.area.zoom === 1 || far < NEAR_SLIDER;
@@ -291,11 +295,16 @@ class CaseView {
     const { x, y } = this.cursor;
     const range = (at) => (this.factor > 1 ? `${at * this.factor} to ${(at + 1) * this.factor - 1}` : at);
     this.box.querySelector(".place").textContent = `x ${range(x)}, y ${range(y)}`;
+    if (this.trace) {
+      const middle = (at) => at * this.factor + Math.floor(this.factor / 2);
+      this.trace.querySelector("code").textContent = `${this.command} --pixel ${middle(x)},${middle(y)}`;
+      this.trace.hidden = false;
+    }
     for (const row of this.box.querySelectorAll("[data-row]")) {
       const kind = row.dataset.row;
       const values = this.values(this.pictures[kind], x, y);
       [...row.cells].slice(1).forEach((cell, k) => {
-        cell.textContent = k < values.length ? reading(values[k], SIGNIFICANT[kind]) : "–";
+        cell.textContent = k < values.length ? reading(values[k], this.digits[kind]) : "–";
       });
     }
   }

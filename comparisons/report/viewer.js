@@ -172,7 +172,7 @@ function state() {
   return {
     case: looked?.dataset.name ?? "",
     view: mode,
-    of: mode === "side" || mode === "slider" || mode === "blink" ? "candidate" : which,
+    of: mode === "flip" || mode === "single" ? which : "candidate",
     x: x ?? "",
     y: y ?? "",
     stops: String(look.stops),

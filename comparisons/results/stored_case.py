@@ -22,7 +22,7 @@ from reference_rt.util.files import read_input, read_text, replacing
 
 CASE, PICTURES = "case.json", "pictures.exr"
 
-SCHEMA = 2
+SCHEMA = 3
 """Version of the layout; raised whenever a reader of the former layout would misread the new
 one."""
 

@@ -155,6 +155,8 @@ def test_the_views(show):
     assert shown(page) == ["candidate"]
     page.keyboard.press("4")
     assert shown(page) == ["candidate", "reference"]
+    page.keyboard.press("6")
+    assert shown(page) == ["candidate", "reference"]
     page.keyboard.press("5")
     for kind in ("reference", "difference", "z", "flip", "candidate"):
         page.keyboard.press("f")
@@ -195,14 +197,15 @@ def test_a_single_view_says_what_a_case_lacks(show):
 
 
 @pytest.mark.slow
-def test_the_slider(show):
+def test_the_slider_and_the_onion_skin(show):
     page = show(case(Images(grey(0.25), grey(1.0))))
-    page.keyboard.press("4")
     pixel(page, "candidate", 0, 0)
-    page.locator(".wipe input").fill("25")
-    page.locator("h1").hover()
-    picture = Image.open(io.BytesIO(page.locator("#case-1 .reference .frame").screenshot()))
-    middle = picture.height // 2
-    left, right = (picture.getpixel((int(f * picture.width), middle))[:3] for f in (0.2, 0.3))
-    assert left == (display(0.25),) * 3
-    assert right == (255, 255, 255)
+    dark, white = display(0.25), 255
+    for key, expected in (("4", (dark, white)), ("6", (round(0.25 * dark + 0.75 * white),) * 2)):
+        page.keyboard.press(key)
+        page.locator(".wipe input").fill("25")
+        page.locator("h1").hover()
+        picture = Image.open(io.BytesIO(page.locator("#case-1 .reference .frame").screenshot()))
+        row = picture.height // 2
+        found = [picture.getpixel((int(f * picture.width), row))[0] for f in (0.2, 0.3)]
+        assert np.abs(np.subtract(found, expected)).max() <= 1
