@@ -173,15 +173,27 @@ def write_report(
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
     counts = Counter(case.verdict for case in cases)
 
+    few = len(cases) <= MOST_OPEN
+    layers = [
+        (view, name, Images(*pair))
+        for view in views
+        if few and view["pictures"]
+        for name, pair in view["case"].images.layers.items()
+    ]
+
     def rendered(pictures: Sequence[Fitted | None]) -> str:
-        for view, data in zip(views, pictures, strict=True):
+        for (view, name, images), data in zip(layers, pictures[len(views) :], strict=False):
+            if data and data.data:
+                small = thumbnails(images)
+                view["layers"].append((name, Markup(data.data), small.white, small.span))
+        for view, data in zip(views, pictures[: len(views)], strict=True):
             # Trusted: `as_json` escapes <, > and &.
             view["data"] = Markup(data.data) if data else ""
             view["factor"] = data.factor if data else 1
         return filled(
             counts=[(status, counts[status]) for status in ORDER if counts[status]],
             sides=_common_sides(cases),
-            expanded=len(cases) <= MOST_OPEN,
+            expanded=few,
             signs=SIGNS,
             modes=MODES,
             provenance=provenance,
@@ -202,8 +214,9 @@ def write_report(
     left -= 4000 * len(views)
     failed = [case.verdict in FAILED for case in ranked]
     pictures = [view["case"].images if view["pictures"] else None for view in views]
-    bits = EXACT if len(cases) <= MOST_OPEN else COARSE
-    page = rendered(fitted(pictures, failed, max(left, 0), bits))
+    pictures += [images for _, _, images in layers]
+    failed += [False] * len(layers)
+    page = rendered(fitted(pictures, failed, max(left, 0), EXACT if few else COARSE))
     write(path, page)
 
 
@@ -230,6 +243,7 @@ def _view(case: Case, mapped: bool, walls: Mapping[str, float]) -> dict[str, Any
         "found": numbers_rows(case),
         "tiers": sorted(case.rungs, key=lambda rung: _rung(rung.name)),
         "pictures": pictures,
+        "layers": [],
         "figures": _figures(case, pictures, mapped) if pictures else [],
         "witness": of_witness(case.images, case.sides) if pictures and case.images else [],
         "histograms": _histograms(case, pictures) if pictures else [],

@@ -19,13 +19,7 @@ class CaseView {
     this.section = section;
     this.box = section.querySelector(".pictures");
     this.row = this.box.querySelector(".row");
-    this.data = JSON.parse(this.box.querySelector("script.data").textContent);
-    this.factor = this.data.factor;
-    /** Of what is read. */
-    const digits = this.data.digits;
-    this.digits = { candidate: digits, reference: digits, difference: digits > 3 ? digits : 2, z: 2 };
-    this.white = Number(this.box.dataset.white);
-    this.span = Number(this.box.dataset.span);
+    this.choose("");
     this.figures = [...this.row.querySelectorAll("figure")].map((element) => this.figure(element));
     this.crops = [...section.querySelectorAll(".places button")].map((button) => new Crop(button));
     /** What of the pictures shows: from (left, top), as fractions, 1 / zoom of each side. */
@@ -35,11 +29,28 @@ class CaseView {
     /** Called with the section when the cursor has moved. */
     this.onlook = () => {};
     this.region = null;
-    this.pictures = null;
     this.row.tabIndex = 0;
     this.trace = this.box.querySelector(".trace");
     this.command = this.trace?.querySelector("code").textContent;
     this.listen();
+  }
+
+  /** Take the numbers of a layer, "" for the picture itself. */
+  choose(layer) {
+    this.layer = layer;
+    const stored = this.box.querySelector(layer ? `[data-layer="${layer}"]` : "script.data");
+    this.data = JSON.parse(stored.textContent);
+    this.factor = this.data.factor;
+    /** Of what is read. */
+    const digits = this.data.digits;
+    this.digits = { candidate: digits, reference: digits, difference: digits > 3 ? digits : 2, z: 2 };
+    const { white, span } = layer ? stored.dataset : this.box.dataset;
+    [this.white, this.span, this.pictures] = [Number(white), Number(span), null];
+    for (const figure of this.figures ?? []) {
+      const { width, height } = this.data[figure.kind === "candidate" ? "candidate" : "reference"];
+      Object.assign(figure, { width, height });
+      figure.element.hidden = layer !== "" && (figure.kind === "z" || figure.kind === "flip");
+    }
   }
 
   /** A canvas in place of the thumbnail; the map of FLIP is a picture already. */
@@ -62,8 +73,10 @@ class CaseView {
   /** Decode, unless it is done, and draw. */
   async show(look) {
     this.pictures ??= await unpack(this.data);
-    const own = { ...look, white: this.white, span: this.span };
-    for (const figure of this.figures.filter(({ kind }) => kind !== "flip")) {
+    this.look = look;
+    const own = { ...look, white: this.white, span: this.span, signed: this.layer === "normal" };
+    const drawn = this.figures.filter(({ kind, element }) => kind !== "flip" && !element.hidden);
+    for (const figure of drawn) {
       paintKind(figure.canvas, figure.kind, this.pictures[figure.kind], own);
       figure.image.replaceWith(figure.canvas);
       const end = reading(this.span / 2 ** look.stops, 4);
@@ -91,12 +104,14 @@ class CaseView {
 
   exposed({ stops, colours }) {
     const white = this.white / 2 ** stops;
+    if (this.layer === "normal") return "Normals: red, green and blue are x, y and z; grey is 0";
+    if (this.layer) return `White is a ${this.layer} of ${reading(white, 4)}`;
     if (colours === "linear") return `Luminance: yellow is ${reading(white, 4)}, purple is 0`;
     const dark = reading(white / 2 ** LOG_STOPS, 4);
     if (colours === "reinhard") return `Reinhard's curve: radiance ${reading(4 * white, 4)} is white`;
     if (colours === "filmic") return `A curve of film: radiance ${reading(white, 4)} is bright`;
     if (colours === "log") return `Luminance: yellow is ${reading(white, 4)}, purple is ${dark}`;
-    return `White is radiance ${reading(white, 4)} in both pictures`;
+    return `White is radiance ${reading(white, 4)} W·sr⁻¹·m⁻² in both pictures`;
   }
 
   listen() {
@@ -112,6 +127,10 @@ class CaseView {
     for (const button of this.box.querySelectorAll("[data-zoom]")) {
       button.addEventListener("click", () => this.zoom(button.dataset.zoom));
     }
+    this.box.querySelector(".layer")?.addEventListener("change", ({ target }) => {
+      this.choose(target.value);
+      this.show(this.look);
+    });
     this.wipe = this.box.querySelector(".wipe input");
     this.wipe.addEventListener("input", () => this.setWipe(Number(this.wipe.value)));
   }

@@ -64,6 +64,8 @@ class Images:
     error: FloatArray | None = None
     witness: FloatArray | None = None
     """A third renderer's, where one was asked."""
+    layers: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+    """Other pictures of both sides by name: of hits of the rays through the pixels' centres."""
 
 
 @dataclass(frozen=True)

@@ -140,6 +140,27 @@ def test_what_is_not_finite_is_magenta_and_readable(show):
     assert read(page, "difference") == ["NaN", "∞", "−∞"]
 
 
+def test_layers(show):
+    normals, distances = grey(0.0), grey(4.0)
+    normals[2, 3] = 0.0, 1.0, -0.5
+    layers = {"normal": (normals, grey(0.0)), "distance": (distances, grey(2.0))}
+    page = show(case(Images(grey(0.25), grey(1.0), grey(0.1), layers=layers)))
+    pixel(page, "candidate", 0, 0)
+    point(page, 3, 2)
+    page.locator(".layer").select_option("normal")
+    page.wait_for_function("!document.querySelector('.exposed').textContent.includes('White')")
+    assert pixel(page, "candidate", 3, 2) == (128, 255, 64)
+    assert read(page, "candidate") == ["0", "1", "−0.5"]
+    assert shown(page) == ["candidate", "reference", "difference"]
+    page.locator(".layer").select_option("distance")
+    page.get_by_text("White is a distance of 2").wait_for()
+    assert read(page, "difference") == ["2"] * 3
+    page.locator(".layer").select_option("")
+    page.get_by_text("White is radiance 1 W").wait_for()
+    assert read(page, "candidate") == ["0.25"] * 3
+    assert shown(page) == ["candidate", "reference", "difference", "z", "flip"]
+
+
 # Views
 
 
