@@ -34,7 +34,7 @@ from comparisons.results.case import (
     how_many,
 )
 from comparisons.results.files import named, plain
-from comparisons.results.headline import headline, in_short, numbers_rows
+from comparisons.results.headline import headline, in_short, is_of_statistics, numbers_rows
 from comparisons.results.rungs import RUNGS
 from reference_rt.util.files import replacing
 
@@ -240,7 +240,11 @@ def _view(case: Case, mapped: bool, walls: Mapping[str, float]) -> dict[str, Any
         "short": named(short, case.sides),
         "seen": seen,
         "seconds_in_all": walls.get(case.scene, ""),
-        "found": numbers_rows(case),
+        "found": [
+            [f"{cell[:1].upper()}{cell[1:]}".replace(" %", "\N{NO-BREAK SPACE}%") for cell in row]
+            for row in numbers_rows(case)
+        ],
+        "reason": "" if is_of_statistics(case) else named(case.reason, case.sides),
         "tiers": sorted(case.rungs, key=lambda rung: _rung(rung.name)),
         "pictures": pictures,
         "layers": [],

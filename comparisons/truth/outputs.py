@@ -120,7 +120,7 @@ def write(out: Path, rows: Sequence[Row], provenance: Mapping[str, Any]) -> None
         totals=[(renderer, *total) for renderer, total in totals.items()],
         provenance=provenance,
         level=LEVEL,
-        scores=[(AREAS[a], r, n, m) for a, r, n, m in scores(rows)],
+        areas_right=[(AREAS[a], r, f"{n} of {m}") for a, r, n, m in scores(rows)],
         areas=[(AREAS[a], [r for r in rows if r.case.area == a]) for a in AREAS],
         signs=SIGNS,
         triple=_triple,
