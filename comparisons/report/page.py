@@ -22,7 +22,7 @@ from comparisons.report.pictures_data import COARSE, EXACT, Bits, as_json, pack
 from comparisons.report.plots import histograms
 from comparisons.report.templates import encoded, template, write
 from comparisons.report.thumbnails import Thumbnail, Thumbnails, flip_map, of_witness, thumbnails
-from comparisons.report.values import shown
+from comparisons.report.values import label, shown
 from comparisons.results.case import (
     INTERRUPTED,
     PASSING,
@@ -201,7 +201,6 @@ def write_report(
             title=named or "no case",
             verdict=verdict,
             missing=missing,
-            not_run=not_run,
             idle=idle,
             coarser=sum(view["factor"] > 1 for view in views),
             most_megabytes=most_bytes / 1e6,
@@ -228,9 +227,7 @@ def _script() -> str:
 def _view(case: Case, mapped: bool, walls: Mapping[str, float]) -> dict[str, Any]:
     """A case as the template takes it.  mapped: whether it has a map of FLIP."""
     short, seen = in_short(case)
-    stages = dict.fromkeys(stage for times in case.seconds.values() for stage in times)
     pictures = _thumbnails(case)
-    seconds = {_side(who, case): times for who, times in case.seconds.items()}
     return {
         "case": case,
         "told": lambda text: named(text, case.sides),
@@ -239,7 +236,7 @@ def _view(case: Case, mapped: bool, walls: Mapping[str, float]) -> dict[str, Any
         "headline": named(headline(case), case.sides),
         "short": named(short, case.sides),
         "seen": seen,
-        "seconds_in_all": walls.get(case.scene, ""),
+        "wall": f"{walls[case.scene]:.1f}" if case.scene in walls else "",
         "found": [
             [f"{cell[:1].upper()}{cell[1:]}".replace(" %", "\N{NO-BREAK SPACE}%") for cell in row]
             for row in numbers_rows(case)
@@ -252,15 +249,20 @@ def _view(case: Case, mapped: bool, walls: Mapping[str, float]) -> dict[str, Any
         "witness": of_witness(case.images, case.sides) if pictures and case.images else [],
         "histograms": _histograms(case, pictures) if pictures else [],
         "metrics": _metric_rows(case.metrics) if case.metrics else [],
-        "stages": list(stages),
-        "seconds": seconds,
-        "totals": {who: sum(times.values()) for who, times in seconds.items()},
+        "times": _times(case),
     }
 
 
-def _side(who: str, case: Case) -> str:
-    """What the page calls a side, also where times name it by its role."""
-    return dict(zip(("candidate", "reference"), case.sides, strict=True)).get(who, who)
+def _times(case: Case) -> list[list[str]]:
+    """The seconds of each step, a column for each side; [] if there are none."""
+    sides = dict(zip(("candidate", "reference"), case.sides, strict=True))
+    stages = dict.fromkeys(stage for times in case.seconds.values() for stage in times)
+    if not stages:
+        return []
+    columns = case.seconds.values()
+    rows = [[label(stage), *(shown(times.get(stage)) for times in columns)] for stage in stages]
+    total = ["total", *(shown(sum(times.values())) for times in columns)]
+    return [["Step", *(sides.get(who, who) for who in case.seconds)], *rows, total]
 
 
 def _common_sides(cases: Sequence[Case]) -> tuple[str, str]:
