@@ -152,9 +152,10 @@ def numbers_rows(case: Case) -> list[tuple[str, ...]]:
     biases = {} if rung is None else rung.numbers.get("relative_bias")
     if rung is None or seen is None or not isinstance(biases, Mapping):
         return []
-    found = ", ".join(
+    some = [
         f"{name} {_percent(bias, sign=True)}" for name, bias in biases.items() if bias is not None
-    )
+    ]
+    found = ", ".join(some).replace(" %,", ",")
     known = rung.numbers.get("noise_known", True)
     would = _percent(seen) if known else "unknown"
     columns = [("image mean", found, would, _within(rung.numbers.get("limit")))]
@@ -169,12 +170,15 @@ def numbers_rows(case: Case) -> list[tuple[str, ...]]:
 
 
 def _worst(cells: Mapping[str, Any]) -> str:
-    """Such as "3 differ; worst -12 % ± 2.1 %"."""
+    """Such as "3 differ; worst -12 ± 2.1 %"."""
     bias, half = cells.get("worst_bias"), cells.get("worst_half_width")
-    worst = "" if bias is None else f"; worst {_percent(bias, sign=True)}"
-    width = "" if bias is None or half is None else f" ± {_percent(half)}"
     count = f"{cells['differ']:,} differ" if cells["differ"] else "none differs"
-    return f"{count}{worst}{width}"
+    if bias is None:
+        return count
+    worst = _percent(bias, sign=True)
+    if half is not None:
+        worst = f"{worst.removesuffix(' %')} ± {_percent(half)}"
+    return f"{count}; worst {worst}"
 
 
 def _within(margin: float | None) -> str:

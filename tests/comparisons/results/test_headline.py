@@ -151,10 +151,10 @@ def test_the_numbers_as_a_table():
     told = list(zip(*numbers_rows(case("differ", rung)), strict=True))
     assert told == [
         ("bias", "measured", "would have been seen", "limit"),
-        ("image mean", "R +1.0 %, G +1.1 %, B +1.2 %", "0.35 %", "±0.50 %"),
+        ("image mean", "R +1.0, G +1.1, B +1.2 %", "0.35 %", "±0.50 %"),
         ("64 tiles", "3 differ; worst -12 %", "", ""),
         ("16,384 pixels", "1 differ; worst +200 %", "", ""),
-        ("8 smooth patterns", "1 differ; worst -2.0 % ± 0.40 %", "", ""),
+        ("8 smooth patterns", "1 differ; worst -2.0 ± 0.40 %", "", ""),
     ]
     assert numbers_rows(case("invalid", RungResult("input", "invalid", "why"))) == []
     lines["differ"] = 1
