@@ -1,5 +1,6 @@
 """The gate as a whole: right pictures pass, wrong ones do not, and each says why."""
 
+import re
 import shlex
 from pathlib import Path
 
@@ -33,7 +34,9 @@ def test_right_pictures_pass(right: FloatArray, monkeypatch: pytest.MonkeyPatch)
     assert all(rung["status"] == "agree" for rung in case["tiers"].values())
     assert case["sides"] == {"candidate": "candidate's", "reference": "reference_rt's"}
     assert found["provenance"]["candidates"] == [f"c{k}.exr" for k in range(4)]
-    assert "ball" in Path("out/report.html").read_text()
+    page = Path("out/report.html").read_text()
+    assert "<title>ball: agree, reference_rt</title>" in page
+    assert re.search(r"<h3>Seconds</h3>\s*<p>\d+\.\d in all</p>", page)
     assert JUnitXml.fromfile("junit.xml").tests == 1
     assert JUnitXml.fromfile("junit.xml").failures == 0
 
