@@ -44,7 +44,7 @@ async function unpack(data) {
   if (data.rest) pictures.difference = difference(pictures, decode(data.rest, next(data.rest)));
   if (data.error) {
     pictures.error = decode(data.error, next(data.error));
-    pictures.z = quotient(pictures.difference, pictures.error);
+    pictures.z = quotient(pictures);
   }
   return pictures;
 }
@@ -54,8 +54,12 @@ function difference({ candidate, reference }, rest) {
   return { ...candidate, values };
 }
 
-/** Differences in standard errors: nothing over nothing is 0, something over nothing infinite. */
-function quotient(differences, errors) {
-  const values = differences.values.map((value, i) => (value === 0 ? 0 : value / errors.values[i]));
-  return { ...differences, values };
+/** What float32 arithmetic may make of a value, relatively: sixteen roundings. */
+const ROUNDING = 2 ** -20;
+
+/** Differences in standard errors: 0 where rounding explains them, something over nothing infinite. */
+function quotient({ difference, error, reference }) {
+  const values = difference.values.map((value, i) =>
+    Math.abs(value) <= ROUNDING * Math.abs(reference.values[i]) ? 0 : value / error.values[i]);
+  return { ...difference, values };
 }
