@@ -248,9 +248,17 @@ def report(
     results = folder / "results.json"
     check_stored_results(folder)
     check_writable(results, page)
-    cases, provenance, suite, not_run, missing = read_stored_results(folder)
+    cases, walls, provenance, suite, not_run, missing = read_stored_results(folder)
     write_results(results, cases, provenance, suite, not_run, missing)
-    write_report(page, cases, provenance, missing=missing)
+    write_report(
+        page,
+        cases,
+        provenance,
+        title=suite or "",
+        walls=walls,
+        not_run=not_run,
+        missing=missing,
+    )
     say(f"{how_many(len(cases), len(missing))}: {results}, {page}", err=True)
     raise typer.Exit(1 if missing else 0)
 

@@ -2,6 +2,7 @@
 
 import shlex
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -143,6 +144,7 @@ def gate(
     usage; 3: invalid picture, scene or baseline; 4: the renderer could not run, or the baseline is
     missing or stale.
     """
+    started = time.perf_counter()
     with compare_extra("the gate"):
         from comparisons.compare.looks import SECONDS
         from comparisons.gate import outputs
@@ -153,7 +155,9 @@ def gate(
         from comparisons.gate.request import Request, gated
         from comparisons.gate.rounds import Rounds, gated_renderer
         from comparisons.renderers import witness_facts
-        from comparisons.results.headline import headline, numbers_table
+        from comparisons.report import terminal
+        from comparisons.results.case import trace_command
+        from comparisons.results.headline import headline
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.console import ProgressLine
 
@@ -238,22 +242,21 @@ def gate(
         case, failed = not_run(name, error), error
     else:
         case = replace(case, seconds={"candidate": {"render": driver.seconds}} if driver else {})
-    case = replace(case, again=shlex.join(["reference-rt", *sys.argv[1:]]))
+    trace = "" if scene is None else trace_command(scene, size, by_name(define))
+    case = replace(case, again=shlex.join(["reference-rt", *sys.argv[1:]]), trace=trace)
     names = [str(path) for path in candidates or (driver.made if driver else ())]
     facts = {"limit": limit, "candidates": names}
     facts |= {"baseline": baseline} if baseline else {}
     facts |= {"command": command} if command else {}
     facts |= witness_facts(witness)
-    results, report = outputs.write(case, out, facts)
+    results, report = outputs.write(case, out, facts, time.perf_counter() - started)
     outputs.for_ci(case, junit, "" if scene is None else scene.as_posix(), github)
     if failed is not None:
         raise failed
     say(f"{case.scene}: {case.verdict}: {headline(case)}")
     if case.cause is not None:
         say(f"  {case.cause.name}: {case.cause.evidence}")
-    for line in numbers_table(case):
-        say(f"  {line}")
-    say(f"  {case.reason}")
+    terminal.tell(terminal.console(), case)
     tell(f"{results}, {report}")
     raise typer.Exit(outputs.code_of(case))
 

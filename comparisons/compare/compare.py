@@ -290,6 +290,8 @@ def _gather(
     decided = any(rung.status == "differ" for rung in found)
     shown = counterpart if own is None else Counterpart(own, counterpart.mi_shapes)
     rendered, looked = _pictures(scene, tables, shown, budget, threads, say, decided)
+    shapes = pictures.layers(scene, tables, counterpart)
+    rendered = replace(rendered, images=replace(rendered.images, layers=shapes))
     for side, times in rendered.seconds.items():
         seconds[side] = seconds[side] | times
     notes.extend(rendered.notes)

@@ -19,7 +19,7 @@ from comparisons.report.thumbnails import BLUE, RED, WHITE, png_url
 from comparisons.report.values import shown
 from comparisons.results.case import Case, FloatArray, Images
 from comparisons.results.files import named
-from comparisons.results.headline import HEAD, headline, numbers_rows
+from comparisons.results.headline import headline, numbers_rows
 from comparisons.runs.provenance import provenance
 from comparisons.statistics.metrics import encode, nonfinite_pixels, white_level
 from reference_rt.rendering.render import with_settings
@@ -66,11 +66,11 @@ class NotebookCase(Case):
         """The numbers of the statistics as a table."""
         if not (rows := numbers_rows(self)):
             return ""
-        head = "".join(f"<th>{name}</th>" for name in HEAD)
         body = "".join(
-            f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows
+            f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in row)}</tr>"
+            for tag, row in zip(("th", "td", "td", "td"), rows, strict=True)
         )
-        return f"<table><tr>{head}</tr>{body}</table>"
+        return f"<table>{body}</table>"
 
     def _numbers(self) -> str:
         assert self.metrics is not None

@@ -17,6 +17,7 @@ from comparisons.rungs.whitted import plugin_radiance
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import Whitted
 from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.rendering import query
 from reference_rt.rendering.image import display
 from reference_rt.rendering.picture import Picture
 from reference_rt.rendering.render import render
@@ -56,6 +57,25 @@ def mitsuba_cast(
     }
     shaped = {k: v.reshape(film.height, film.width, *v.shape[1:]) for k, v in layers.items()}
     return display(Picture(shaped, ours.shown)), tuple(notes)
+
+
+def layers(
+    scene: Scene, tables: SceneTables, counterpart: Counterpart
+) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Distances and shading normals of both sides, each (height, width, 3), by the rays through the
+    pixels' centres; 0 for rays that miss."""
+    film = scene.film
+    y, x = np.mgrid[0 : film.height, 0 : film.width]
+    o, d = camera_rays(scene, x.ravel() + 0.5, y.ravel() + 0.5)
+    sides = query.intersect(tables, o, d), trace(counterpart, o, d)
+    found = {}
+    for name, values in (("distance", [h.t for h in sides]), ("normal", [h.ns for h in sides])):
+        pair = [np.zeros((len(o), 3)), np.zeros((len(o), 3))]
+        for picture, hits, some in zip(pair, sides, values, strict=True):
+            hit = hits.shape >= 0
+            picture[hit] = some[hit].reshape(hit.sum(), -1)
+        found[name] = pair[0].reshape(*y.shape, 3), pair[1].reshape(*y.shape, 3)
+    return found
 
 
 def whitted(scene: Scene, tables: SceneTables, counterpart: Counterpart) -> Rendered:

@@ -135,7 +135,7 @@ def bounces_of(integrator: Any) -> int:
         raise NoCounterpartError("lamps that cameras do not see")
     if isinstance(integrator, Direct):
         if not integrator.shadows:
-            raise IneligibleError("direct light without shadows")
+            raise NoCounterpartError("direct light without shadows")
         if not (integrator.light_samples and integrator.bsdf_samples):
             raise NoCounterpartError("direct light by one strategy alone")
         return 0

@@ -11,11 +11,12 @@ from reference_rt.util.files import check_writable
 
 
 def write(
-    case: Case, out: Path, facts: dict[str, Any], page: bool = True
+    case: Case, out: Path, facts: dict[str, Any], wall: float | None = None, page: bool = True
 ) -> tuple[Path, Path | None]:
     """`results.json` and `report.html` in `out`; their paths.  Raises ImageError.
 
-    facts: provenance besides versions, date and machine, such as the baseline.
+    facts: provenance besides versions, date and machine, such as the baseline;  wall: seconds that
+    the gate took in all.
     """
     provenance = {**ours(), **facts}
     results, report = out / "results.json", out / "report.html"
@@ -23,7 +24,7 @@ def write(
     if not page:
         report.unlink(missing_ok=True)
         return results, None
-    write_report(report, [case], provenance)
+    write_report(report, [case], provenance, walls={} if wall is None else {case.scene: wall})
     return results, report
 
 

@@ -18,14 +18,23 @@ from typing import Any
 
 from markupsafe import Markup
 
-from comparisons.report.pictures_data import as_json, pack
+from comparisons.report.pictures_data import COARSE, EXACT, Bits, as_json, pack
 from comparisons.report.plots import histograms
 from comparisons.report.templates import encoded, template, write
 from comparisons.report.thumbnails import Thumbnail, Thumbnails, flip_map, of_witness, thumbnails
-from comparisons.report.values import shown
-from comparisons.results.case import Case, Images, Metrics, RungResult, Status, how_many
+from comparisons.report.values import label, shown
+from comparisons.results.case import (
+    INTERRUPTED,
+    PASSING,
+    Case,
+    Images,
+    Metrics,
+    RungResult,
+    Status,
+    how_many,
+)
 from comparisons.results.files import named, plain
-from comparisons.results.headline import HEAD, headline, numbers_rows
+from comparisons.results.headline import headline, in_short, is_of_statistics, numbers_rows
 from comparisons.results.rungs import RUNGS
 from reference_rt.util.files import replacing
 
@@ -46,33 +55,39 @@ class Fitted:
 
     data: str
     factor: int
+    bits: Bits = COARSE
 
 
 def fitted(
-    pictures: Sequence[Images | None], failed: Sequence[bool], most_bytes: int
+    pictures: Sequence[Images | None],
+    failed: Sequence[bool],
+    most_bytes: int,
+    bits: Bits = COARSE,
 ) -> list[Fitted | None]:
     """The pictures of all cases within `most_bytes`; None where a case has none.
 
-    The largest pictures of cases that did not fail are reduced first; those of failed cases only
-    when no others are left.
+    bits: of pictures that are not reduced.  The largest pictures of cases that did not fail are
+    reduced first; those of failed cases only when no others are left.
     """
-    kept = {i: _packed(p, 1, most_bytes) for i, p in enumerate(pictures) if p is not None}
+    kept = {i: _packed(p, 1, most_bytes, bits) for i, p in enumerate(pictures) if p is not None}
     while sum(len(one.data) for one in kept.values()) > most_bytes:
         _, _, coarse = max((not failed[i], len(one.data), i) for i, one in kept.items() if one.data)
         images = pictures[coarse]
         assert images is not None
-        kept[coarse] = _packed(images, 2 * kept[coarse].factor, most_bytes)
+        by = 1 if kept[coarse].bits == EXACT else 2
+        kept[coarse] = _packed(images, by * kept[coarse].factor, most_bytes)
     return [kept.get(i) for i in range(len(pictures))]
 
 
-def _packed(images: Images, factor: int, most_bytes: int) -> Fitted:
+def _packed(images: Images, factor: int, most_bytes: int, bits: Bits = COARSE) -> Fitted:
     pixels = images.candidate[..., 0].size + images.reference[..., 0].size
     # Packing takes seconds for a picture that cannot fit anyway.
     while factor <= COARSEST and FEWEST_BYTES * pixels > most_bytes * factor**2:
         factor *= 2
     if factor > COARSEST:
         return Fitted("", factor)
-    return Fitted(as_json(pack(images, factor)), factor)
+    bits = bits if factor == 1 else COARSE
+    return Fitted(as_json(pack(images, factor, bits)), factor, bits)
 
 
 MOST_BYTES = 15_000_000
@@ -108,8 +123,9 @@ MODES = (
     ("blink", "blink"),
     ("slider", "slider"),
     ("single", "single"),
+    ("onion", "onion skin"),
 )
-"""Ways of viewing the pictures, in the order of their keys 1 to 5."""
+"""Ways of viewing the pictures, in the order of their keys 1 to 6."""
 
 SCRIPTS = (
     *("unpack.js", "colour.js", "crop.js", "view.js"),
@@ -123,42 +139,69 @@ def write_report(
     cases: Sequence[Case],
     provenance: Mapping[str, Any],
     *,
+    title: str = "",
+    walls: Mapping[str, float] | None = None,
     most_bytes: int = MOST_BYTES,
+    not_run: Mapping[str, str] | None = None,
     missing: Sequence[str] = (),
 ) -> None:
     """Write the page about `cases`, whole or not at all.
 
-    missing: names of requested cases that were not run, because the run was interrupted;
-    provenance: facts by name, shown as they are: versions, Mitsuba's variant and why it was chosen,
-    machine and date;  most_bytes: a page that would be larger stores its float pictures at lower
-    resolution, those of passing cases first, and says so; text and thumbnails are never cut.
+    title: the suite's name, by default those of the scenes;  walls: seconds of each case in all, by
+    name;  not_run: why other cases were not run, by name;  missing: names of requested cases that
+    were not run, because the run was interrupted;  provenance: facts by name, shown as they are:
+    versions, Mitsuba's variant and why it was chosen, machine and date;  most_bytes: a page that
+    would be larger stores its float pictures at lower resolution, those of passing cases first, and
+    says so; text and thumbnails are never cut.
 
     In the numbers of a rung, a name that ends in `_bias` means a fraction and is shown in percent.
     """
     ranked = sorted(cases, key=lambda case: ORDER.index(case.verdict))
     mapped = len(cases) <= MOST_MAPPED
-    views = [_view(case, mapped or case.verdict in FAILED) for case in ranked]
+    views = [_view(case, mapped or case.verdict in FAILED, walls or {}) for case in ranked]
+    named = title or ", ".join(case.scene for case in cases[:MOST_OPEN])
+    failing = sum(case.verdict not in PASSING for case in cases)
+    idle = [(name, "missing", INTERRUPTED) for name in missing]
+    idle += [(name, "not run", why) for name, why in (not_run or {}).items()]
+    verdict = how_many(len(cases), len(missing))
+    if cases:
+        verdict += f": {f'{failing} fail' if failing else 'all pass'}"
+    if not_run:
+        verdict += f"; {len(not_run)} not run"
     filled = template("page.html.jinja").render
     script = Markup(_script())  # trusted: part of this package
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
     counts = Counter(case.verdict for case in cases)
 
+    few = len(cases) <= MOST_OPEN
+    layers = [
+        (view, name, Images(*pair))
+        for view in views
+        if few and view["pictures"]
+        for name, pair in view["case"].images.layers.items()
+    ]
+
     def rendered(pictures: Sequence[Fitted | None]) -> str:
-        for view, data in zip(views, pictures, strict=True):
+        for (view, name, images), data in zip(layers, pictures[len(views) :], strict=False):
+            if data and data.data:
+                small = thumbnails(images)
+                view["layers"].append((name, Markup(data.data), small.white, small.span))
+        for view, data in zip(views, pictures[: len(views)], strict=True):
             # Trusted: `as_json` escapes <, > and &.
             view["data"] = Markup(data.data) if data else ""
             view["factor"] = data.factor if data else 1
         return filled(
             counts=[(status, counts[status]) for status in ORDER if counts[status]],
             sides=_common_sides(cases),
-            expanded=len(cases) <= MOST_OPEN,
+            expanded=few,
             signs=SIGNS,
             modes=MODES,
-            head=HEAD,
             provenance=provenance,
             cases=views,
-            how_many=how_many(len(cases), len(missing)),
+            title=named or "no case",
+            verdict=verdict,
             missing=missing,
+            idle=idle,
             coarser=sum(view["factor"] > 1 for view in views),
             most_megabytes=most_bytes / 1e6,
             script=script,
@@ -170,7 +213,9 @@ def write_report(
     left -= 4000 * len(views)
     failed = [case.verdict in FAILED for case in ranked]
     pictures = [view["case"].images if view["pictures"] else None for view in views]
-    page = rendered(fitted(pictures, failed, max(left, 0)))
+    pictures += [images for _, _, images in layers]
+    failed += [False] * len(layers)
+    page = rendered(fitted(pictures, failed, max(left, 0), EXACT if few else COARSE))
     write(path, page)
 
 
@@ -179,33 +224,45 @@ def _script() -> str:
     return "\n" + "\n".join((folder / name).read_text(encoding="utf-8") for name in SCRIPTS)
 
 
-def _view(case: Case, mapped: bool) -> dict[str, Any]:
+def _view(case: Case, mapped: bool, walls: Mapping[str, float]) -> dict[str, Any]:
     """A case as the template takes it.  mapped: whether it has a map of FLIP."""
-    stages = dict.fromkeys(stage for times in case.seconds.values() for stage in times)
+    short, seen = in_short(case)
     pictures = _thumbnails(case)
-    seconds = {_side(who, case): times for who, times in case.seconds.items()}
     return {
         "case": case,
         "told": lambda text: named(text, case.sides),
         "failed": case.verdict in FAILED,
         "rank": ORDER.index(case.verdict),
         "headline": named(headline(case), case.sides),
-        "found": numbers_rows(case),
+        "short": named(short, case.sides),
+        "seen": seen,
+        "wall": f"{walls[case.scene]:.1f}" if case.scene in walls else "",
+        "found": [
+            [f"{cell[:1].upper()}{cell[1:]}".replace(" %", "\N{NO-BREAK SPACE}%") for cell in row]
+            for row in numbers_rows(case)
+        ],
+        "reason": "" if is_of_statistics(case) else named(case.reason, case.sides),
         "tiers": sorted(case.rungs, key=lambda rung: _rung(rung.name)),
         "pictures": pictures,
+        "layers": [],
         "figures": _figures(case, pictures, mapped) if pictures else [],
         "witness": of_witness(case.images, case.sides) if pictures and case.images else [],
         "histograms": _histograms(case, pictures) if pictures else [],
         "metrics": _metric_rows(case.metrics) if case.metrics else [],
-        "stages": list(stages),
-        "seconds": seconds,
-        "totals": {who: sum(times.values()) for who, times in seconds.items()},
+        "times": _times(case),
     }
 
 
-def _side(who: str, case: Case) -> str:
-    """What the page calls a side, also where times name it by its role."""
-    return dict(zip(("candidate", "reference"), case.sides, strict=True)).get(who, who)
+def _times(case: Case) -> list[list[str]]:
+    """The seconds of each step, a column for each side; [] if there are none."""
+    sides = dict(zip(("candidate", "reference"), case.sides, strict=True))
+    stages = dict.fromkeys(stage for times in case.seconds.values() for stage in times)
+    if not stages:
+        return []
+    columns = case.seconds.values()
+    rows = [[label(stage), *(shown(times.get(stage)) for times in columns)] for stage in stages]
+    total = ["total", *(shown(sum(times.values())) for times in columns)]
+    return [["Step", *(sides.get(who, who) for who in case.seconds)], *rows, total]
 
 
 def _common_sides(cases: Sequence[Case]) -> tuple[str, str]:

@@ -1,63 +1,66 @@
-"""Float pictures inside the page, about 12 bytes a pixel; decoded by `unpack.js` and `unpack`.
+"""Float pictures inside the page; decoded by `unpack.js` and `unpack`.
 
-A picture is stored as IEEE half floats times one power of two; values too large for that are listed
-separately.  Pictures of the same size share the power of two, and the candidate's codes are stored
-as differences from the reference's, which are small.  Half floats cannot distinguish 1.0001 from 1:
-therefore the difference of the pictures is stored too, as the residual beyond the difference of the
-stored pictures.
+A picture is stored as float32 numbers rounded to a number of bits; values beyond their range are
+listed separately.  The candidate's codes are stored as differences from the reference's, which are
+small.  Rounded numbers cannot distinguish 1.0001 from 1: therefore the difference of the pictures
+is stored too, as the residual beyond the difference of the stored pictures.
 
-Precision after decoding: radiance 1/1024, the difference 1/64, the standard error 1/16, relative;
-the latter two at worst 1e-10 of the brightest values.  NaN, infinities and zeros are exact.
+Precision after decoding, relative: radiance 1/1024, the difference 1/64, the standard error 1/16,
+in about 12 bytes a pixel; `EXACT` pictures are what an EXR file holds, in about twice as many.
+NaN, infinities and zeros are exact.
 """
 
 import base64
 import json
-import math
 import zlib
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from comparisons.results.case import FloatArray, Images
 
-RADIANCE_BITS, REST_BITS, ERROR_BITS = 11, 6, 4
-"""Significant bits, including the leading one; fewer bits compress better."""
+
+class Bits(NamedTuple):
+    """Significant bits, including the leading one; fewer bits compress better.  digits: decimal
+    ones of radiance that they stand for."""
+
+    radiance: int
+    rest: int
+    error: int
+    digits: int
+
+
+COARSE = Bits(radiance=11, rest=6, error=4, digits=3)
+EXACT = Bits(radiance=24, rest=24, error=11, digits=7)
 
 NEAR = 1.0 / 64.0
 """Candidate values within this relative difference are stored as the stored reference plus the
 difference: equal pixels then have equal codes, and the residual is the difference itself."""
 
-HEADROOM = 7
-"""Powers of two between the 99.9th percentile and the largest half float: brighter values (at most
-0.1 % of all, fireflies) are listed separately."""
-
-_LARGEST_HALF = 16
-"""65504 is just below 2^16."""
-
-Codes = npt.NDArray[np.uint16]
+Codes = npt.NDArray[np.uint32]
 
 
 @dataclass(frozen=True)
 class Coded:
-    """A picture as half floats: value = half float · 2^exponent, or as listed in `beyond` under its
-    index in the flattened picture."""
+    """A picture as float32 numbers without their last `shift` bits, which are zero, or as listed in
+    `beyond` under its index in the flattened picture."""
 
     codes: Codes
     """(height, width, 3)"""
-    exponent: int
+    shift: int
     beyond: dict[int, float]
 
     def decoded(self) -> FloatArray:
-        values = np.ldexp(self.codes.view(np.float16).astype(np.float64), self.exponent)
+        values = (self.codes << np.uint32(self.shift)).view(np.float32).astype(np.float64)
         values.flat[list(self.beyond)] = list(self.beyond.values())
         return values
 
     def described(self) -> dict[str, Any]:
         height, width, _ = self.codes.shape
         listed = [[index, value] for index, value in self.beyond.items()]
-        return {"width": width, "height": height, "exponent": self.exponent, "beyond": listed}
+        return {"width": width, "height": height, "shift": self.shift, "beyond": listed}
 
 
 @dataclass(frozen=True)
@@ -70,32 +73,30 @@ class Unpacked:
     error: FloatArray | None
 
 
-def pack(images: Images, factor: int = 1) -> dict[str, Any]:
-    """`images` as JSON: sizes, exponents and "bytes", base64 of a raw deflate stream (RFC 1951).
+def pack(images: Images, factor: int = 1, bits: Bits = COARSE) -> dict[str, Any]:
+    """`images` as JSON: sizes, shifts and "bytes", base64 of a raw deflate stream (RFC 1951).
 
     With a factor above 1 the pixels are means over factor x factor of the given ones.  The stream
     holds the codes of the reference, the candidate, the rest of the difference and the standard
-    error (the last two where there are any): of each first all the high bytes, then all the low
-    ones, in the order rows, columns, channels.
+    error (the last two where there are any): of each first all the highest bytes, last all the
+    lowest ones, in the order rows, columns, channels.
     """
     images = reduced_images(images, factor)
     candidate, reference = images.candidate, images.reference
-    comparable = candidate.shape == reference.shape
-    exponent = _exponent(candidate, reference)
-    kept = {"reference": coded(reference, exponent)}
+    kept = {"reference": coded(reference, bits.radiance)}
     streams = [kept["reference"].codes]
-    if comparable:
-        kept |= _beside(candidate, reference, kept["reference"])
+    if candidate.shape == reference.shape:
+        kept |= _beside(candidate, kept["reference"], reference, bits)
         streams.append(_zigzag(kept["candidate"].codes - kept["reference"].codes))
         streams.append(kept["rest"].codes)
         if images.error is not None:
-            kept["error"] = coded(images.error, _exponent(images.error), ERROR_BITS)
+            kept["error"] = coded(images.error, bits.error)
             streams.append(kept["error"].codes)
     else:
-        kept["candidate"] = coded(candidate, _exponent(candidate))
+        kept["candidate"] = coded(candidate, bits.radiance)
         streams.append(kept["candidate"].codes)
     described = {name: picture.described() for name, picture in kept.items()}
-    return {"factor": factor, **described, "bytes": _deflated(streams)}
+    return {"factor": factor, "digits": bits.digits, **described, "bytes": _deflated(streams)}
 
 
 def unpack(data: dict[str, Any]) -> Unpacked:
@@ -122,16 +123,17 @@ def as_json(data: dict[str, Any]) -> str:
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def coded(values: FloatArray, exponent: int, bits: int = RADIANCE_BITS) -> Coded:
-    """`values` (height, width, 3) rounded to `bits` significant bits, at most 11."""
+def coded(values: FloatArray, bits: int) -> Coded:
+    """`values` (height, width, 3) rounded to `bits` significant bits, at most 24."""
     significand, powers = np.frexp(values)
     with np.errstate(over="ignore", under="ignore"):
-        rounded = np.ldexp(np.rint(np.ldexp(significand, bits)), powers - bits - exponent)
-        halves = rounded.astype(np.float16)
-    lost = np.isinf(halves) & np.isfinite(values)
-    halves[lost] = 0.0
-    places = np.flatnonzero(lost).tolist()
-    return Coded(halves.view(np.uint16), exponent, {i: float(values.flat[i]) for i in places})
+        exact = np.ldexp(np.rint(np.ldexp(significand, bits)), powers - bits)
+        rounded = exact.astype(np.float32)
+    lost = np.isfinite(values) & (rounded != exact)  # beyond float32's range
+    rounded[lost] = 0.0
+    listed = {i: float(values.flat[i]) for i in np.flatnonzero(lost).tolist()}
+    shift = 24 - bits
+    return Coded(rounded.view(np.uint32) >> np.uint32(shift), shift, listed)
 
 
 def reduced(image: FloatArray, factor: int) -> FloatArray:
@@ -163,44 +165,35 @@ def _block_counts(image: FloatArray, factor: int) -> FloatArray:
     return _block_sums(np.ones((*image.shape[:2], 1)), factor)
 
 
-def _beside(candidate: FloatArray, reference: FloatArray, kept: Coded) -> dict[str, Coded]:
+def _beside(
+    candidate: FloatArray, kept: Coded, reference: FloatArray, bits: Bits
+) -> dict[str, Coded]:
     """The candidate and the residual of the difference, given the stored reference."""
     base = kept.decoded()
     with np.errstate(invalid="ignore", over="ignore"):
         difference = candidate - reference
         near = np.abs(difference) < NEAR * np.abs(reference)
-        moved = coded(np.where(near, base + difference, candidate), kept.exponent)
+        moved = coded(np.where(near, base + difference, candidate), bits.radiance)
         rest = difference - (moved.decoded() - base)
     rest = np.where(np.isfinite(rest), rest, 0.0)
-    return {"candidate": moved, "rest": coded(rest, _exponent(rest), REST_BITS)}
-
-
-def _exponent(*pictures: FloatArray) -> int:
-    """The power of two that brings nearly all values into the range of half floats."""
-    values = np.concatenate([np.abs(picture).ravel() for picture in pictures])
-    values = values[np.isfinite(values) & (values > 0.0)]
-    if not values.size:
-        return 0
-    top = math.frexp(float(np.percentile(values, 99.9, method="lower")))[1]
-    # 2^exponent and 65504 times it must be float64 numbers; subnormal ones will do.
-    return int(np.clip(top + HEADROOM - _LARGEST_HALF, -1070, 1008))
+    return {"candidate": moved, "rest": coded(rest, bits.rest)}
 
 
 def _zigzag(codes: Codes) -> Codes:
-    """0, -1, 1, -2, ... (as 16-bit two's complement) -> 0, 1, 2, 3, ...: small ones have an empty
-    high byte, whatever their sign."""
-    return np.asarray((codes << 1) ^ -(codes >> 15), dtype=np.uint16)
+    """0, -1, 1, -2, ... (as 32-bit two's complement) -> 0, 1, 2, 3, ...: small ones have empty high
+    bytes, whatever their sign."""
+    return np.asarray((codes << 1) ^ -(codes >> 31), dtype=np.uint32)
 
 
 def _unzigzag(codes: Codes) -> Codes:
-    return np.asarray((codes >> 1) ^ -(codes & 1), dtype=np.uint16)
+    return np.asarray((codes >> 1) ^ -(codes & 1), dtype=np.uint32)
 
 
 def _deflated(streams: list[Codes]) -> str:
-    planes = [bytes_ for s in streams for bytes_ in ((s >> 8), (s & 0xFF))]
     # Level 9 takes four times as long and saves 2 % of noise.
     compressor = zlib.compressobj(6, zlib.DEFLATED, -zlib.MAX_WBITS)
-    raw = b"".join(plane.astype(np.uint8).tobytes() for plane in planes)
+    planes = (s.astype(">u4").ravel().view(np.uint8).reshape(-1, 4).T for s in streams)
+    raw = b"".join(plane.tobytes() for plane in planes)
     return base64.b64encode(compressor.compress(raw) + compressor.flush()).decode("ascii")
 
 
@@ -210,12 +203,12 @@ def _inflated(raw: bytes, data: dict[str, Any]) -> list[Codes]:
     for name in ("reference", "candidate", "rest", "error"):
         if name in data:
             count = 3 * data[name]["width"] * data[name]["height"]
-            high, low = np.frombuffer(raw, np.uint8, 2 * count, at).reshape(2, count)
-            streams.append(high.astype(np.uint16) * np.uint16(256) + low)
-            at += 2 * count
+            planes = np.frombuffer(raw, np.uint8, 4 * count, at).reshape(4, count)
+            streams.append(planes.T.copy().view(">u4")[:, 0].astype(np.uint32))
+            at += 4 * count
     return streams
 
 
 def _coded(described: dict[str, Any], codes: Codes) -> Coded:
     shape = described["height"], described["width"], 3
-    return Coded(codes.reshape(shape), described["exponent"], dict(described["beyond"]))
+    return Coded(codes.reshape(shape), described["shift"], dict(described["beyond"]))

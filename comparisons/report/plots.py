@@ -31,6 +31,10 @@ WIDTH, HEIGHT, FOOT = 320, 120, 18
 
 BINS = 48
 
+ROUNDING = 2.0**-20
+"""What float32 arithmetic may make of a value, relatively (sixteen roundings): a standard error
+below it is no noise."""
+
 Z_SPAN = 6.0
 """Standard errors at the ends of the axis: noise alone has one value of 5e8 beyond."""
 
@@ -54,7 +58,8 @@ def histograms(images: Images, span: float) -> list[Histogram]:
         difference = images.candidate - images.reference
         found = [_of_difference(difference[np.isfinite(difference)], span)]
         if images.error is not None:
-            known = np.isfinite(difference) & (images.error > 0.0) & np.isfinite(images.error)
+            noisy = images.error > ROUNDING * np.abs(images.reference)
+            known = np.isfinite(difference) & noisy & np.isfinite(images.error)
             found.append(_of_z(difference[known] / images.error[known]))
     return [one for one in found if one is not None]
 

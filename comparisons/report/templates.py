@@ -7,7 +7,7 @@ from typing import Any
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Template
 
-from comparisons.report.values import label, rows_of, shown, typeset
+from comparisons.report.values import flip, label, rows_of, shown, soft, typeset
 from reference_rt.util.errors import UsageError, printable
 from reference_rt.util.files import check_writable, read_text, replacing
 
@@ -66,7 +66,7 @@ def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -
         lstrip_blocks=True,
     )
     environment.filters |= {"shown": shown, "label": label, "rows": rows_of}
-    environment.filters |= {"typeset": typeset, **filters}
+    environment.filters |= {"typeset": typeset, "flip": flip, "soft": soft, **filters}
     return environment.get_template(name)
 
 

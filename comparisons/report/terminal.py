@@ -9,8 +9,14 @@ import textwrap
 from collections.abc import Collection, Sequence
 
 from rich.console import Console, Group, RenderableType
+from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
+
+from comparisons.results.case import Case
+from comparisons.results.files import named
+from comparisons.results.headline import is_of_statistics, numbers_rows
+from reference_rt.util.errors import printable
 
 MOST_LINES = 3
 """Lines of a cell: it is folded twice."""
@@ -28,6 +34,17 @@ def console(*, stderr: bool = False) -> Console:
     if not made.is_terminal and not os.environ.get("COLUMNS", "").isdigit():
         made.width = _LOG
     return made
+
+
+def tell(console: Console, case: Case) -> None:
+    """Print what stands below a headline: the numbers of the statistics as a table, or the reason
+    where another rung decides."""
+    rows = numbers_rows(case) if is_of_statistics(case) else []
+    if rows:
+        console.print(Padding.indent(fitted(console.width - _GAP, rows[0], rows[1:]), _GAP))
+    else:
+        reason = printable(named(case.reason, case.sides))
+        console.print(f"  {reason}", markup=False, soft_wrap=True)
 
 
 def fitted(

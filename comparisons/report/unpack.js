@@ -1,17 +1,5 @@
 // Float pictures out of a case's data: the same numbers as `unpack` of pictures_data.py.
 
-/** The value of every half float (IEEE 754 binary16), by its code. */
-const HALVES = new Float64Array(65536).map((_, code) => half(code));
-
-function half(code) {
-  const sign = code & 0x8000 ? -1 : 1;
-  const exponent = (code >> 10) & 31;
-  const fraction = code & 1023;
-  if (exponent === 31) return fraction ? NaN : sign * Infinity;
-  if (exponent === 0) return sign * fraction * 2 ** -24;
-  return sign * (1024 + fraction) * 2 ** (exponent - 25);
-}
-
 async function inflate(base64) {
   const packed = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
@@ -20,15 +8,15 @@ async function inflate(base64) {
 
 /** A picture {width, height, values}: three values a pixel, row by row. */
 function decode(stored, codes) {
-  const scale = 2 ** stored.exponent;
-  const values = Float64Array.from(codes, (code) => HALVES[code] * scale);
+  const floats = new Float32Array(codes.map((code) => code << stored.shift).buffer);
+  const values = Float64Array.from(floats);
   for (const [index, value] of stored.beyond) values[index] = value;
   return { width: stored.width, height: stored.height, values };
 }
 
 /** From the differences between the codes of two pictures, zigzag coded, to those of the second. */
 function codesBeside(base, zigzag) {
-  return base.map((code, i) => (code + ((zigzag[i] >>> 1) ^ -(zigzag[i] & 1))) & 0xffff);
+  return base.map((code, i) => code + ((zigzag[i] >>> 1) ^ -(zigzag[i] & 1)));
 }
 
 /** What `pack` packed: {factor, candidate, reference, difference, error, z}, null where absent. */
@@ -37,9 +25,11 @@ async function unpack(data) {
   let start = 0;
   const next = (stored) => {
     const count = 3 * stored.width * stored.height;
-    const [high, low] = [start, start + count];
-    start += 2 * count;
-    return Uint16Array.from({ length: count }, (_, i) => (bytes[high + i] << 8) | bytes[low + i]);
+    const codes = new Uint32Array(count);
+    for (let plane = 0; plane < 4; plane += 1, start += count) {
+      for (let i = 0; i < count; i += 1) codes[i] = (codes[i] << 8) | bytes[start + i];
+    }
+    return codes;
   };
   const base = next(data.reference);
   const others = next(data.candidate);
@@ -54,7 +44,7 @@ async function unpack(data) {
   if (data.rest) pictures.difference = difference(pictures, decode(data.rest, next(data.rest)));
   if (data.error) {
     pictures.error = decode(data.error, next(data.error));
-    pictures.z = quotient(pictures.difference, pictures.error);
+    pictures.z = quotient(pictures);
   }
   return pictures;
 }
@@ -64,8 +54,12 @@ function difference({ candidate, reference }, rest) {
   return { ...candidate, values };
 }
 
-/** Differences in standard errors: nothing over nothing is 0, something over nothing infinite. */
-function quotient(differences, errors) {
-  const values = differences.values.map((value, i) => (value === 0 ? 0 : value / errors.values[i]));
-  return { ...differences, values };
+/** What float32 arithmetic may make of a value, relatively: sixteen roundings. */
+const ROUNDING = 2 ** -20;
+
+/** Differences in standard errors: 0 where rounding explains them, something over nothing infinite. */
+function quotient({ difference, error, reference }) {
+  const values = difference.values.map((value, i) =>
+    Math.abs(value) <= ROUNDING * Math.abs(reference.values[i]) ? 0 : value / error.values[i]);
+  return { ...difference, values };
 }

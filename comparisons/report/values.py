@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 SHOWN_ITEMS = 8
 """Numbers shown of a list; `results.json` has all of them."""
@@ -55,6 +56,16 @@ _DEEPEST = 2
 def percent(fraction: float) -> str:
     """A fraction as a percentage with three digits."""
     return f"{_real(100.0 * fraction, '.3g')} %" if math.isfinite(fraction) else _real(fraction)
+
+
+def flip(value: float) -> str:
+    """A mean of FLIP, from 0 to 1, with three decimals."""
+    return "< 0.001" if 0.0 < value < 0.0005 else f"{value:.3f}" if value == value else "undefined"
+
+
+def soft(name: str) -> Markup:
+    """A name or a command that may be broken behind its underscores and slashes."""
+    return Markup("<wbr>").join(re.split("(?<=[_/])(?=[^_/])", name))
 
 
 def label(name: object) -> str:

@@ -2,7 +2,6 @@
 
 /** Pixels of the screen within which a drag of a zoomed picture moves the slider. */
 const NEAR_SLIDER = 24;
-const SIGNIFICANT = { candidate: 3, reference: 3, difference: 2, z: 2 };
 
 /** A value with as many digits as were kept of it. */
 function reading(value, digits) {
@@ -20,10 +19,7 @@ class CaseView {
     this.section = section;
     this.box = section.querySelector(".pictures");
     this.row = this.box.querySelector(".row");
-    this.data = JSON.parse(this.box.querySelector("script.data").textContent);
-    this.factor = this.data.factor;
-    this.white = Number(this.box.dataset.white);
-    this.span = Number(this.box.dataset.span);
+    this.choose("");
     this.figures = [...this.row.querySelectorAll("figure")].map((element) => this.figure(element));
     this.crops = [...section.querySelectorAll(".places button")].map((button) => new Crop(button));
     /** What of the pictures shows: from (left, top), as fractions, 1 / zoom of each side. */
@@ -33,9 +29,28 @@ class CaseView {
     /** Called with the section when the cursor has moved. */
     this.onlook = () => {};
     this.region = null;
-    this.pictures = null;
     this.row.tabIndex = 0;
+    this.trace = this.box.querySelector(".trace");
+    this.command = this.trace?.querySelector("code").textContent;
     this.listen();
+  }
+
+  /** Take the numbers of a layer, "" for the picture itself. */
+  choose(layer) {
+    this.layer = layer;
+    const stored = this.box.querySelector(layer ? `[data-layer="${layer}"]` : "script.data");
+    this.data = JSON.parse(stored.textContent);
+    this.factor = this.data.factor;
+    /** Of what is read. */
+    const digits = this.data.digits;
+    this.digits = { candidate: digits, reference: digits, difference: digits > 3 ? digits : 2, z: 2 };
+    const { white, span } = layer ? stored.dataset : this.box.dataset;
+    [this.white, this.span, this.pictures] = [Number(white), Number(span), null];
+    for (const figure of this.figures ?? []) {
+      const { width, height } = this.data[figure.kind === "candidate" ? "candidate" : "reference"];
+      Object.assign(figure, { width, height });
+      figure.element.hidden = layer !== "" && (figure.kind === "z" || figure.kind === "flip");
+    }
   }
 
   /** A canvas in place of the thumbnail; the map of FLIP is a picture already. */
@@ -58,8 +73,10 @@ class CaseView {
   /** Decode, unless it is done, and draw. */
   async show(look) {
     this.pictures ??= await unpack(this.data);
-    const own = { ...look, white: this.white, span: this.span };
-    for (const figure of this.figures.filter(({ kind }) => kind !== "flip")) {
+    this.look = look;
+    const own = { ...look, white: this.white, span: this.span, signed: this.layer === "normal" };
+    const drawn = this.figures.filter(({ kind, element }) => kind !== "flip" && !element.hidden);
+    for (const figure of drawn) {
       paintKind(figure.canvas, figure.kind, this.pictures[figure.kind], own);
       figure.image.replaceWith(figure.canvas);
       const end = reading(this.span / 2 ** look.stops, 4);
@@ -72,6 +89,14 @@ class CaseView {
     this.section.dataset.drawn = JSON.stringify(look);
   }
 
+  /** The candidate alone, on a canvas in place of what is in `element`. */
+  async drawInto(element, look) {
+    const { candidate } = this.pictures ?? (await unpack(this.data));
+    const canvas = document.createElement("canvas");
+    paintKind(canvas, "candidate", candidate, { ...look, white: this.white, span: this.span });
+    element.replaceChildren(canvas);
+  }
+
   /** Give the memory back; what is drawn stays. */
   forget() {
     this.pictures = null;
@@ -79,12 +104,14 @@ class CaseView {
 
   exposed({ stops, colours }) {
     const white = this.white / 2 ** stops;
+    if (this.layer === "normal") return "Normals: red, green and blue are x, y and z; grey is 0";
+    if (this.layer) return `White is a ${this.layer} of ${reading(white, 4)}`;
     if (colours === "linear") return `Luminance: yellow is ${reading(white, 4)}, purple is 0`;
     const dark = reading(white / 2 ** LOG_STOPS, 4);
     if (colours === "reinhard") return `Reinhard's curve: radiance ${reading(4 * white, 4)} is white`;
     if (colours === "filmic") return `A curve of film: radiance ${reading(white, 4)} is bright`;
     if (colours === "log") return `Luminance: yellow is ${reading(white, 4)}, purple is ${dark}`;
-    return `White is radiance ${reading(white, 4)} in both pictures`;
+    return `White is radiance ${reading(white, 4)} W·sr⁻¹·m⁻² in both pictures`;
   }
 
   listen() {
@@ -100,6 +127,10 @@ class CaseView {
     for (const button of this.box.querySelectorAll("[data-zoom]")) {
       button.addEventListener("click", () => this.zoom(button.dataset.zoom));
     }
+    this.box.querySelector(".layer")?.addEventListener("change", ({ target }) => {
+      this.choose(target.value);
+      this.show(this.look);
+    });
     this.wipe = this.box.querySelector(".wipe input");
     this.wipe.addEventListener("input", () => this.setWipe(Number(this.wipe.value)));
   }
@@ -112,7 +143,7 @@ class CaseView {
 
   /** Whether a drag moves the slider: near it, or anywhere if there is nothing to pan. */
   moves(figure, event) {
-    if (document.body.dataset.mode !== "slider") return false;
+    if (!["slider", "onion"].includes(document.body.dataset.mode)) return false;
     const box = figure.frame.getBoundingClientRect();
     const far = Math.abs(event.clientX - box.left - (box.width * Number(this.wipe.value)) / 100);
     return this.area.zoom === 1 || far < NEAR_SLIDER;
@@ -283,11 +314,16 @@ class CaseView {
     const { x, y } = this.cursor;
     const range = (at) => (this.factor > 1 ? `${at * this.factor} to ${(at + 1) * this.factor - 1}` : at);
     this.box.querySelector(".place").textContent = `x ${range(x)}, y ${range(y)}`;
+    if (this.trace) {
+      const middle = (at) => at * this.factor + Math.floor(this.factor / 2);
+      this.trace.querySelector("code").textContent = `${this.command} --pixel ${middle(x)},${middle(y)}`;
+      this.trace.hidden = false;
+    }
     for (const row of this.box.querySelectorAll("[data-row]")) {
       const kind = row.dataset.row;
       const values = this.values(this.pictures[kind], x, y);
       [...row.cells].slice(1).forEach((cell, k) => {
-        cell.textContent = k < values.length ? reading(values[k], SIGNIFICANT[kind]) : "–";
+        cell.textContent = k < values.length ? reading(values[k], this.digits[kind]) : "–";
       });
     }
   }

@@ -6,7 +6,7 @@ const BLINK_MILLISECONDS = 700;
 
 const find = (selector) => document.querySelector(selector);
 const sections = [...document.querySelectorAll(".case")];
-const rows = [...document.querySelectorAll("nav tbody tr")];
+const rows = [...document.querySelectorAll("nav tbody:not(.idle) tr")];
 const views = new Map();
 const look = { stops: 0, colours: "srgb" };
 const overview = new Overview(sections, rows);
@@ -60,7 +60,7 @@ function current() {
 
 function step(by) {
   const shown = overview.ordered.filter((section) => !section.hidden);
-  const next = shown[shown.indexOf(current()) + by];
+  const next = shown[shown.indexOf(current()) + by] ?? current();
   if (next) goTo(next);
 }
 
@@ -172,7 +172,7 @@ function state() {
   return {
     case: looked?.dataset.name ?? "",
     view: mode,
-    of: mode === "side" || mode === "slider" || mode === "blink" ? "candidate" : which,
+    of: mode === "flip" || mode === "single" ? which : "candidate",
     x: x ?? "",
     y: y ?? "",
     stops: String(look.stops),
@@ -181,6 +181,7 @@ function state() {
     only: checked.length === boxes.length ? "" : checked.join(" "),
     sort: key,
     order: down ? "down" : "up",
+    cases: document.body.dataset.layout,
   };
 }
 
@@ -196,6 +197,7 @@ async function follow(fragment) {
     for (const box of document.querySelectorAll("[name=verdict]")) box.checked = only.includes(box.value);
   }
   filter();
+  setLayout(wanted.cases === "grid" ? "grid" : "list");
   if (wanted.sort) overview.sort(wanted.sort, wanted.order === "down");
   if (modes.includes(wanted.view)) setMode(wanted.view);
   if (WHICH.includes(wanted.of)) setWhich(wanted.of);
@@ -208,6 +210,23 @@ async function follow(fragment) {
   const [x, y] = [Number(wanted.x), Number(wanted.y)];
   if (wanted.x !== undefined && Number.isInteger(x) && Number.isInteger(y)) viewOf(section)?.setCursor(x, y);
 }
+
+/** The cases as a list with numbers, or as a grid of pictures. */
+function setLayout(layout) {
+  document.body.dataset.layout = layout;
+  find("#layout").textContent = layout === "grid" ? "list" : "grid";
+  if (layout === "grid") rows.forEach((row) => enlarged.observe(row));
+  address.changed();
+}
+
+/** Draws pictures of the grid when they come near the window: thumbnails would be too coarse. */
+const enlarged = new IntersectionObserver((entries) => {
+  for (const { target, isIntersecting } of entries) {
+    if (!isIntersecting) continue;
+    enlarged.unobserve(target);
+    viewOf(sections[rows.indexOf(target)])?.drawInto(target.querySelector(".thumb"), look);
+  }
+});
 
 // Commands to copy
 
@@ -290,6 +309,7 @@ find("#expand").addEventListener("click", ({ target }) => {
   target.textContent = all ? "collapse all" : "expand all";
   overview.expand(all);
 });
+find("#layout").addEventListener("click", ({ target }) => setLayout(target.textContent));
 window.addEventListener("hashchange", () => follow(location.hash));
 document.addEventListener("keydown", pressed);
 window.addEventListener("resize", resized);

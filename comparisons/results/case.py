@@ -2,8 +2,10 @@
 the verdict from its rungs, and the exit code of a run from its verdicts.
 """
 
-from collections.abc import Sequence
+import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -62,6 +64,8 @@ class Images:
     error: FloatArray | None = None
     witness: FloatArray | None = None
     """A third renderer's, where one was asked."""
+    layers: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+    """Other pictures of both sides by name: of hits of the rays through the pixels' centres."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +117,14 @@ class Case:
     """Features that the scene does not use, which were compiled out."""
     again: str = ""
     """The command that repeats this case alone."""
+    trace: str = ""
+    """The command that shows the rays of a pixel, without the pixel."""
+
+
+def trace_command(scene: Path, size: str | None, defaults: Mapping[str, str]) -> str:
+    """`Case.trace` of a scene's file, at a size and with the defaults of Mitsuba's files."""
+    words = ["reference-rt", "trace", str(scene), *(["--size", size] if size else [])]
+    return shlex.join([*words, *(f"-D{name}={value}" for name, value in defaults.items())])
 
 
 WARNING = "warning: "

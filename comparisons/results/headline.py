@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from comparisons.results.case import Case, RungResult, Status
+from comparisons.results.rungs import OF_LIGHT
 
 
 def headline(case: Case) -> str:
@@ -34,14 +35,22 @@ def _differ(case: Case) -> str:
     return f"likeliest cause: {case.cause.name}; {what}"
 
 
+def in_short(case: Case) -> tuple[str, str]:
+    """The headline, and apart from it the smallest bias of the image mean that would have been
+    seen; "" if it is unknown."""
+    seen = _detectable(next((rung for rung in case.rungs if rung.name == "statistics"), None))
+    sentence = _NONE if case.verdict == "agree" else headline(case)
+    return sentence, "" if seen is None else _percent(seen)
+
+
+_NONE = "no difference was found"
+
+
 def _agree(case: Case) -> str:
-    seen = _detectable(_first(case, "agree", "statistics"))
-    if seen is None:
-        return "no difference was found"
-    return (
-        f"no difference was found, and a bias of the image mean of {_percent(seen)} would have "
-        "been seen"
-    )
+    _, seen = in_short(case)
+    if not seen:
+        return _NONE
+    return f"{_NONE}, and a bias of the image mean of {seen} would have been seen"
 
 
 def _unchanged(case: Case) -> str:
@@ -56,19 +65,21 @@ def _inconclusive(case: Case) -> str:
         return "too noisy to decide" if rung is None else f"undecided: {_clause(rung.reason)}"
     if not rung.numbers.get("noise_known", True):
         return "a single picture does not show its noise here: give more, with other seeds"
+    advice = rung.numbers.get("advice")
+    more = f"; {advice}" if advice else ""
     if seen > limit:
         return (
             f"too noisy to decide: only a bias of the image mean above {_percent(seen)} would be "
-            f"seen, and {_percent(limit)} is asked for"
+            f"seen, and {_percent(limit)} is asked for{more}"
         )
     unseen = rung.numbers.get("unseen_light")
     missing = unseen.get("missing_at_most") if isinstance(unseen, Mapping) else None
     if isinstance(missing, int | float) and missing > limit:
         return (
             f"too few samples met the rare light: {_percent(missing)} of all light may be missing "
-            f"by chance, and {_percent(limit)} is asked for"
+            f"by chance, and {_percent(limit)} is asked for{more}"
         )
-    return f"too near to the limit of {_percent(limit)} to decide with so few samples"
+    return f"too near to the limit of {_percent(limit)} to decide with so few samples{more}"
 
 
 def _invalid(case: Case) -> str:
@@ -85,7 +96,24 @@ def _by_reason(case: Case) -> str:
 
 
 def _limited(case: Case) -> str:
-    return "Mitsuba's float32 is too coarse for this scene; nothing else differs"
+    """Which side is wrong, what of it the pictures show, and what proves it."""
+    rungs = {rung.name: rung for rung in case.rungs}
+    shows = any(name in rungs and rungs[name].status == "reference-limited" for name in OF_LIGHT)
+    flip = f" (FLIP {case.metrics.flip:.2g})" if case.metrics and shows else ""
+    what = "the pictures agree, and where rays differ Mitsuba's float32"
+    if shows:
+        what = f"the pictures differ{flip}, and Mitsuba's is the wrong one: its float32"
+    numbers = rungs["geometry"].numbers if "geometry" in rungs else {}
+    resolution, wrong = numbers.get("resolution"), numbers.get("decided_mitsuba")
+    proof = ""
+    if isinstance(resolution, Mapping) and resolution.get("found"):
+        proof = (
+            f": from {resolution['found']:,} of {resolution['hits']:,} points of surfaces, the "
+            "rays that it starts hit a wrong surface"
+        )
+    elif wrong and not numbers.get("decided_ours"):
+        proof = f": exact arithmetic finds {wrong:,} of its hits wrong, and none of ours"
+    return f"{what} is too coarse for this scene{proof}"
 
 
 _SENTENCES: Mapping[Status, Callable[[Case], str]] = {
@@ -103,9 +131,6 @@ _SENTENCES: Mapping[Status, Callable[[Case], str]] = {
 # ---- the numbers of the statistics, as a table ---------------------------------------------------
 
 
-HEAD = ("tested", "found", "would have been seen", "limit")
-"""The columns of `numbers_rows`."""
-
 _FAMILIES = (
     ("tiles", "tiles"),
     ("pixels", "pixels"),
@@ -114,47 +139,46 @@ _FAMILIES = (
 )
 """The numbers of tests of many biases, and what these are called."""
 
+_MAIN = ("tiles", "pixels")
+"""Those that a table has always; it has the others where they differ."""
 
-def numbers_rows(case: Case) -> list[tuple[str, str, str, str]]:
-    """What the statistics tested, what they found, the bias that would have been seen, and the one
-    that is permitted; [] for a case without them."""
+
+def numbers_rows(case: Case) -> list[tuple[str, ...]]:
+    """The numbers of the statistics as a table: its head (the image mean, tiles, pixels) and three
+    rows, of the biases measured, those that would have been seen, and those that are permitted; []
+    for a case without them."""
     rung = next((r for r in case.rungs if r.name == "statistics"), None)
     seen = _detectable(rung)
     biases = {} if rung is None else rung.numbers.get("relative_bias")
     if rung is None or seen is None or not isinstance(biases, Mapping):
         return []
-    found = ", ".join(
+    some = [
         f"{name} {_percent(bias, sign=True)}" for name, bias in biases.items() if bias is not None
-    )
+    ]
+    found = ", ".join(some).replace(" %,", ",")
     known = rung.numbers.get("noise_known", True)
     would = _percent(seen) if known else "unknown"
-    rows = [("image mean", found, would, _within(rung.numbers.get("limit")))]
+    columns = [("image mean", found, would, _within(rung.numbers.get("limit")))]
     for key, what in _FAMILIES:
         cells = rung.numbers.get(key)
-        if isinstance(cells, Mapping):
+        if isinstance(cells, Mapping) and (key in _MAIN or cells["differ"]):
             half = cells.get("median_detectable_bias")
             would = f"{_percent(half)} in half of them" if known and half is not None else ""
-            row = (f"{cells['tested']:,} {what}", _worst(cells), would)
-            rows.append((*row, _within(cells.get("worst_margin"))))
-    return rows
-
-
-def numbers_table(case: Case) -> list[str]:
-    """`numbers_rows` as lines of columns."""
-    if not (rows := numbers_rows(case)):
-        return []
-    rows = [HEAD, *rows]
-    widths = [max(len(row[k]) for row in rows) for k in range(len(HEAD))]
-    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+            column = (f"{cells['tested']:,} {what}", _worst(cells), would)
+            columns.append((*column, _within(cells.get("worst_margin"))))
+    return list(zip(("bias", "measured", "would have been seen", "limit"), *columns, strict=True))
 
 
 def _worst(cells: Mapping[str, Any]) -> str:
-    """Such as "3 differ; worst -12 % ± 2.1 %"."""
+    """Such as "3 differ; worst -12 ± 2.1 %"."""
     bias, half = cells.get("worst_bias"), cells.get("worst_half_width")
-    worst = "" if bias is None else f"; worst {_percent(bias, sign=True)}"
-    width = "" if bias is None or half is None else f" ± {_percent(half)}"
     count = f"{cells['differ']:,} differ" if cells["differ"] else "none differs"
-    return f"{count}{worst}{width}"
+    if bias is None:
+        return count
+    worst = _percent(bias, sign=True)
+    if half is not None:
+        worst = f"{worst.removesuffix(' %')} ± {_percent(half)}"
+    return f"{count}; worst {worst}"
 
 
 def _within(margin: float | None) -> str:
@@ -216,6 +240,11 @@ def _detectable(rung: RungResult | None) -> float | None:
     if not isinstance(biases, Mapping) or not biases or None in biases.values():
         return None
     return float(max(biases.values()))
+
+
+def is_of_statistics(case: Case) -> bool:
+    """Whether the case's reason is that of the statistics, whose numbers `numbers_rows` has."""
+    return "statistics" in case.reason.partition(": ")[0].split(", ")
 
 
 def _clause(reason: str) -> str:

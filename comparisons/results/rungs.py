@@ -11,3 +11,6 @@ only if a third renderer is asked."""
 
 COMPARED = RUNGS[3:]
 """The rungs that compare the two renderers: those a suite can be limited to."""
+
+OF_LIGHT = ("direct", "whitted", "statistics", "images")
+"""Those whose difference may show Mitsuba's precision in place of a fault."""

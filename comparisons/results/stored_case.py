@@ -22,7 +22,7 @@ from reference_rt.util.files import read_input, read_text, replacing
 
 CASE, PICTURES = "case.json", "pictures.exr"
 
-SCHEMA = 2
+SCHEMA = 3
 """Version of the layout; raised whenever a reader of the former layout would misread the new
 one."""
 
@@ -30,6 +30,8 @@ _NUMBER = "number"
 """The only key of an object that encodes a number that JSON lacks: {"number": "nan"}."""
 
 _CHANNELS = "RGB"
+
+_SIDES = "candidate", "reference"
 
 _KEYS = {
     f.name: {"rungs": "tiers"}.get(f.name, f.name)
@@ -138,8 +140,10 @@ def _write_pictures(
 ) -> dict[str, tuple[int, int]]:
     """All pictures as channels of one file, in its upper left corner; smaller ones are padded with
     NaN."""
-    pictures = {f.name: getattr(images, f.name) for f in dataclasses.fields(images)}
-    pictures = {name: picture for name, picture in pictures.items() if picture is not None}
+    names = [f.name for f in dataclasses.fields(images) if f.name != "layers"]
+    pictures = {n: getattr(images, n) for n in names if getattr(images, n) is not None}
+    for layer, pair in images.layers.items():
+        pictures |= {f"{side}/{layer}": one for side, one in zip(_SIDES, pair, strict=True)}
     for name, picture in pictures.items():
         if picture.ndim != 3 or picture.shape[2] != 3 or picture.size == 0:
             raise ValueError(f"{name}: expected (height, width, 3), got {picture.shape}")
@@ -166,7 +170,11 @@ def _read_pictures(path: Path, record: StoredCase) -> Images:
             name: np.stack([channels[f"{name}.{c}"][:height, :width] for c in _CHANNELS], axis=-1)
             for name, (height, width) in record.pictures.items()
         }
-        return Images(**pictures)
+        layers = [name.partition("/")[2] for name in pictures if name.startswith("candidate/")]
+        pairs = {
+            n: (pictures.pop(f"candidate/{n}"), pictures.pop(f"reference/{n}")) for n in layers
+        }
+        return Images(**pictures, layers=pairs)
     except (KeyError, TypeError):
         raise StoredCaseError(f"{path}: lacks a picture that {CASE} lists") from None
 

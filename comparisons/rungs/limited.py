@@ -4,11 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from comparisons.results.case import RungResult
-from comparisons.results.rungs import RUNGS
+from comparisons.results.rungs import OF_LIGHT, RUNGS
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.resolution import Resolution
-
-OF_LIGHT = ("direct", "whitted", "statistics", "images")
 
 
 def limited(rungs: Sequence[RungResult]) -> list[RungResult]:
@@ -47,6 +45,3 @@ def _limit(result: RungResult) -> str:
     if arbiter.too_many(result.numbers["explained"], total):
         return f"{result.name}: {result.reason}"
     return ""
-
-
-__all__ = ["OF_LIGHT", "limited"]

@@ -215,6 +215,7 @@ def _verdict(
         **{key: of_image[key] for key in TOP},
         "equivalent_within": finite(reach),
         "samples_factor": finite(factor),
+        "advice": advice if status == "inconclusive" else "",
         "noise_known": not unknown,
         "unseen_light": unseen_numbers(found.unseen),
         "image": of_image,

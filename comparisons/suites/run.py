@@ -81,9 +81,12 @@ class Display(Count):
                 self.line(note)
         line = Text.assemble(f"{case.scene}: ", (case.verdict, _STYLES[case.verdict]))
         line.append(f" ({remark})")
-        if self._steps or case.verdict not in PASSING:
-            line.append(named(f": {headline(case)}\n  {case.reason}", case.sides))
+        told = self._steps or case.verdict not in PASSING
+        if told:
+            line.append(named(f": {headline(case)}", case.sides))
         self._console.print(line, soft_wrap=True)
+        if told:
+            terminal.tell(self._console, case)
         self._show(1)
 
     def _show(self, ended: int = 0) -> None:
@@ -135,11 +138,12 @@ def summarise(
 
 
 class StoredResults(NamedTuple):
-    """cases: with their pictures, in order;  provenance: versions, machine, date;  suite: its name;
-    not_run: why other cases were skipped, by name;  missing: names of cases that an interrupted run
-    did not reach."""
+    """cases: with their pictures, in order;  walls: seconds of each, by name;  provenance:
+    versions, machine, date;  suite: its name;  not_run: why other cases were skipped, by name;
+    missing: names of cases that an interrupted run did not reach."""
 
     cases: tuple[Case, ...]
+    walls: dict[str, float]
     provenance: dict[str, Any]
     suite: str | None
     not_run: dict[str, str]
@@ -173,7 +177,9 @@ def read_stored_results(folder: Path) -> StoredResults:
     if not names and not missing:
         raise _no_case(folder)
     cases = tuple(read_case(records / name) for name in names)
-    return StoredResults(cases, provenance, suite, not_run, missing)
+    folders = zip(cases, names, strict=True)
+    walls = {case.scene: read_stored_case(records / name).wall for case, name in folders}
+    return StoredResults(cases, walls, provenance, suite, not_run, missing)
 
 
 def _no_case(folder: Path) -> StoredCaseError:
@@ -245,7 +251,6 @@ def run_suite(source: Source, plan: Plan, options: Options) -> Run:
         "suite": f"{source.name}: {source.suite.about}",
         "workers": options.workers.threads,
         **({"rungs": ", ".join(options.rungs)} if options.rungs else {}),
-        **{f"not run: {name}": why for name, why in plan.skipped.items()},
     }
     seconds = source.suite.case_seconds
     return run_cases(plan._replace(work=work), options, seconds, source.name, facts)
@@ -296,7 +301,15 @@ def run_cases(
 
     def finish() -> None:
         at = now()
-        write_report(options.report, at.cases, told, missing=at.missing)
+        write_report(
+            options.report,
+            at.cases,
+            told,
+            title=suite or "",
+            walls=at.walls,
+            not_run=at.not_run,
+            missing=at.missing,
+        )
         options.tell(at)
 
     with Display(len(plan.work), options.steps) as display, _terminable():

@@ -20,7 +20,7 @@ from typing import ClassVar, TextIO
 from pydantic import BaseModel, ConfigDict
 
 from comparisons.compare.budget import Budget
-from comparisons.results.case import WARNING, Case
+from comparisons.results.case import WARNING, Case, trace_command
 from comparisons.results.stored_case import write_case
 from comparisons.runs.processes import carry_out, private_stdout, send
 from comparisons.suites.suite import Changes
@@ -88,11 +88,19 @@ def answer(request: Request, runner: Runner, threads: int | None, answers: TextI
             case,
             scene=request.name,
             again=request.again,
+            trace=_traced(request),
             notes=(*warned, *case.notes, described(request.budget)),
         )
         write_case(request.folder, case, request.key, time.perf_counter() - start)
 
     carry_out(run, answers)
+
+
+def _traced(request: Request) -> str:
+    size = request.changes.size
+    if request.budget.size is not None:
+        size = "{}x{}".format(*request.budget.size)
+    return trace_command(request.scene, size, request.changes.defaults)
 
 
 def described(budget: Budget) -> str:

@@ -112,10 +112,15 @@ def write(out: Path, rows: Sequence[Row], provenance: Mapping[str, Any]) -> None
         "rows": [_flat(row) for row in rows],
     }
     write_json(out / "results.json", plain(document))
+    totals = {}
+    for renderer in dict.fromkeys(row.renderer for row in rows):
+        of = [score for score in scores(rows) if score[1] == renderer]
+        totals[renderer] = sum(s[2] for s in of), sum(s[3] for s in of)
     page = template("truth.html.jinja", "truth").render(
+        totals=[(renderer, *total) for renderer, total in totals.items()],
         provenance=provenance,
         level=LEVEL,
-        scores=[(AREAS[a], r, n, m) for a, r, n, m in scores(rows)],
+        areas_right=[(AREAS[a], r, f"{n} of {m}") for a, r, n, m in scores(rows)],
         areas=[(AREAS[a], [r for r in rows if r.case.area == a]) for a in AREAS],
         signs=SIGNS,
         triple=_triple,
@@ -123,10 +128,8 @@ def write(out: Path, rows: Sequence[Row], provenance: Mapping[str, Any]) -> None
         number=_number,
     )
     write_text(out / "report.html", page)
-    for renderer in dict.fromkeys(row.renderer for row in rows):
-        total = [score for score in scores(rows) if score[1] == renderer]
+    for renderer, (right, judged) in totals.items():
         with replacing(out / f"truth-{renderer}.svg") as temporary:
-            right, judged = sum(s[2] for s in total), sum(s[3] for s in total)
             temporary.write_text(_badge(right, judged), encoding="utf-8")
 
 

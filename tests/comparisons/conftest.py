@@ -3,7 +3,6 @@
 import os
 import shutil
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ import pytest
 import typer
 from builders import HELPERS
 from gate_checks import SCENE, pictures
-from page_in_browser import CONTRASTS
+from page_in_browser import BROKEN_WORDS, CONTRASTS, FIRST_PICTURE
 from PIL import Image
 from suite_runs import RUNNER
 from typer.testing import CliRunner, Result
@@ -131,21 +130,28 @@ def show(browser, window, tmp_path):
 
 @pytest.fixture
 def check_page(browser):
-    """Check a page without scripts: it asks for nothing, complains of nothing, can be read in both
-    colour schemes, and is as wide as the window, that of a telephone too."""
+    """Check a page: it asks for nothing, complains of nothing, can be read in both colour schemes,
+    begins with a picture or a chart, is as wide as the window, that of a telephone too, and breaks
+    no word.
 
-    def check(path):
-        for width, scheme in product((1280, 400), ("light", "dark")):
+    pictures: whether it has any.
+    """
+
+    def check(path, pictures=True):
+        for width, scheme in ((1400, "light"), (400, "dark")):
             size = {"width": width, "height": 900}
             context = browser.new_context(viewport=size, color_scheme=scheme, offline=True)
             page, complaints, requests = context.new_page(), [], []
             page.on("console", lambda message, to=complaints: to.append(message.text))
             page.on("request", lambda request, to=requests: to.append(request.url))
             page.goto(path.as_uri())
+            if pictures and width == 1400:
+                assert page.evaluate(FIRST_PICTURE) < 400
             page.evaluate("document.querySelectorAll('details').forEach((d) => (d.open = true))")
             assert complaints == []
             assert [url for url in requests if not url.startswith("data:")] == [path.as_uri()]
             assert page.evaluate(CONTRASTS) == []
+            assert page.evaluate(BROKEN_WORDS) == []
             assert page.evaluate("document.documentElement.scrollWidth") <= width
             context.close()
 

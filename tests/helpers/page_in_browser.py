@@ -33,6 +33,34 @@ CONTRASTS = """() => {
 }"""
 """Elements whose text has a contrast below 4.5, as text."""
 
+BROKEN_WORDS = """() => {
+    const found = [];
+    const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+    while (walker.nextNode()) {
+        const { data, parentElement } = walker.currentNode;
+        if (!parentElement.checkVisibility()) continue;
+        if (parentElement.closest("svg, .unseen, option")) continue;
+        for (const word of data.matchAll(/[\\p{L}\\p{N}]{2,}/gu)) {
+            // What is longer than the longest words has to be broken somewhere.
+            if (word[0].length > 24) continue;
+            const range = document.createRange();
+            range.setStart(walker.currentNode, word.index);
+            range.setEnd(walker.currentNode, word.index + word[0].length);
+            const lines = [...range.getClientRects()].filter(({ width }) => width > 0);
+            if (new Set(lines.map(({ top }) => Math.round(top))).size > 1) found.push(word[0]);
+        }
+    }
+    return found;
+}"""
+"""Words, and parts of names between underscores, that stand on two lines."""
+
+FIRST_PICTURE = """() => Math.min(
+    ...[...document.querySelectorAll("img, canvas, svg")]
+        .map((element) => element.getBoundingClientRect())
+        .filter(({ height }) => height > 40).map(({ top }) => top + scrollY)
+)"""
+"""Where the first picture or chart begins, in pixels; infinite if there is none."""
+
 
 def case(images, scene="box", verdict="differ", reason="why", **more):
     metrics = Metrics(0.9, 0.1, 30.0, 0.5, 0.25, (0.0, 0.0, -0.01), 0)

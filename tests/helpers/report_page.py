@@ -31,7 +31,7 @@ def noise(shape, seed=0):
 class Page(HTMLParser):
     """What a page asks the network for, its headings of cases, its pictures and its scripts."""
 
-    VOID = frozenset({"meta", "img", "input", "link", "br"})
+    VOID = frozenset({"meta", "img", "input", "link", "br", "wbr"})
 
     def __init__(self, text):
         super().__init__()

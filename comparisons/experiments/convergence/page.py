@@ -49,13 +49,12 @@ def write_page(
     path: Path, curves: Sequence[Curves], settings: Settings, provenance: Mapping[str, Any]
 ) -> None:
     """Write the page about `curves`, at once or not at all; all text is escaped."""
+    targets = [percent(target) for target in settings.targets]
     page = template("convergence.html.jinja", "experiments/convergence").render(
         provenance=provenance,
         settings=settings,
-        targets=[percent(target) for target in settings.targets],
         summary=_summary(curves, settings),
-        scenes=[_view(one) for one in curves],
-        stages=STAGES,
+        scenes=[{**_view(one, targets), "number": k} for k, one in enumerate(curves, 1)],
     )
     write(path, page)
 
@@ -64,7 +63,8 @@ def _summary(curves: Sequence[Curves], settings: Settings) -> dict[str, Any]:
     """Ours against each other method at one target, scene by scene, and the medians."""
     targets = list(settings.targets)
     if not targets:
-        return {"target": "", "columns": [], "rows": [], "medians": [], "absent": []}
+        none: dict[str, Any] = {key: [] for key in ("columns", "rows", "medians", "absent")}
+        return {"target": "", "verdict": "How the error falls with time", **none}
     place = targets.index(0.01) if 0.01 in targets else len(targets) - 1
     titles = {name: c.title for one in curves for name, c in one.methods.items()}
     names = [name for name in titles if name != "ours"]
@@ -76,11 +76,19 @@ def _summary(curves: Sequence[Curves], settings: Settings) -> dict[str, Any]:
         rows.append((number, one.scene, _instead(one), cells))
         for name, ratio in found.items():
             known[name].append(ratio)
+    medians = [_median(ratios) for ratios in known.values()]
+    each = [
+        f"{cell.text} times that of {titles[name]} ({cell.small})"
+        for name, cell in zip(names, medians, strict=True)
+        if cell.small
+    ]
+    told = f"is, as a median, {'; '.join(each)}" if each else "cannot be compared"
     return {
         "target": percent(targets[place]),
+        "verdict": f"Our time to {percent(targets[place])} relative error {told}",
         "columns": [titles[name] for name in names],
         "rows": rows,
-        "medians": [_median(ratios) for ratios in known.values()],
+        "medians": medians,
         "absent": [f"{one.scene}: {line}" for one in curves for line in one.missing],
     }
 
@@ -115,7 +123,7 @@ def _median(ratios: Sequence[Ratio]) -> Cell:
     return Cell(f"{median:.2f}" if math.isfinite(median) else "∞", ", ".join(parts), look)
 
 
-def _view(one: Curves) -> dict[str, Any]:
+def _view(one: Curves, targets: Sequence[str]) -> dict[str, Any]:
     """What the template shows of a scene."""
     view: dict[str, Any] = {"one": one, "plots": [], "picture": "", "crops": []}
     if one.reference is not None:
@@ -131,30 +139,80 @@ def _view(one: Curves) -> dict[str, Any]:
     if one.grids is not None:
         view["picture"] = _png(one.grids.picture, white_level(one.grids.picture))
         view["plots"] = [Markup(svg) for svg in grid_plots(one)]
-    ratios = one.ratios()
-    view["targets"] = [
-        (
-            one.methods[name].title,
-            [_reached(target) for target in found.targets],
-            [_ratio(ratio) for ratio in ratios[name]] if name in ratios else None,
-        )
-        for name, found in one.findings.items()
+    view["tables"] = _tables(one, targets)
+    steps = [
+        (one.methods[name].title, s) for name, found in one.findings.items() for s in found.steps
     ]
-    view["laws"] = [
-        (
-            one.methods[name].title,
-            [
-                _slope(found.slopes["relmse"]["spp"]),
-                _slope(found.slopes["relmse"]["seconds"]),
-                _slope(found.slopes["mse"]["spp"]),
-                _slope(found.slopes["mse"]["seconds"]),
-                _bias(found.relative_bias),
-                Cell(shown(found.steps[-1].efficiency)),
-            ],
-        )
-        for name, found in one.findings.items()
-    ]
+    columns = ("samples", "seconds", "least", "most", "MSE", "relMSE", "from", "to")
+    rungs: list[list[str]] = [["Method", *columns, "relative variance", "efficiency"]]
+    for title, s in steps:
+        values = (s.spp, *s.seconds, s.mse.value, *s.relmse, s.variance, s.efficiency)
+        rungs.append([title, *map(shown, values)])
+    view["rungs"] = rungs if steps else []
     return view
+
+
+Table = tuple[str, list[str], list[list[Any]], str]
+"""Title, head, rows of texts and `Cell`s, and a hint below."""
+
+_EXTRAPOLATED = (
+    "Extrapolated: beyond the last rung, the relMSE is modelled as a / n + c / n^1.5 for n samples "
+    "(c = 0 for independent ones), fitted to the last rungs."
+)
+
+_SLOPES = (
+    "Slopes are of log error over log samples or log time; independent samples have a slope of −1 "
+    "over samples. The bias is the error that remains at any number of samples, estimated from "
+    "products of different replicates at the last rung, with one-sided bounds (lower: 99.99 %, "
+    "upper: 99 %); where no bias is significant, the upper bound is shown. The last column is the "
+    "efficiency at the last rung."
+)
+
+
+def _tables(one: Curves, targets: Sequence[str]) -> list[Table]:
+    tables: list[Table] = []
+    ratios = one.ratios()
+    if one.findings:
+        head = ["Method", *targets, *(f"ratio at {target}" for target in targets if ratios)]
+        times: list[list[Any]] = []
+        laws: list[list[Any]] = []
+        for name, found in one.findings.items():
+            title = one.methods[name].title
+            own = map(_ratio, ratios[name]) if name in ratios else ["1"] * len(targets)
+            times.append([title, *map(_reached, found.targets), *(own if ratios else [])])
+            slopes = [
+                found.slopes[e][over] for e in ("relmse", "mse") for over in ("spp", "seconds")
+            ]
+            efficiency = shown(found.steps[-1].efficiency)
+            laws.append([title, *map(_slope, slopes), _bias(found.relative_bias), efficiency])
+        against = ", and the ratio ours / theirs" if ratios else ""
+        tables.append((f"Time to a relative error{against}", head, times, _EXTRAPOLATED))
+        of = [f"{of} over {over}" for of in ("relMSE", "MSE") for over in ("samples", "time")]
+        columns = [*(f"slope of {what}" for what in of), "bias, relative to ours"]
+        head = ["Method", *columns, "1 / (relative variance × s)"]
+        tables.append(("Slopes, bias, efficiency", head, laws, _SLOPES))
+    if one.grids is not None:
+        finest = f"{one.grids.finest}"
+        some: list[tuple[str, Any, str]] = [("ours", step, finest) for step in one.grids.steps]
+        some += [(f"Mitsuba {p.variant}", p, f"{p.spp}") for p in one.grids.points]
+        rows: list[list[Any]] = [
+            [who, *map(shown, (p.spp, p.seconds, p.mse, p.relmse)), f"ours, {exact} samples"]
+            for who, p, exact in some
+        ]
+        head = ["Renderer", "samples per pixel", "seconds", "MSE", "relMSE", "against"]
+        tables.append(("Grids", head, rows, ""))
+    if one.starts:
+        rows = []
+        for side, states in one.starts.items():
+            for state, stages in states.items():
+                spent = [*(stages[stage] for stage in STAGES), sum(stages.values())]
+                cache = "empty" if state == "cold" else "full"
+                rows.append([side, cache, *(f"{seconds:.3f}" for seconds in spent)])
+            if not states:
+                rows.append([side, Cell("a process failed", look="bad")])
+        head = ["Renderer", "kernel caches", *STAGES, "total"]
+        tables.append(("Seconds from the start of a process to its first picture", head, rows, ""))
+    return tables
 
 
 # ---- plots --------------------------------------------------------------------------------------

@@ -32,7 +32,8 @@ from comparisons.mitsuba.translate.materials import is_textured
 from comparisons.mitsuba.translate.shapes.stand_ins import coarser
 from comparisons.mitsuba.translate.textures import TranslationContext
 from comparisons.results.case import Case, RungResult
-from comparisons.rungs.limited import OF_LIGHT, limited
+from comparisons.results.rungs import OF_LIGHT
+from comparisons.rungs.limited import limited
 from reference_rt.materials import (
     Blend,
     Bump,

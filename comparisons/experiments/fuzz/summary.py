@@ -14,6 +14,7 @@ from comparisons.experiments.fuzz.fields import all_types, possible_pairs
 from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced, text_of
 from comparisons.experiments.fuzz.run import Plan, Run
 from comparisons.report.templates import template, write
+from comparisons.report.values import label
 from comparisons.results.files import write_json
 from comparisons.runs.engine import Count
 from reference_rt.util.errors import printable
@@ -265,8 +266,14 @@ def write_page(path: Path, plan: Plan, run: Run, provenance: Mapping[str, Any]) 
     page = template("fuzz.html.jinja", "experiments/fuzz").render(
         lines=words(run),
         findings=findings,
-        rungs={name: counts.most_common() for name, counts in rungs.items()},
-        coverage=coverage(checked.types for checked in run.scenes.values()),
+        rungs=[
+            (name, ", ".join(f"{count} {status}" for status, count in counts.most_common()))
+            for name, counts in rungs.items()
+        ],
+        types=[
+            (label(name.replace(":", ": ")), f"{count}", f"{100 * share:.0f} %")
+            for name, count, share in coverage(c.types for c in run.scenes.values()).rows()
+        ],
         provenance={**provenance, "seed": plan.seed},
     )
     write(path, page)

@@ -152,12 +152,13 @@ def write_page(
     path: Path, rows: Sequence[Row], effort: Effort, seed: int, provenance: Mapping[str, Any]
 ) -> None:
     """Write the page about `rows`, at once or not at all."""
-    families = dict.fromkeys(row.family for row in rows)
+    names = dict.fromkeys(row.family for row in rows)
+    families = [_family(name, [row for row in rows if row.family == name]) for name in names]
     page = template("methods.html.jinja", "experiments/methods").render(
         provenance=provenance,
         effort=effort,
         seed=seed,
-        families=[_family(name, [r for r in rows if r.family == name]) for name in families],
+        families=sorted(families, key=lambda family: not family["plots"]),  # charts first
     )
     write_text(path, page)
 

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
@@ -13,10 +14,12 @@ import comparisons.commands.register
 import comparisons.compare.compare
 import comparisons.mitsuba.translate
 from comparisons.compare.budget import Budget
+from comparisons.compare.pictures import layers
 from comparisons.mitsuba.translate import UntranslatableError
 from comparisons.results.case import Case, exit_code
 from reference_rt.cli.main import app
 from reference_rt.rendering.scene import Scene
+from reference_rt.scene.build import build_tables
 
 SCENES = Path(__file__).parents[3] / "scenes"
 
@@ -36,6 +39,23 @@ def compared_here(budget: Budget) -> Case:
     return comparisons.compare.compare.compare_scene(
         comparisons.compare.compare.Subject(scene), budget, lambda _: None
     )
+
+
+def test_layers_are_the_hits_of_both_sides() -> None:
+    scene = Scene.load(SCENES / "spheres_whitted.yaml")
+    film = scene.film.model_copy(update={"width": 24, "height": 15})
+    scene = scene.changed(film=film)
+    tables, counterpart = build_tables(scene), comparisons.mitsuba.translate.load(scene)
+    found = layers(scene, tables, counterpart)
+    hit = found["distance"][0][..., 0] > 0.0
+    assert 0 < hit.sum() < hit.size
+    for name, (ours, theirs) in found.items():
+        assert ours.shape == theirs.shape == (15, 24, 3)
+        # Mitsuba's float32 has 6e-8; a ray at an edge may hit another surface.
+        off = np.abs(ours - theirs).max(axis=-1) > 1e-4 * max(1.0, np.abs(ours).max())
+        assert off.sum() <= 3, name
+    lengths = np.linalg.norm(found["normal"][0], axis=-1)
+    np.testing.assert_allclose(lengths, hit, atol=1e-12)
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """The gate as a whole: right pictures pass, wrong ones do not, and each says why."""
 
+import re
 import shlex
 from pathlib import Path
 
@@ -33,7 +34,9 @@ def test_right_pictures_pass(right: FloatArray, monkeypatch: pytest.MonkeyPatch)
     assert all(rung["status"] == "agree" for rung in case["tiers"].values())
     assert case["sides"] == {"candidate": "candidate's", "reference": "reference_rt's"}
     assert found["provenance"]["candidates"] == [f"c{k}.exr" for k in range(4)]
-    assert "ball" in Path("out/report.html").read_text()
+    page = Path("out/report.html").read_text()
+    assert "<title>ball: agree, reference_rt</title>" in page
+    assert re.search(r"<h3>Seconds</h3>\s*<p>\d+\.\d in all</p>", page)
     assert JUnitXml.fromfile("junit.xml").tests == 1
     assert JUnitXml.fromfile("junit.xml").failures == 0
 
@@ -49,7 +52,7 @@ def test_one_percent_more_fails(right: FloatArray) -> None:
     result, found = run(*replicates, "--scene", "ball.yaml", "--junit", "junit.xml")
     assert result.exit_code == 1, result.output
     assert "ball: differ: likeliest cause: constant gain of 1.0" in result.stdout
-    assert "\n  statistics: the image mean differs: " in result.stdout
+    assert "\n  limit  " in result.stdout
     assert "gain" in found["cases"][0]["cause"]["name"]
     assert found["cases"][0]["worst"]
     assert JUnitXml.fromfile("junit.xml").failures == 1
@@ -70,7 +73,7 @@ def test_a_single_noisy_picture_is_inconclusive() -> None:
     result, found = run(*files(noisy), "--scene", "ball.yaml")
     assert result.exit_code == 1, result.output
     assert "ball: inconclusive: a single picture does not show its noise" in result.stdout
-    assert "\n  statistics: a single picture does not show its noise here, " in result.stdout
+    assert "\n  would have been seen  unknown  " in result.stdout
     assert status(found, "statistics") == "inconclusive"
     assert status(found, "images") == "not-applicable"
 

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 import reference_rt as rt
-from comparisons.cycles.translate import IneligibleError, bounces_of
+from comparisons.cycles.translate import bounces_of
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import trace
 from comparisons.mitsuba.scene import render
 from comparisons.mitsuba.translate import UntranslatableError, load, to_mitsuba
 from comparisons.mitsuba.translate.lights import ambient_of
 from comparisons.pbrt import write_pbrt
+from comparisons.renderers import NoCounterpartError
 from comparisons.rungs import geometry
 from reference_rt.cameras.camera import Camera
 from reference_rt.cameras.film import AnyFilter, BoxFilter, Film, GaussianFilter, TentFilter
@@ -271,5 +272,5 @@ def test_light_without_shadows_has_no_counterpart(masked: bool, tmp_path: Path) 
         write_pbrt(scene, tmp_path / "s.pbrt")
     reasons = str(caught.value), *map(str, caught.value.others)
     assert sum("direct light without shadows" in reason for reason in reasons) == 1
-    with pytest.raises(IneligibleError, match="without shadows"):
+    with pytest.raises(NoCounterpartError, match="without shadows"):
         bounces_of(scene.integrator)

@@ -18,12 +18,12 @@ def test_pixels_read_what_the_arrays_hold(show):
         point(page, x, y, kind)
         assert page.locator(".place").inner_text() == f"x {x}, y {y}"
         difference = candidate[y, x] - reference[y, x]
-        # Rounding to the digits shown, and what is stored.
+        # Rounding to the seven digits shown, and to float32; z has two digits.
         rows = {
-            "candidate": (candidate[y, x], 0.5e-2 + 2**-10),
-            "reference": (reference[y, x], 0.5e-2 + 2**-11),
-            "difference": (difference, 0.5e-1 + 2**-6),
-            "z": (difference / error[y, x], 0.5e-1 + 2**-6 + 2**-4),
+            "candidate": (candidate[y, x], 0.5e-6 + 2**-24),
+            "reference": (reference[y, x], 0.5e-6 + 2**-24),
+            "difference": (difference, 0.5e-6 + 2**-24),
+            "z": (difference / error[y, x], 0.5e-1 + 2**-11),
         }
         for row, (values, tolerance) in rows.items():
             texts = [text.replace("−", "-") for text in read(page, row)]
@@ -32,8 +32,9 @@ def test_pixels_read_what_the_arrays_hold(show):
 
 def test_the_cursor_moves_by_keys_in_all_pictures_at_once(show):
     candidate = np.arange(96.0).reshape(8, 12)[..., None] * np.ones(3)
-    page = show(case(Images(candidate, grey(1.0))))
+    page = show(case(Images(candidate, grey(1.0)), trace="reference-rt trace a_b/c.yaml"))
     pixel(page, "candidate", 0, 0)
+    assert not page.locator(".trace").is_visible()
     page.keyboard.press("n")
     assert page.evaluate("document.activeElement.className") == "row"
     assert read(page, "candidate") == [f"{4 * 12 + 6}"] * 3
@@ -44,6 +45,8 @@ def test_the_cursor_moves_by_keys_in_all_pictures_at_once(show):
     page.keyboard.press("Shift+ArrowRight")
     page.keyboard.press("ArrowDown")
     assert page.locator(".place").inner_text() == "x 11, y 3"
+    told = page.locator(".trace code").inner_text()
+    assert told == "reference-rt trace a_b/c.yaml --pixel 11,3"
     for kind in ("candidate", "reference", "difference"):
         frame = page.locator(f".{kind} .frame").bounding_box()
         mark = page.locator(f".{kind} .cursor").bounding_box()

@@ -1,10 +1,22 @@
 """The page for everybody: contrast, screen readers, the keyboard, paper, many cases."""
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 from page_in_browser import CONTRASTS, FOUR, PICTURES, case, measured, pixel
+
+from comparisons.report import write_report
+from comparisons.results.case import Cause, RungResult
+
+NUMBERS = {
+    "relative_bias": {"R": 0.01, "G": 0.011, "B": 0.012},
+    "detectable_bias": {"R": 0.002, "G": 0.0035, "B": 0.001},
+    "max_shading_normal_error_over_bound": 0.25,
+    "tiles": {"differ": 3, "tested": 64, "worst_bias": -0.12, "worst_half_width": 0.021},
+    "pixels": {"differ": 0, "tested": 16384, "median_detectable_bias": 0.5},
+}
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -36,7 +48,7 @@ def test_roles_for_screen_readers(show):
 
 
 def test_everything_is_reached_by_the_tab_key(show):
-    page = show(case(PICTURES, again="again"))
+    page = show(case(PICTURES, again="again"), case(None, "other"))
     pixel(page, "candidate", 0, 0)
     reached = set()
     for _ in range(60):
@@ -46,7 +58,7 @@ def test_everything_is_reached_by_the_tab_key(show):
                 "(({activeElement: e}) => e.id || e.className || e.name || e.tagName)(document)"
             )
         )
-    assert {"search", "expand", "stops", "colours", "permalink", "row", "copy live"} <= reached
+    assert {"search", "expand", "stops", "colours", "permalink live", "row", "copy live"} <= reached
 
 
 def test_on_paper(show):
@@ -87,3 +99,15 @@ def test_a_page_of_64_cases_is_light(show):
     assert page.locator("[data-drawn]").count() == 1
     assert page.locator("canvas").count() <= 4
     assert json.loads(page.locator("#case-1").get_attribute("data-drawn"))["stops"] == 0
+
+
+@pytest.mark.parametrize("count", [1, 5])
+def test_pages_of_one_case_and_of_a_suite(tmp_path, check_page, count):
+    name = "a_scene_with_a_rather_long_name_" * 3
+    rung = RungResult("statistics", "differ", "why", NUMBERS)
+    one = case(PICTURES, name, reason="statistics: why", again=f"reference-rt compare {name}.yaml")
+    one = replace(one, rungs=(*one.rungs, rung), cause=Cause("gain", "by 2 %", 0.9))
+    cases = [one, *(measured(f"{name}{k}", "agree", 0.1, 1.0, None) for k in range(count - 1))]
+    more = {} if count == 1 else {"title": "standard", "not_run": {f"other_{name}": "no file"}}
+    write_report(tmp_path / "page.html", cases, {"versions": {"numpy": "2.4"}}, **more)
+    check_page(tmp_path / "page.html")

@@ -79,6 +79,12 @@ def test_odd_pictures(images, count):
     assert len(histograms(images, span=0.5)) == count
 
 
+def test_what_float32_makes_is_no_noise():
+    rounded = grey(1.0 + 2.0**-23)
+    (only,) = histograms(Images(rounded, grey(1.0), grey(2.0**-28)), 1e-6)
+    assert "radiance" in only.title
+
+
 def test_without_a_difference_there_is_no_axis():
     assert histograms(Images(grey(1.0), grey(1.0)), span=0.0) == []
 

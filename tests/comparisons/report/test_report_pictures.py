@@ -8,7 +8,7 @@ import pytest
 from report_page import noise
 
 from comparisons.report.page import fitted
-from comparisons.report.pictures_data import as_json, pack, reduced, reduced_images, unpack
+from comparisons.report.pictures_data import EXACT, as_json, pack, reduced, reduced_images, unpack
 from comparisons.results.case import Images
 
 
@@ -19,21 +19,28 @@ def test_what_is_packed_comes_back_within_the_stated_bounds():
     candidate = reference * (1.0 + relative)
     error = rng.lognormal(sigma=3.0, size=reference.shape)
     back = unpack(pack(Images(candidate, reference, error)))
-    # The floor: the smallest half float's half, below the 99.9th percentile by 34 powers of two.
-    floor = 2.0**-33 * np.percentile(np.abs(reference), 99.9)
-    np.testing.assert_allclose(back.reference, reference, rtol=2**-11, atol=floor)
-    np.testing.assert_allclose(back.candidate, candidate, rtol=2**-10, atol=floor)
+    np.testing.assert_allclose(back.reference, reference, rtol=2**-11)
+    np.testing.assert_allclose(back.candidate, candidate, rtol=2**-10)
     np.testing.assert_allclose(back.error, error, rtol=2**-4)
     difference = candidate - reference
-    np.testing.assert_allclose(back.difference, difference, rtol=2**-6, atol=2**-6 * floor)
+    np.testing.assert_allclose(back.difference, difference, rtol=2**-6)
     assert (back.difference[difference == 0.0] == 0.0).all()
     assert (np.sign(back.reference) == np.sign(reference)).all()
 
 
+def test_exact_pictures_are_those_of_the_file():
+    candidate, reference = (noise((20, 30), k).astype(np.float32).astype(float) for k in (0, 1))
+    candidate[0, 0] = np.nextafter(reference[0, 0].astype(np.float32), np.float32(9.0))
+    back = unpack(pack(Images(candidate, reference), bits=EXACT))
+    np.testing.assert_array_equal(back.candidate, candidate)
+    np.testing.assert_array_equal(back.reference, reference)
+    np.testing.assert_array_equal(back.difference, candidate - reference)
+
+
 def test_what_is_not_finite_or_far_too_bright_comes_back_as_it_is():
     reference, candidate = noise((20, 20)), noise((20, 20), 1)
-    candidate[0, :4, 0] = np.nan, np.inf, -np.inf, 1e30
-    reference[1, :3, 1] = 3e38, np.nan, -1e300
+    candidate[0, :4, 0] = np.nan, np.inf, -np.inf, 1e50
+    reference[1, :3, 1] = 4e38, np.nan, -1e-300
     back = unpack(pack(Images(candidate, reference, np.zeros_like(reference))))
     np.testing.assert_array_equal(back.candidate[0, :4, 0], candidate[0, :4, 0])
     np.testing.assert_array_equal(back.reference[1, :3, 1], reference[1, :3, 1])

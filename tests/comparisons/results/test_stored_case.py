@@ -90,7 +90,8 @@ def test_pictures_come_back_as_float32(tmp_path, with_error):
     candidate[0, 0] = math.nan, math.inf, -math.inf
     candidate[1, 1, 0] = 1e-50
     error = RNG.random((5, 7, 3)) if with_error else None
-    images = Images(candidate, RNG.random((5, 7, 3)), error)
+    layers = {"normal": (RNG.random((5, 7, 3)), RNG.random((3, 2, 3)))} if with_error else {}
+    images = Images(candidate, RNG.random((5, 7, 3)), error, layers=layers)
     write_case(tmp_path, case(images))
     read = read_case(tmp_path).images
     for name in ("candidate", "reference", "error"):
@@ -100,6 +101,9 @@ def test_pictures_come_back_as_float32(tmp_path, with_error):
         else:
             assert after.dtype == np.float64
             np.testing.assert_array_equal(after, before.astype(np.float32))
+    assert read.layers.keys() == layers.keys()
+    for after, before in zip(read.layers.get("normal", ()), layers.get("normal", ()), strict=True):
+        np.testing.assert_array_equal(after, before.astype(np.float32))
     channels, header = read_exr(tmp_path / PICTURES)
     assert set(channels) >= {f"{p}.{c}" for p in ("candidate", "reference") for c in "RGB"}
     assert header["scene"] == "scene"

@@ -41,12 +41,16 @@ def test_exit_code():
 def test_the_page(tmp_path):
     write_report(tmp_path / "page.html", RAN, {}, missing=MISSING)
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert "<title>2 of 4 cases run: 2 agree" in page
-    assert '<span class="missing">2 of 4 cases run</span>' in page
-    assert "The run was interrupted before these cases: &lt;c&gt;, d." in page
-    write_report(tmp_path / "page.html", RAN, {})
+    assert "<title>a, b: 2 of 4 cases run: all pass" in page
+    assert '<b class="missing">2 of 4 cases run: all pass</b>' in page
+    for name in ("&lt;c&gt;", "d"):
+        assert f'– missing</span></td><th scope="row">{name}</th>' in page
+    assert page.count("the run was interrupted before this case") == 2
+    write_report(tmp_path / "page.html", RAN, {}, title="some", not_run={"<e>": "it is <odd>"})
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert "<span>2 cases</span>" in page
+    assert "<title>some: 2 cases: all pass; 1 not run" in page
+    assert '– not run</span></td><th scope="row">&lt;e&gt;</th>' in page
+    assert "it is &lt;odd&gt;" in page
     assert "interrupted" not in page
 
 

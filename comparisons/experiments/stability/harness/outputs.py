@@ -335,8 +335,11 @@ def write_page(
 ) -> None:
     """Write the page, at once or not at all; all text is escaped."""
     folder = "experiments/stability"
+    series = [one for some in summaries(found).values() for one in some]
+    held = f"in {sum(one.holds for one in series)} of {len(series)}" if series else "in no"
     page = template("stability.html.jinja", folder, number=number, named=named).render(
         provenance={**provenance, "effort": effort, "seed": seed},
+        verdict=f"Ours holds as far as it must {held} series",
         columns=list(zip(COLUMNS[1:], _LOOKS, strict=True)),
         families=[
             {
