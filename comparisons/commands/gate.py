@@ -149,7 +149,7 @@ def gate(
         from comparisons.gate.driver import Command, Driver
         from comparisons.gate.gate import not_run
         from comparisons.gate.pictures_in import read_candidates
-        from comparisons.gate.reference import is_noise_free
+        from comparisons.gate.reference import SizeError, is_noise_free
         from comparisons.gate.request import Request, gated
         from comparisons.gate.rounds import Rounds, gated_renderer
         from comparisons.results.headline import headline, numbers_table
@@ -234,7 +234,10 @@ def gate(
     except UsageError:
         raise
     except ReferenceRtError as error:
-        case, failed = not_run(name, error), error
+        failed = error
+        if isinstance(error, SizeError) and command and size and "{width}" not in command:
+            failed = SizeError(f"{error}; pass {{width}} and {{height}} to it in --command")
+        case = not_run(name, failed)
     else:
         case = replace(case, seconds={"candidate": {"render": driver.seconds}} if driver else {})
     case = replace(case, again=shlex.join(["reference-rt", *sys.argv[1:]]))

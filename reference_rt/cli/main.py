@@ -7,17 +7,34 @@ import os
 import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+import typer.core
 
 from reference_rt.cli import render_options
 from reference_rt.cli.adjusted import Defaults, SceneArgument, adjusted, by_name, without_blas
 from reference_rt.cli.guarded import guarded, is_output_lost, lost_output, say
-from reference_rt.util.errors import ImageError
+from reference_rt.util.errors import ImageError, meant_by
 from reference_rt.util.processes import catch_signals, exit_code_of
 
+
+class _Commands(typer.core.TyperGroup):
+    """Says what is meant by an option that there is not."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except Exception as found:
+            error: Any = found
+            if type(error).__name__ == "NoSuchOption" and error.ctx is not None:
+                known = [name for option in error.ctx.command.params for name in option.opts]
+                error.possibilities = meant_by(error.option_name, known)
+            raise
+
+
 app = typer.Typer(
+    cls=_Commands,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     help="An independent float64 reference ray tracer.\n\nExit codes: 0 success or agreement, "
@@ -129,6 +146,49 @@ def preview(
     view = previews.view_of(to, loaded)
     with without_blas():
         previews.preview(loaded, view, spp, share_of(target_error, "--target-error"), threads)
+
+
+@app.command()
+@guarded
+def trace(
+    scene: SceneArgument,
+    pixel: Annotated[
+        str, typer.Option(metavar="X,Y", help="Column and row, from 0 on the left and the top.")
+    ],
+    sample: Annotated[int, typer.Option(min=0, help="Which of the pixel's samples.")] = 0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Also write a page that draws the rays in the scene."),
+    ] = None,
+    spp: Annotated[int | None, typer.Option(help="Samples per pixel.")] = None,
+    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
+    integrator: Annotated[
+        str | None, typer.Option(help="ray_cast, whitted, direct or path.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the random numbers.")] = None,
+    define: Defaults = None,
+) -> None:
+    """Show the rays of one sample of a pixel: what they hit, and what each adds to its value.
+
+    The numbers are those of `render`, to the last bit.
+    """
+    from reference_rt.cli import trace as tracing
+    from reference_rt.rendering.scene import Scene
+    from reference_rt.util.files import check_writable
+
+    loaded = adjusted(Scene.load(scene, by_name(define)), spp, size, integrator, seed)
+    if out is not None:
+        check_writable(out)
+    with without_blas():
+        tree = tracing.traced(loaded, pixel, sample)
+        if as_json:
+            typer.echo(tracing.as_json(tree))
+        else:
+            tracing.print_tree(loaded, tree)
+        if out is not None:
+            tracing.write_page(loaded, tree, out)
+            say(f"{out}: {len(tree['rays'])} rays", err=True)
 
 
 @app.command()

@@ -20,10 +20,80 @@ _MOST_KEYS = 16
 """The most keys of a path into a scene that a message shows; the middle ones are left out."""
 
 
+_OURS = {
+    "albedo": "reflectance base_colour",
+    "area_light": "emissive",
+    "background": "lights",
+    "bounces": "max_depth",
+    "brightness": "radiance intensity irradiance",
+    "circle": "disk",
+    "color": "reflectance base_colour radiance intensity irradiance",
+    "colour": "reflectance base_colour radiance intensity irradiance",
+    "cube": "box",
+    "depth": "max_depth",
+    "diffuse_color": "reflectance base_colour diffuse",
+    "disney": "principled",
+    "emission": "radiance intensity irradiance",
+    "emitter": "emissive",
+    "envmap": "environment_map",
+    "filename": "file",
+    "from": "eye origin position",
+    "glass": "dielectric",
+    "gltf": "mesh",
+    "hdri": "environment_map",
+    "index": "interior_ior eta",
+    "intensity": "radiance irradiance",
+    "ior": "interior_ior eta",
+    "lambertian": "diffuse",
+    "light": "emissive lights",
+    "location": "eye position center origin",
+    "look_at": "target",
+    "lookat": "target",
+    "matte": "diffuse",
+    "max_bounces": "max_depth",
+    "metal": "conductor",
+    "obj": "mesh",
+    "objects": "shapes",
+    "origin": "eye position",
+    "path_tracer": "path",
+    "pathtracer": "path",
+    "ply": "mesh",
+    "position": "eye origin center",
+    "power": "intensity radiance irradiance",
+    "quad": "rectangle",
+    "radiance": "intensity irradiance",
+    "resolution": "width+height",
+    "rotation": "transform",
+    "roughness": "alpha",
+    "--samples": "--spp",
+    "samples": "spp",
+    "samples_per_pixel": "spp",
+    "scale": "transform",
+    "size": "width+height",
+    "--resolution": "--size",
+    "sky": "constant",
+    "specular": "mirror",
+    "sun": "directional",
+    "to": "target",
+    "translate": "transform",
+    "world": "shapes",
+}
+"""Words of other programs, and of beginners: ours in their place, the first that is possible; with
+a plus between those of two keys."""
+
+
 def meant(name: str, known: Iterable[str]) -> str:
-    """ "; did you mean 'NAME'?", if one of the known names is near; else nothing."""
-    near = difflib.get_close_matches(name, [*known], n=1)
-    return f"; did you mean '{near[0]}'?" if near else ""
+    """ "; did you mean 'NAME'?", with the names of `meant_by`; nothing if there are none."""
+    quoted = " and ".join(f"'{one}'" for one in meant_by(name, known))
+    return f"; did you mean {quoted}?" if quoted else ""
+
+
+def meant_by(name: str, known: Iterable[str]) -> list[str]:
+    """The known names, mostly one, that mean the same as `name`, or the one that is near."""
+    known = [*known]
+    words = [one.split("+") for one in _OURS.get(name.lower(), "").split()]
+    same = [word for word in words if {*word} <= {*known}]
+    return same[0] if same else difflib.get_close_matches(name, known, n=1)
 
 
 class ReferenceRtError(Exception):
