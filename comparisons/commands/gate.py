@@ -20,8 +20,8 @@ from comparisons.commands.options import (
     compare_extra,
 )
 from comparisons.commands.truth import truth_gate
-from reference_rt.cli.adjusted import Defaults, adjusted, by_name
 from reference_rt.cli.guarded import guarded, say
+from reference_rt.cli.options import Defaults, adjusted, by_name
 from reference_rt.util.errors import ReferenceRtError, SceneError, UsageError, printable
 
 if TYPE_CHECKING:

@@ -12,9 +12,9 @@ from typing import Annotated, Any
 import typer
 import typer.core
 
-from reference_rt.cli import render_options
-from reference_rt.cli.adjusted import Defaults, SceneArgument, adjusted, by_name, without_blas
+from reference_rt.cli import options
 from reference_rt.cli.guarded import guarded, is_output_lost, lost_output, say
+from reference_rt.cli.options import Defaults, SceneArgument, adjusted, by_name, without_blas
 from reference_rt.util.errors import ImageError, meant_by
 from reference_rt.util.processes import catch_signals, exit_code_of
 
@@ -79,24 +79,24 @@ def render(
     seed: Annotated[int | None, typer.Option(help="Seed of the random numbers.")] = None,
     threads: Threads = None,
     define: Defaults = None,
-    time_limit: render_options.TimeLimit = None,
-    target_error: render_options.TargetError = None,
-    checkpoint: render_options.CheckpointFolder = None,
-    no_checkpoint: render_options.NoCheckpoint = False,
-    resume: render_options.Resume = False,
-    more_spp: render_options.MoreSpp = None,
-    preview: render_options.Preview = None,
-    memory: render_options.Memory = None,
-    workers: render_options.NumberOfWorkers = None,
-    scheduler: render_options.Scheduler = None,
-    cluster: render_options.ClusterFile = None,
+    time_limit: options.TimeLimit = None,
+    target_error: options.TargetError = None,
+    checkpoint: options.CheckpointFolder = None,
+    no_checkpoint: options.NoCheckpoint = False,
+    resume: options.Resume = False,
+    more_spp: options.MoreSpp = None,
+    preview: options.Preview = None,
+    memory: options.Memory = None,
+    workers: options.NumberOfWorkers = None,
+    scheduler: options.Scheduler = None,
+    cluster: options.ClusterFile = None,
 ) -> None:
     """Render a scene to a file.
 
     Ctrl-C writes the picture so far, marked as partial in its header.
     """
+    from reference_rt.cli.options import Where
     from reference_rt.cli.render import Limited, Stored, render_to_file
-    from reference_rt.cli.render_options import Where
     from reference_rt.rendering.image import check_suffix
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.files import check_writable
@@ -135,17 +135,28 @@ def preview(
     ] = "1%",
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Default: all cores.")] = None,
+    watch: Annotated[
+        bool,
+        typer.Option("--watch", help="Begin again whenever the scene or one of its files changes."),
+    ] = False,
     define: Defaults = None,
 ) -> None:
     """Show a picture of a scene that becomes less noisy until it is closed or interrupted."""
     from reference_rt.cli import preview as previews
-    from reference_rt.cli.render_options import share_of
+    from reference_rt.cli.options import share_of
     from reference_rt.rendering.scene import Scene
 
-    loaded = adjusted(Scene.load(scene, by_name(define)), size=size)
+    def load() -> Scene:
+        return adjusted(Scene.load(scene, by_name(define)), size=size)
+
+    loaded = load()
     view = previews.view_of(to, loaded)
+    wanted = previews.Wanted(spp, share_of(target_error, "--target-error"), threads)
     with without_blas():
-        previews.preview(loaded, view, spp, share_of(target_error, "--target-error"), threads)
+        if watch:
+            previews.watch(load, scene, view, wanted)
+        else:
+            previews.preview(loaded, view, wanted)
 
 
 @app.command()

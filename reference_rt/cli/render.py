@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference_rt.cli.render_options import (
+from reference_rt.cli.options import (
     Where,
     bytes_of,
     duration,
