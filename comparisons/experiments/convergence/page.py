@@ -158,8 +158,9 @@ def _ladder_plots(one: Curves) -> list[Markup]:
         for over, x_label in (("seconds", SECONDS), ("spp", SAMPLES)):
             curves = []
             for number, (method, found) in enumerate(one.findings.items()):
-                bands = [getattr(step, name) for step in found.steps]
-                x = [s.seconds.value if over == "seconds" else s.spp for s in found.steps]
+                steps = [s for s in found.steps if over == "spp" or not s.disturbed]
+                bands = [getattr(step, name) for step in steps]
+                x = [s.seconds.value if over == "seconds" else s.spp for s in steps]
                 curves.append(
                     Curve(
                         one.methods[method].title,
@@ -178,6 +179,7 @@ def _grid_plots(one: Curves) -> list[Markup]:
     assert one.grids is not None
     steps = one.grids.steps
     plots = []
+    steps = tuple(step for step in steps if step.seconds > 0.0)
     for text, values in (("relMSE", [s.relmse for s in steps]), ("MSE", [s.mse for s in steps])):
         for x_label, x in (
             (SECONDS, [s.seconds for s in steps]),
