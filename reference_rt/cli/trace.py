@@ -106,7 +106,8 @@ def lines_of(scene: Scene, ray: dict[str, Any]) -> Iterator[str]:
         yield f"adds {_numbers(value)}: {what}"
     if numbers:
         yield ", ".join(f"{name} {value:.6g}" for name, value in numbers.items())
-    yield f"{len(ray['steps'])} nodes of the hierarchy, {ray['tests']} primitives tested"
+    steps = f"nodes of the hierarchy: {len(ray['steps'])}; " if ray["steps"] else ""
+    yield f"{steps}primitives tested: {ray['tests']}"
 
 
 def _light(scene: Scene, number: int) -> str:
