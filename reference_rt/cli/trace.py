@@ -5,7 +5,6 @@ translucent, so that the inside of a closed room is seen.
 """
 
 import base64
-import io
 import json
 import math
 from collections.abc import Iterable, Iterator
@@ -17,8 +16,8 @@ import numpy as np
 
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import RayCast
-from reference_rt.rendering.image import eight_bits
-from reference_rt.rendering.ray_tree import SHADOW, ray_tree
+from reference_rt.rendering.picture import Picture
+from reference_rt.rendering.ray_tree import SHADOW, ray_trees
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import UsageError, printable
@@ -50,7 +49,7 @@ def traced(scene: Scene, pixel: str, sample: int) -> Tree:
         "pixel": [column, row],
         "sample": sample,
         "spp": spp,
-        **ray_tree(scene, column, row, sample),
+        **ray_trees(scene, [(column, row, sample)])[0],
     }
 
 
@@ -219,42 +218,44 @@ def _views(scene: Scene, tree: Tree) -> Iterator[str]:
             x, y = (np.subtract(p, center) @ right / half, np.subtract(p, center) @ up / half)
             return round(0.5 * _SIDE * (1.0 + x), 2), round(0.5 * _SIDE * (1.0 - y), 2)
 
-        shapes = []
+        boxes, lines = [], []
         for number, ray in enumerate(rays):
-            for _, box in ray["steps"]:
-                if box is not None and np.isfinite(box).all():
-                    (x0, y0), (x1, y1) = place(box[:3]), place(box[3:])
-                    shapes.append(
-                        f'<rect data-ray="{number}" x="{min(x0, x1)}" y="{min(y0, y1)}" '
-                        f'width="{abs(x1 - x0)}" height="{abs(y1 - y0)}"/>'
-                    )
-        for number, ray in enumerate(rays):
+            data = f'data-ray="{number}"'
+            for box in [box for _, box in ray["steps"] if box is not None and max(box) < math.inf]:
+                (x0, y0), (x1, y1) = place(box[:3]), place(box[3:])
+                corner, size = f'x="{min(x0, x1)}" y="{min(y0, y1)}"', (abs(x1 - x0), abs(y1 - y0))
+                boxes.append(f'<rect {data} {corner} width="{size[0]}" height="{size[1]}"/>')
             direction = np.array(ray["d"]) / np.linalg.norm(ray["d"])
             end = ray["end"] if ray["end"] is not None else ray["o"] + 2.0 * half * direction
             (x0, y0), (x1, y1) = place(ray["o"]), place(end)
             dashes = ' stroke-dasharray="4 4"' if ray.get("occluded") else ""
-            shapes.append(
-                f'<line data-ray="{number}" stroke="{_COLOURS[ray["kind"]]}"{dashes} '
-                f'x1="{x0}" y1="{y0}" x2="{x1}" y2="{y1}"/>'
-            )
-        image = _data(_translucent(scene, center, half, right, up))
-        yield (
-            f'<figure><svg viewBox="0 0 {_SIDE} {_SIDE}"><image href="{image}" width="{_SIDE}" '
-            f'height="{_SIDE}"/>{"".join(shapes)}</svg><figcaption>{name}</figcaption></figure>'
-        )
+            span = f'x1="{x0}" y1="{y0}" x2="{x1}" y2="{y1}"'
+            lines.append(f'<line {data} stroke="{_COLOURS[ray["kind"]]}"{dashes} {span}/>')
+        view = Picture({"colour": _translucent(scene, center, half, right, up)}, "colour")
+        yield _figure(view.png(exposure=1.0), _SIDE, _SIDE, "".join(boxes + lines), name)
+
+
+def _figure(image: bytes, width: int, height: int, drawn: str, caption: str) -> str:
+    """A PNG with what is drawn on it."""
+    url = f"data:image/png;base64,{base64.b64encode(image).decode()}"
+    return (
+        f'<figure><svg viewBox="0 0 {width} {height}"><image href="{url}" width="{width}" '
+        f'height="{height}" preserveAspectRatio="none"/>{drawn}</svg>'
+        f"<figcaption>{caption}</figcaption></figure>"
+    )
 
 
 def _translucent(
     scene: Scene, center: FloatArray, half: float, right: FloatArray, up: FloatArray
 ) -> FloatArray:
-    """(_SIDE, _SIDE, 3) display values of a parallel view of a cube: the more a surface is seen
-    edge-on, the darker it is."""
+    """(_SIDE, _SIDE, 3) light through a cube along an axis: the more a surface is seen edge-on,
+    the darker it is."""
     at = (np.arange(_SIDE) + 0.5) * (2.0 / _SIDE) - 1.0
     x, y = np.meshgrid(at, -at)
     towards = np.cross(right, up)
     o = center + half * (x[..., None] * right + y[..., None] * up + towards)
     found = scene.crossings(o.reshape(-1, 3), -towards, t_max=2.0 * half)
-    opacity = 0.07 + 0.4 * (1.0 - np.abs(found.n @ towards)) ** 3
+    opacity = 0.15 + 0.6 * (1.0 - np.abs(found.n @ towards)) ** 3
     light = np.zeros(_SIDE * _SIDE)
     np.add.at(light, found.ray, np.log1p(-opacity))
     return np.repeat(np.exp(light).reshape(_SIDE, _SIDE, 1), 3, axis=2)
@@ -276,23 +277,12 @@ def _pictures(scene: Scene, tree: Tree) -> Iterator[str]:
         "bvh_steps": "nodes of the hierarchy that each pixel's ray is tested against",
         "intersections": f"primitives, of {count:,}, that each pixel's ray is tested against",
     }
+    radius = 0.02 * max(width, height)
+    mark = (
+        f'<circle cx="{x + 0.5}" cy="{y + 0.5}" r="{radius:.2f}" fill="none" stroke="#f0f" '
+        f'stroke-width="{0.3 * radius:.2f}"/>'
+    )
     for name, text in words.items():
         values = picture.layers[name]
         numbers = "" if name == "colour" else f": mean {values.mean():.4g}, most {values.max():g}"
-        png = f"data:image/png;base64,{base64.b64encode(picture.png(name)).decode()}"
-        yield (
-            f'<figure><svg viewBox="0 0 {width} {height}"><image href="{png}" width="{width}" '
-            f'height="{height}" preserveAspectRatio="none"/><circle cx="{x + 0.5}" cy="{y + 0.5}" '
-            f'r="{0.02 * max(width, height):.2f}" fill="none" stroke="#f0f" '
-            f'stroke-width="{0.006 * max(width, height):.2f}"/></svg>'
-            f"<figcaption>{text}{numbers}</figcaption></figure>"
-        )
-
-
-def _data(values: FloatArray) -> str:
-    """Display values as a PNG in a URL."""
-    from PIL import Image
-
-    file = io.BytesIO()
-    Image.fromarray(eight_bits(values)).save(file, "PNG")
-    return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
+        yield _figure(picture.png(name), width, height, mark, text + numbers)

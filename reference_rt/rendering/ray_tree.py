@@ -20,15 +20,16 @@ Each ray is a dictionary:
 The sum of all `adds`, ray after ray from 0, is the sample's radiance, to the last bit.
 """
 
+import functools
 import inspect
 import math
 import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import CodeType, FrameType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,7 +40,7 @@ from reference_rt.accel.block_query import any_hits
 from reference_rt.accel.bvh import CENTER, CHILDREN, child_of, size_of
 from reference_rt.accel.leaf import nearer_primitive, nearest_of_triangle_leaf
 from reference_rt.accel.single_ray import enter
-from reference_rt.core.ray import Hit, Ray, at
+from reference_rt.core.ray import Ray, at
 from reference_rt.core.vec3 import Vec3, is_black
 from reference_rt.integrators import (
     RayCast,
@@ -59,19 +60,13 @@ from reference_rt.scene.build import BuiltScene
 
 RayRecord = dict[str, Any]
 
-CAMERA, MIRRORED, REFRACTED, SCATTERED, SHADOW = KINDS = (
-    *("camera", "mirrored", "refracted", "scattered", "shadow"),
-)
-
-
-def ray_tree(scene: BuiltScene, x: int, y: int, sample: int = 0) -> dict[str, Any]:
-    """What one sample of the pixel in column x and row y is made of: its `rays`, its radiance, the
-    filter_weight, and value, the product of both.  Raises SceneError."""
-    return ray_trees(scene, [(x, y, sample)])[0]
+CAMERA, MIRRORED, REFRACTED = "camera", "mirrored", "refracted"
+SCATTERED, SHADOW = "scattered", "shadow"
 
 
 def ray_trees(scene: BuiltScene, places: Sequence[tuple[int, int, int]]) -> list[dict[str, Any]]:
-    """`ray_tree` of several (x, y, sample)."""
+    """What samples are made of, each given by its pixel's column and row and its number: its
+    `rays`, its radiance, the filter_weight, and value, the product of both.  Raises SceneError."""
     film = scene.film
     tables = build_and_check(scene, None)
     given = tables, scene.camera.setup(film.width, film.height), film.filter.setup()
@@ -100,7 +95,7 @@ def _tree(is_cast: bool, arguments: Any, pixel: int, sample: int) -> dict[str, A
     kernel: Any = tiles.aov_tile if is_cast else tiles.render_tile
     out: Any = [np.zeros((1, 10))] if is_cast else [np.zeros((1, 3)), None]
     recorder, scene = _Recorder(), arguments[0 if is_cast else 1]
-    recorder.watch(lambda: kernel(*arguments, *out, pixel, pixel + 1, sample, sample + 1))
+    recorder.run(lambda: kernel(*arguments, *out, pixel, pixel + 1, sample, sample + 1))
     radiance = Vec3(0.0, 0.0, 0.0)
     for ray in recorder.rays:
         for _, value in ray["adds"]:
@@ -125,211 +120,208 @@ def _plain(value: Any) -> Any:
     return [*map(_plain, value)] if isinstance(value, tuple | list) else value
 
 
+class _Return(NamedTuple):
+    """A function that returns: its local variables and its result; the code and the local variables
+    of its caller."""
+
+    own: dict[str, Any]
+    result: Any
+    caller: CodeType
+    outer: dict[str, Any]
+
+
 def _code(function: Any) -> CodeType:
     code: CodeType = inspect.unwrap(function).__code__
     return code
 
 
-class _Frames:
-    """Calls handlers when certain functions return: with the function's local variables, the code
-    and the local variables of its caller, and the result."""
+def _watch(run: Callable[[], object], handlers: Mapping[Any, Callable[[_Return], Any]]) -> None:
+    """Run a function; whenever one of certain functions returns, its handler is called."""
+    by_code = {_code(function): handler for function, handler in handlers.items()}
 
-    handlers: dict[CodeType, Callable[[Any, CodeType, Any, Any], None]]
+    def on_event(frame: FrameType, event: str, result: Any) -> None:
+        if event == "return" and frame.f_code in by_code:
+            caller = frame.f_back
+            while caller is not None and caller.f_code.co_name == "choose":
+                caller = caller.f_back  # of `ByClass` and `Linkable`
+            assert caller is not None
+            found = _Return(dict(frame.f_locals), result, caller.f_code, caller.f_locals)
+            by_code[frame.f_code](found)
 
-    def watch(self, run: Callable[[], object]) -> None:
-        def on_event(frame: FrameType, event: str, result: Any) -> None:
-            if event == "return" and frame.f_code in self.handlers:
-                caller = frame.f_back
-                while caller is not None and caller.f_code.co_name == "choose":
-                    caller = caller.f_back  # of `ByClass` and `Linkable`
-                assert caller is not None
-                self.handlers[frame.f_code](frame.f_locals, caller.f_code, caller.f_locals, result)
-
-        sys.setprofile(on_event)
-        try:
-            run()
-        finally:
-            sys.setprofile(None)
+    sys.setprofile(on_event)
+    try:
+        run()
+    finally:
+        sys.setprofile(None)
 
 
-_WHITTED, _DIRECT, _PATH = map(_code, (whitted.radiance, direct.radiance, path.radiances))
+_WHITTED, _DIRECT = _code(whitted.radiance), _code(direct.radiance)
+_WHOLE = Vec3(1.0, 1.0, 1.0)
 
 
-class _Recorder(_Frames):
+class _Recorder:
     """rays: see above, each with its `Ray` as "ray" and its `Hit` as "found"."""
 
     def __init__(self) -> None:
         self.rays: list[RayRecord] = []
         self.filter_weight = 1.0
-        self._waiting: dict[int, tuple[int | None, str]] = {}
         self._surface: int | None = None
-        self._point: Any = None
-        self._shadow: tuple[Ray, bool] | None = None
-        self._numbers: dict[str, float] = {}
-        self._sampled: dict[str, float] = {}
-        self.handlers = {
-            _code(tiles._camera_film_ray): self._film_ray,
-            _code(geometries.closest_hit): self._closest_hit,
-            _code(geometries.occluded): self._occluded,
-            _code(any_light.background): self._emission,
-            _code(any_light.emitted): self._emission,
-            _code(any_material.ambient): self._ambient_share,
-            _code(any_light.ambient): self._ambient,
-            _code(direct_light.direct_from): self._direct_from,
-            _code(whitted._push): self._push,
-            _code(whitted._direct_light): self._direct_light,
-            _code(shading.shade): self._shade,
-            _code(direct._light_sample): self._light_sample,
-            _code(direct._bsdf_sample): self._bsdf_sample,
-            _code(path._environment_emission): self._path_emission,
-            _code(path._hit_emission): self._path_emission,
-            _code(path._next_event_estimation): self._next_event,
-            _code(path._scatter): self._scatter,
-            _code(path._edge): self._edge,
-            _code(any_hits): self._any_hits,
-            _code(ray_cast.cast): self._cast,
-        }
+        """The ray at whose end others begin."""
+        self._waiting: dict[int, tuple[int | None, str]] = {}
+        """By places of Whitted's stack: parent and kind of a ray."""
+        self._last: dict[str, _Return] = {}
+        """What was returned for the ray that comes next."""
 
-    def _ray(self, kind: str, parent: int | None, ray: Ray, **more: Any) -> RayRecord:
-        record = {"kind": kind, "parent": parent, "ray": ray, "adds": [], "numbers": {}, **more}
-        record["depth"] = 0 if parent is None else self.rays[parent]["depth"] + 1
-        self.rays.append(record)
+    def run(self, kernel: Callable[[], object]) -> None:
+        keep = {
+            name: functools.partial(self._last.__setitem__, name)
+            for name in ("occluded", "share", "emission", "light", "scatter")
+        }
+        handlers: dict[Any, Callable[[_Return], Any]] = {
+            tiles._camera_film_ray: self._film_ray,
+            shading.shade: self._shade,
+            geometries.closest_hit: self._closest_hit,
+            geometries.occluded: keep["occluded"],
+            any_light.background: self._emission,
+            any_light.emitted: self._emission,
+            any_material.ambient: keep["share"],
+            any_light.ambient: self._ambient,
+            direct_light.direct_from: self._direct_from,
+            whitted._push: self._push,
+            whitted._direct_light: self._direct_light,
+            direct._light_sample: self._light_sample,
+            direct._bsdf_sample: self._bsdf_sample,
+            path._environment_emission: keep["emission"],
+            path._hit_emission: keep["emission"],
+            path._next_event_estimation: keep["light"],
+            path._scatter: keep["scatter"],
+            path._edge: self._edge,
+            any_hits: self._any_hits,
+            ray_cast.cast: self._cast,
+        }
+        _watch(kernel, handlers)
+
+    def _ray(self, kind: str, parent: int | None, ray: Ray, weight: Vec3, **more: Any) -> RayRecord:
+        depth = 0 if parent is None else self.rays[parent]["depth"] + 1
+        record = {"kind": kind, "parent": parent, "depth": depth, "ray": ray, "weight": weight}
+        self.rays.append(record | {"adds": [], "numbers": {}, **more})
         if kind != SHADOW:
             self._surface = len(self.rays) - 1
-        return record
+        return self.rays[-1]
 
-    def _add(self, record: RayRecord, what: str, value: Vec3) -> None:
-        if not is_black(value):
-            record["adds"].append((what, value))
+    def _shadow(self, ray: Ray, occluded: bool) -> RayRecord:
+        assert self._surface is not None
+        weight = self.rays[self._surface]["weight"]
+        return self._ray(SHADOW, self._surface, ray, weight, occluded=occluded)
 
-    def _film_ray(self, own: Any, caller: CodeType, outer: Any, result: Any) -> None:
-        self.filter_weight = result.weight
+    def _film_ray(self, r: _Return) -> None:
+        self.filter_weight = r.result.weight
 
-    def _shade(self, own: Any, caller: CodeType, outer: Any, result: Any) -> None:
-        self._point = result.point
-        if caller in (_WHITTED, _DIRECT):
-            self.rays[-1]["point"] = result.point
+    def _shade(self, r: _Return) -> None:
+        if r.caller in (_WHITTED, _DIRECT):
+            self.rays[-1]["point"] = r.result.point
+        else:
+            self._last["point"] = r
 
     # ---- Whitted and direct illumination --------------------------------------------------------
 
-    def _push(self, own: Any, caller: CodeType, outer: Any, result: Any) -> None:
-        kind = REFRACTED if own["weight"] is outer.get("refracted") else MIRRORED
-        first = own["depth"] == 0
-        self._waiting[own["top"]] = (None, CAMERA) if first else (self._surface, kind)
+    def _push(self, r: _Return) -> None:
+        kind = REFRACTED if r.own["weight"] is r.outer.get("refracted") else MIRRORED
+        is_first = r.own["depth"] == 0
+        self._waiting[r.own["top"]] = (None, CAMERA) if is_first else (self._surface, kind)
 
-    def _closest_hit(self, own: Any, caller: CodeType, outer: Any, hit: Hit) -> None:
-        if caller is _WHITTED:
-            parent, kind = self._waiting[outer["top"]]
-            self._ray(kind, parent, own["ray"], weight=outer["weight"], found=hit)
-        elif caller is _DIRECT:
-            self._ray(CAMERA, None, own["ray"], weight=Vec3(1.0, 1.0, 1.0), found=hit)
-        elif caller is _code(direct._bsdf_sample):
-            weight = outer["scattered"].weight
-            self._ray(SCATTERED, 0, own["ray"], weight=weight, found=hit)
+    def _closest_hit(self, r: _Return) -> None:
+        ray = r.own["ray"]
+        if r.caller is _WHITTED:
+            parent, kind = self._waiting[r.outer["top"]]
+            self._ray(kind, parent, ray, r.outer["weight"], found=r.result)
+        elif r.caller is _DIRECT:
+            self._ray(CAMERA, None, ray, _WHOLE, found=r.result)
+        elif r.caller is _code(direct._bsdf_sample):
+            self._ray(SCATTERED, 0, ray, r.outer["scattered"].weight, found=r.result)
 
-    def _emission(self, own: Any, caller: CodeType, outer: Any, radiance: Vec3) -> None:
-        what = "emitted" if "q" in own else "background"
-        if caller is _WHITTED:
-            self._add(self.rays[-1], what, outer["weight"] * radiance)
-        elif caller is _DIRECT:
-            self._add(self.rays[-1], what, radiance)
+    def _emission(self, r: _Return) -> None:
+        if r.caller in (_WHITTED, _DIRECT):
+            what = "emitted" if "q" in r.own else "background"
+            _add(self.rays[-1], what, r.outer.get("weight", _WHOLE) * r.result)
 
-    def _ambient_share(self, own: Any, caller: CodeType, outer: Any, share: Vec3) -> None:
-        self._share = share
+    def _ambient(self, r: _Return) -> None:
+        light = self._last.pop("share").result * r.result
+        _add(self.rays[-1], "ambient", r.outer["weight"] * light)
 
-    def _ambient(self, own: Any, caller: CodeType, outer: Any, light: Vec3) -> None:
-        if caller is _WHITTED:
-            self._add(self.rays[-1], "ambient", outer["weight"] * (self._share * light))
+    def _direct_from(self, r: _Return) -> None:
+        if (query := self._last.pop("occluded", None)) is not None:
+            record = self._shadow(query.own["ray"], query.result)
+            record["numbers"] = {"light": r.outer.get("k"), "light pdf": r.result.light.pdf}
 
-    def _occluded(self, own: Any, caller: CodeType, outer: Any, result: bool) -> None:
-        self._shadow = own["ray"], result
+    def _direct_light(self, r: _Return) -> None:
+        assert self._surface is not None
+        _add(self.rays[self._surface], "direct light", r.outer["weight"] * r.result)
 
-    def _direct_from(self, own: Any, caller: CodeType, outer: Any, sample: Any) -> None:
-        self._numbers = {"light": outer.get("k"), "light pdf": sample.light.pdf}
-        if self._shadow is None:
-            return
-        weight = self.rays[self._surface or 0]["weight"]
-        self._ray(SHADOW, self._surface, self._shadow[0], occluded=self._shadow[1], weight=weight)
-        self.rays[-1]["numbers"] = self._numbers
-        self._shadow = None
+    def _light_sample(self, r: _Return) -> None:
+        if "sample" in r.own and "selection" not in (numbers := self.rays[-1]["numbers"]):
+            sample = r.own["sample"]
+            numbers |= _of_light(r.own, sample.light, sample)
+            _add(self.rays[-1], "direct light", r.result)
 
-    def _direct_light(self, own: Any, caller: CodeType, outer: Any, result: Vec3) -> None:
-        self._add(self.rays[self._surface or 0], "direct light", outer["weight"] * result)
-
-    def _light_sample(self, own: Any, caller: CodeType, outer: Any, value: Vec3) -> None:
-        shadow = self.rays[-1]
-        if shadow["kind"] != SHADOW or "selection" in shadow["numbers"] or "sample" not in own:
-            return
-        shadow["numbers"] = _of_light(own["picked"], own["sample"].light, own["sample"].bsdf_pdf)
-        shadow["numbers"]["MIS weight"] = own.get("weight", 1.0)
-        self._add(shadow, "direct light", value)
-
-    def _bsdf_sample(self, own: Any, caller: CodeType, outer: Any, value: Vec3) -> None:
-        if "hit" not in own:
+    def _bsdf_sample(self, r: _Return) -> None:
+        if "hit" not in r.own:
             return
         self._surface = 0
-        record, scattered = self.rays[-1], own["scattered"]
-        record["point"] = own.get("there")
-        record["numbers"] = {
-            "bsdf pdf": 0.0 if scattered.is_delta else scattered.pdf,
-            "light pdf": own["light_pdf"],
-            "MIS weight": own["weight"],
-        }
-        self._add(record, "emitted" if own["hit"].kind >= 0 else "background", value)
+        record, scattered = self.rays[-1], r.own["scattered"]
+        pdf = 0.0 if scattered.is_delta else scattered.pdf
+        record["point"], record["numbers"] = r.own.get("there"), _of_emission(r.own, pdf)
+        _add(record, "emitted" if r.own["hit"].kind >= 0 else "background", r.result)
 
-    # ---- path tracing ---------------------------------------------------------------------------
+    # ---- path tracing, ray casting --------------------------------------------------------------
 
-    def _path_emission(self, own: Any, caller: CodeType, outer: Any, result: Vec3) -> None:
-        pdf = own["state"].bsdf_pdf
-        self._numbers = {"MIS weight": own["weight"]}
-        if pdf > 0.0:
-            self._numbers |= {"bsdf pdf": pdf, "light pdf": own["light_pdf"]}
-
-    def _next_event(self, own: Any, caller: CodeType, outer: Any, result: Any) -> None:
-        self._sampled = {}
-        if "sample" in own:
-            self._sampled = _of_light(own["picked"], own["light"], own["sample"].bsdf_pdf)
-            self._sampled["MIS weight"] = own.get("weight", 1.0)
-
-    def _scatter(self, own: Any, caller: CodeType, outer: Any, step: Any) -> None:
-        self._numbers |= {"sampled pdf": own["scattered"].pdf}
-        if "survival" in own:
-            self._numbers["survival"] = own["survival"]
-
-    def _edge(self, own: Any, caller: CodeType, outer: Any, edge: Any) -> None:
+    def _edge(self, r: _Return) -> None:
+        own, state = r.own, r.own["state"]
         kind = CAMERA if own["depth"] == 0 else SCATTERED
-        state, hit = own["state"], own["hit"]
-        record = self._ray(kind, self._surface, own["ray"], weight=state.throughput, found=hit)
-        record["point"] = self._point
-        record["numbers"], self._numbers = self._numbers, {}
-        self._add(record, "emitted" if hit.kind >= 0 else "background", edge.emitted)
-        self._connection = edge.connection
+        record = self._ray(kind, self._surface, own["ray"], state.throughput, found=own["hit"])
+        if own["hit"].kind >= 0:
+            record["point"] = self._last.pop("point").result.point
+        if (emission := self._last.pop("emission", None)) is not None:
+            record["numbers"] |= _of_emission(emission.own, state.bsdf_pdf)
+        if (scatter := self._last.pop("scatter", None)) is not None:
+            record["numbers"]["sampled pdf"] = scatter.own["scattered"].pdf
+            record["numbers"] |= {k: scatter.own[k] for k in ("survival",) if k in scatter.own}
+        _add(record, "emitted" if own["hit"].kind >= 0 else "background", r.result.emitted)
+        self._last["edge"] = r
 
-    def _any_hits(self, own: Any, caller: CodeType, outer: Any, result: None) -> None:
-        if own["n"] == 0:
-            return
-        occluded = bool(own["hits"].codes[0] >= 0)
-        record = self._ray(SHADOW, self._surface, self._connection.shadow, occluded=occluded)
-        record["weight"] = self.rays[record["parent"]]["weight"]
-        record["numbers"] = self._sampled
-        if not occluded:
-            self._add(record, "direct light", self._connection.light)
+    def _any_hits(self, r: _Return) -> None:
+        if r.own["n"] > 0:
+            connection = self._last.pop("edge").result.connection
+            record = self._shadow(connection.shadow, bool(r.own["hits"].codes[0] >= 0))
+            own = self._last.pop("light").own
+            record["numbers"] = _of_light(own, own["light"], own["sample"])
+            if not record["occluded"]:
+                _add(record, "direct light", connection.light)
 
-    # ---- ray casting ----------------------------------------------------------------------------
-
-    def _cast(self, own: Any, caller: CodeType, outer: Any, result: Any) -> None:
-        record = self._ray(CAMERA, None, own["ray"], weight=Vec3(1.0, 1.0, 1.0), found=own["hit"])
-        record["point"] = own.get("point")
-        self._add(record, "colour", result.colour)
+    def _cast(self, r: _Return) -> None:
+        record = self._ray(CAMERA, None, r.own["ray"], _WHOLE, found=r.own["hit"])
+        record["point"] = r.own.get("point")
+        _add(record, "colour", r.result.colour)
 
 
-def _of_light(picked: Any, light: Any, bsdf_pdf: float) -> dict[str, float]:
+def _add(record: RayRecord, what: str, value: Vec3) -> None:
+    if not is_black(value):
+        record["adds"].append((what, value))
+
+
+def _of_light(own: dict[str, Any], light: Any, sample: Any) -> dict[str, float]:
     return {
-        "light": picked.light,
-        "selection": picked.probability,
+        "light": own["picked"].light,
+        "selection": own["picked"].probability,
         "light pdf": light.pdf,
-        "bsdf pdf": 0.0 if light.is_delta else bsdf_pdf,
+        "bsdf pdf": 0.0 if light.is_delta else sample.bsdf_pdf,
+        "MIS weight": own.get("weight", 1.0),
     }
+
+
+def _of_emission(own: dict[str, Any], bsdf_pdf: float) -> dict[str, float]:
+    pdfs = {"bsdf pdf": bsdf_pdf, "light pdf": own["light_pdf"]} if bsdf_pdf > 0.0 else {}
+    return pdfs | {"MIS weight": own["weight"]}
 
 
 # ---- what a ray meets ----------------------------------------------------------------------------
@@ -347,43 +339,35 @@ def _described(record: RayRecord, scene: SceneTables) -> RayRecord:
         record["t"], record["end"] = hit.t, point.p
     elif record["kind"] == SHADOW and ray.t_max < math.inf:
         record["end"] = at(ray, ray.t_max)
-    walk = _Walk()
-    if record["kind"] == SHADOW:
-        walk.watch(lambda: geometries.occluded(scene.geometry, ray))
-    else:
-        walk.watch(lambda: geometries.closest_hit(scene.geometry, ray))
-    if scene.geometry.bvh is None:
-        walk.tests = sum(len(table.owner) for table in scene.geometry.shapes if table is not None)
-    return record | {"steps": walk.steps, "tests": walk.tests}
+    return record | _met(ray, record["kind"] == SHADOW, scene)
 
 
-class _Walk(_Frames):
-    """steps: the nodes that a ray meets, as (node, box);  tests: primitives that are tested."""
+def _met(ray: Ray, any_hit: bool, scene: SceneTables) -> dict[str, Any]:
+    """The `steps` and `tests` of a ray that is traced alone."""
+    geometry = scene.geometry
+    if geometry.bvh is None:
+        count = sum(len(table.owner) for table in geometry.shapes if table is not None)
+        return {"steps": [], "tests": count}
+    steps: list[tuple[int, Any]] = []
+    tests: list[int] = []
+    boxes: dict[int, Any] = {}
 
-    def __init__(self) -> None:
-        self.steps: list[tuple[int, tuple[float, ...] | None]] = []
-        self.tests = 0
-        self._boxes: dict[int, tuple[float, ...] | None] = {}
-        self.handlers = {
-            _code(enter): self._enter,
-            _code(nearer_primitive): self._primitive,
-            _code(nearest_of_triangle_leaf): self._leaf,
-        }
-
-    def _enter(self, own: Any, caller: CodeType, outer: Any, result: int) -> None:
-        bvh, node = own["bvh"], own["node"]
-        if outer["instance"] >= 0:
-            self.steps.append((node, None))
+    def entered(r: _Return) -> None:
+        bvh, node = r.own["bvh"], r.own["node"]
+        if r.outer["instance"] >= 0:
+            steps.append((node, None))
             return
         center = bvh.frames[0 if node != bvh.unbounded else node, CENTER : CENTER + 3]
         planes = bvh.boxes[node, :CHILDREN].reshape(2, 3, VECTOR_WIDTH) + center[:, None]
         for lane in range(VECTOR_WIDTH):
-            self._boxes[child_of(bvh, node, lane)] = (*planes[0, :, lane], *planes[1, :, lane])
-        whole = (*planes[0].min(axis=1), *planes[1].max(axis=1))
-        self.steps.append((node, self._boxes.get(node, whole)))
+            boxes[child_of(bvh, node, lane)] = (*planes[0, :, lane], *planes[1, :, lane])
+        steps.append((node, boxes.get(node, (*planes[0].min(axis=1), *planes[1].max(axis=1)))))
 
-    def _primitive(self, own: Any, caller: CodeType, outer: Any, result: Hit) -> None:
-        self.tests += 1
-
-    def _leaf(self, own: Any, caller: CodeType, outer: Any, result: Hit) -> None:
-        self.tests += size_of(own["node"])
+    query = geometries.occluded if any_hit else geometries.closest_hit
+    handlers: dict[Any, Callable[[_Return], Any]] = {
+        enter: entered,
+        nearer_primitive: lambda r: tests.append(1),
+        nearest_of_triangle_leaf: lambda r: tests.append(size_of(r.own["node"])),
+    }
+    _watch(lambda: query(geometry, ray), handlers)
+    return {"steps": steps, "tests": sum(tests)}

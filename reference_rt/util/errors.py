@@ -20,66 +20,39 @@ _MOST_KEYS = 16
 """The most keys of a path into a scene that a message shows; the middle ones are left out."""
 
 
-_OURS = {
-    "albedo": "reflectance base_colour",
-    "area_light": "emissive",
-    "background": "lights",
-    "bounces": "max_depth",
-    "brightness": "radiance intensity irradiance",
-    "circle": "disk",
-    "color": "reflectance base_colour radiance intensity irradiance",
-    "colour": "reflectance base_colour radiance intensity irradiance",
-    "cube": "box",
-    "depth": "max_depth",
-    "diffuse_color": "reflectance base_colour diffuse",
-    "disney": "principled",
-    "emission": "radiance intensity irradiance",
-    "emitter": "emissive",
-    "envmap": "environment_map",
-    "filename": "file",
-    "from": "eye origin position",
-    "glass": "dielectric",
-    "gltf": "mesh",
-    "hdri": "environment_map",
-    "index": "interior_ior eta",
-    "intensity": "radiance irradiance",
-    "ior": "interior_ior eta",
-    "lambertian": "diffuse",
-    "light": "emissive lights",
-    "location": "eye position center origin",
-    "look_at": "target",
-    "lookat": "target",
-    "matte": "diffuse",
-    "max_bounces": "max_depth",
-    "metal": "conductor",
-    "obj": "mesh",
-    "objects": "shapes",
-    "origin": "eye position",
-    "path_tracer": "path",
-    "pathtracer": "path",
-    "ply": "mesh",
-    "position": "eye origin center",
-    "power": "intensity radiance irradiance",
-    "quad": "rectangle",
-    "radiance": "intensity irradiance",
-    "resolution": "width+height",
-    "rotation": "transform",
-    "roughness": "alpha",
-    "--samples": "--spp",
-    "samples": "spp",
-    "samples_per_pixel": "spp",
-    "scale": "transform",
-    "size": "width+height",
-    "--resolution": "--size",
-    "sky": "constant",
-    "specular": "mirror",
-    "sun": "directional",
-    "to": "target",
-    "translate": "transform",
-    "world": "shapes",
-}
-"""Words of other programs, and of beginners: ours in their place, the first that is possible; with
-a plus between those of two keys."""
+_OURS = """
+eye origin center: position location origin from
+target: look_at lookat to
+reflectance base_colour radiance intensity irradiance: color colour albedo
+radiance intensity irradiance: emission brightness power intensity radiance
+alpha: roughness
+interior_ior eta: ior index
+file: filename
+spp: samples samples_per_pixel
+--spp: --samples
+--size: --resolution
+width+height: resolution size
+max_depth: max_bounces bounces depth
+transform: translate rotation scale
+shapes: objects world
+lights: background
+box: cube
+disk: circle
+rectangle: quad
+mesh: obj ply gltf
+diffuse: lambertian matte
+dielectric: glass
+conductor: metal
+mirror: specular
+principled: disney
+emissive lights: light emitter area_light
+directional: sun
+constant: sky
+environment_map: envmap hdri
+path: path_tracer pathtracer
+"""
+"""Our words, and those of other programs and of beginners for the same.  Of several of ours the
+first that is possible is meant; a plus joins two keys that are both meant."""
 
 
 def meant(name: str, known: Iterable[str]) -> str:
@@ -91,8 +64,10 @@ def meant(name: str, known: Iterable[str]) -> str:
 def meant_by(name: str, known: Iterable[str]) -> list[str]:
     """The known names, mostly one, that mean the same as `name`, or the one that is near."""
     known = [*known]
-    words = [one.split("+") for one in _OURS.get(name.lower(), "").split()]
-    same = [word for word in words if {*word} <= {*known}]
+    lines = [line.split(":") for line in _OURS.strip().splitlines()]
+    ours = [word for word, theirs in lines if name.lower() in theirs.split()]
+    words = [word.split("+") for word in " ".join(ours).split()]
+    same = [word for word in words if {*word} <= {*known} and word != [name]]
     return same[0] if same else difflib.get_close_matches(name, known, n=1)
 
 

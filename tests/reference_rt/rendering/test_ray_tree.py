@@ -61,6 +61,7 @@ def rendered(prepared, x, y, sample):
     return done.sums["colour"][0]
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("case", CASES)
 def test_a_tree_adds_up_to_the_rendered_sample(case, tmp_path):
     """Bit for bit: the traced contributions, times the filter's weight, are the sum of the sample
