@@ -10,7 +10,7 @@ Each ray is a dictionary:
   end it begins, None for the camera's;  depth: edges before it;
 - o, d, t_max;  t, end: where it ends, None where it hits nothing;
 - weight: the share of its radiance in the sample: of a path the throughput;
-- hit: shape, copy, part, face, material, p, n of the surface, None for a miss;  of a shadow ray
+- hit: shape, instance, part, face, material, p, n of the surface, None for a miss;  of a shadow ray
   instead occluded;
 - adds: (what, value) of each term that it adds to the sample's radiance;
 - numbers: by name, the pdfs, MIS weights and probabilities behind these terms;
@@ -25,6 +25,7 @@ import inspect
 import math
 import os
 import pickle
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -73,9 +74,9 @@ def ray_trees(scene: BuiltScene, places: Sequence[tuple[int, int, int]]) -> list
     asked = [((film.width * y + x), sample) for x, y, sample in places]
     is_cast = isinstance(scene.integrator, RayCast)
     done = subprocess.run(
-        [sys.executable, "-c", f"from {__name__} import _answer; _answer()"],
+        [sys.executable, "-P", "-c", f"from {__name__} import _answer; _answer()"],
         input=pickle.dumps((is_cast, jobs_of(scene)[0].arguments(*given), asked)),
-        env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(sys.path)},
         stdout=subprocess.PIPE,
         check=True,
     )
@@ -85,6 +86,7 @@ def ray_trees(scene: BuiltScene, places: Sequence[tuple[int, int, int]]) -> list
 
 def _answer() -> None:
     """The second process: from the arguments of a kernel on standard input to trees."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # the first process says that it was interrupted
     is_cast, arguments, asked = pickle.load(sys.stdin.buffer)
     with np.errstate(all="ignore"):
         trees = [_tree(is_cast, arguments, *one) for one in asked]
