@@ -69,7 +69,7 @@ def test_a_tree_adds_up_to_the_rendered_sample(case, tmp_path):
     make, changes = CASES[case]
     scene = make(tmp_path).changed(**changes)
     film, spp = scene.film, 1 if isinstance(scene.integrator, rt.RayCast) else 2
-    places = [(x, y, (x + y) % spp) for x in (1, film.width // 2) for y in range(1, film.height)]
+    places = [(x, y, (x + y) % spp) for x in (1, film.width // 2) for y in range(1, film.height, 2)]
     trees, prepared = ray_trees(scene, places), Prepared(scene, threads=1)
     for tree, place in zip(trees, places, strict=True):
         expected = rendered(prepared, *place)
