@@ -27,8 +27,8 @@ from comparisons.commands.options import (
     out_folder,
 )
 from comparisons.results.rungs import COMPARED
-from reference_rt.cli.adjusted import Defaults, by_name
 from reference_rt.cli.guarded import guarded, say
+from reference_rt.cli.options import Defaults, by_name
 from reference_rt.util.errors import UsageError
 
 if TYPE_CHECKING:
@@ -179,7 +179,7 @@ def suite(
         from comparisons.results.case import exit_code
         from comparisons.suites.run import Options, Run, run_suite, summarise
         from comparisons.suites.suite import Changes, load_suite, plan
-    from reference_rt.cli.render_options import Where
+    from reference_rt.cli.options import Where
     from reference_rt.util.files import check_writable
     from reference_rt.util.workers import Threads
 

@@ -21,8 +21,8 @@ from comparisons.commands.options import (
     compare_extra,
 )
 from comparisons.commands.truth import truth_gate
-from reference_rt.cli.adjusted import Defaults, adjusted, by_name
 from reference_rt.cli.guarded import guarded, say
+from reference_rt.cli.options import Defaults, adjusted, by_name
 from reference_rt.util.errors import ReferenceRtError, SceneError, UsageError, printable
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ def gate(
         from comparisons.gate.driver import Command, Driver
         from comparisons.gate.gate import not_run
         from comparisons.gate.pictures_in import read_candidates
-        from comparisons.gate.reference import is_noise_free
+        from comparisons.gate.reference import SizeError, is_noise_free
         from comparisons.gate.request import Request, gated
         from comparisons.gate.rounds import Rounds, gated_renderer
         from comparisons.renderers import witness_facts
@@ -239,7 +239,10 @@ def gate(
     except UsageError:
         raise
     except ReferenceRtError as error:
-        case, failed = not_run(name, error), error
+        failed = error
+        if isinstance(error, SizeError) and command and size and "{width}" not in command:
+            failed = SizeError(f"{error}; pass {{width}} and {{height}} to it in --command")
+        case = not_run(name, failed)
     else:
         case = replace(case, seconds={"candidate": {"render": driver.seconds}} if driver else {})
     trace = "" if scene is None else trace_command(scene, size, by_name(define))

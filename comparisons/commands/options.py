@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from reference_rt.cli.render_options import ClusterFile as ClusterFile
-from reference_rt.cli.render_options import Scheduler as Scheduler
+from reference_rt.cli.options import ClusterFile as ClusterFile
+from reference_rt.cli.options import Scheduler as Scheduler
 from reference_rt.util.errors import ReferenceUnavailableError
 
 # ---- the message of a command whose Python packages, the extra `compare`, are not installed ------

@@ -19,8 +19,8 @@ from comparisons.commands.options import (
     out_folder,
     table_in,
 )
-from reference_rt.cli.adjusted import Defaults, by_name
 from reference_rt.cli.guarded import guarded, say
+from reference_rt.cli.options import Defaults, by_name
 from reference_rt.util.errors import SceneError, UsageError, printable
 
 
@@ -190,7 +190,7 @@ def converge(
         from comparisons.runs.elsewhere import run_elsewhere
         from comparisons.runs.provenance import provenance
         from comparisons.suites.suite import Changes, folder_name
-    from reference_rt.cli.render_options import Where
+    from reference_rt.cli.options import Where
     from reference_rt.util.console import ProgressLine
     from reference_rt.util.files import check_writable
     from reference_rt.util.workers import Processes

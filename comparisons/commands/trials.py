@@ -51,7 +51,7 @@ def selftest(
     cluster: ClusterFile = None,
 ) -> None:
     """Test the harness: plant faults and check that the suites catch them; count false alarms."""
-    from reference_rt.cli.render_options import Where
+    from reference_rt.cli.options import Where
     from reference_rt.util.workers import Processes
 
     where = Where(workers, scheduler, cluster)
@@ -162,7 +162,7 @@ def stability(
         from comparisons.runs.provenance import ours, provenance
 
         import_module("matplotlib")  # before minutes of measuring that the page then cannot show
-    from reference_rt.cli.render_options import Where
+    from reference_rt.cli.options import Where
     from reference_rt.util.files import check_writable
     from reference_rt.util.workers import Threads
 
@@ -298,7 +298,7 @@ def fuzz(
         from comparisons.experiments.fuzz.run import Plan, run
         from comparisons.experiments.fuzz.summary import Display, write_page
         from comparisons.runs.provenance import provenance
-    from reference_rt.cli.render_options import Where
+    from reference_rt.cli.options import Where
     from reference_rt.util.files import check_writable
     from reference_rt.util.workers import Threads
 

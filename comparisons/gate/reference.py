@@ -133,14 +133,18 @@ def of_files(references: Sequence[Picture], variance: Path | None, noise_free: b
     return Reference(pictures, spread, noise_free, notes=notes, fingerprints=prints)
 
 
+class SizeError(ImageError):
+    """A picture has another size than the reference."""
+
+
 def check_sizes(candidates: Sequence[Picture], expected: str, whose: str) -> None:
-    """Raise ImageError for the first candidate that is not `expected`, "width x height"."""
+    """Raise SizeError for the first candidate that is not `expected`, "width x height"."""
     if not candidates:
         raise UsageError("there is no candidate; expected at least one")
     for picture in candidates:
         size = size_of(picture.radiance)
         if size != expected:
-            raise ImageError(f"{picture.name}: is {size} pixels; expected {expected}, {whose}")
+            raise SizeError(f"{picture.name}: is {size} pixels; expected {expected}, {whose}")
 
 
 def usable(pictures: Sequence[Picture]) -> FloatArray:

@@ -12,7 +12,7 @@ from typing import Annotated, NamedTuple, Self
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from comparisons.compare.budget import Budget
-from reference_rt.cli.adjusted import adjusted
+from reference_rt.cli.options import adjusted
 from reference_rt.core.model import Description, Positive
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene import yaml_text
@@ -24,7 +24,7 @@ from reference_rt.util.files import read_text
 
 
 class Changes(BaseModel):
-    """Changes to a scene by command-line options; see `reference_rt.cli.adjusted.adjusted`."""
+    """Changes to a scene by command-line options; see `reference_rt.cli.options.adjusted`."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

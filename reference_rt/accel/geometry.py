@@ -23,17 +23,21 @@ from reference_rt.accel.single_ray import (
     nearest_child,
     slab_ray_of,
 )
+from reference_rt.core.arrays import IntArray
 from reference_rt.core.ray import Hit, Ray, SurfacePoint, no_hit
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.function_pointer import FunctionPointer
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.links import Linkable
 from reference_rt.jit.simd import VECTOR_WIDTH
-from reference_rt.shapes import Packets, Shapes
+from reference_rt.shapes import TABLES, Packets, Shapes
 from reference_rt.shapes.csg import Parts, Solids, out_of_solid, ray_near
+from reference_rt.shapes.dispatch import primitive_count
 from reference_rt.shapes.instances import Instances, out_of, ray_in, tangents_out_of
 from reference_rt.shapes.meshes.watertight import PROJECTION_FLOATS, Shear, shear_of
 from reference_rt.shapes.shape import Tangents
+
+KINDS = len(TABLES)
 
 STACK = 2 * WIDE_STACK + VECTOR_WIDTH + 1
 """Entries of the traversal stack: for the scene's BVH, for one group's, for the instances of a leaf
@@ -77,7 +81,28 @@ def _trace(geometry: Geometry, ray: Ray, any_hit: bool) -> Hit:
         # For a few shapes an early exit of any-hit rays would cost more than it saves.
         found: Hit = any_shape.nearest(geometry.shapes, geometry.packets, ray)
         return found
-    return _traverse(geometry, ray, any_hit)
+    return _traverse(geometry, ray, any_hit, None)
+
+
+class Cost(NamedTuple):
+    """steps: the nodes whose boxes a ray is tested against;  tests: the primitives, a solid as
+    one."""
+
+    steps: int
+    tests: int
+
+
+@geometries.operation
+def traversal_cost(geometry: Geometry, ray: Ray) -> Cost:
+    """What `closest_hit` takes for a ray."""
+    counts = local_integers(2)
+    counts[0], counts[1] = 0, 0
+    if geometry.bvh is None:
+        for kind in range(KINDS):
+            counts[1] += primitive_count(geometry.shapes, kind)
+    else:
+        _traverse(geometry, ray, False, counts)
+    return Cost(counts[0], counts[1])
 
 
 class LocalRay(NamedTuple):
@@ -99,10 +124,10 @@ def local_ray(bvh: Bvh, instances: Instances | None, instance: int, ray: Ray) ->
 
 
 @kernel
-def _traverse(geometry: Geometry, ray: Ray, any_hit: bool) -> Hit:
+def _traverse(geometry: Geometry, ray: Ray, any_hit: bool, counts: IntArray | None) -> Hit:
     """Depth first, the nearest child first.  The stack holds the other children (`stack`), the t at
     which the ray enters their boxes (`waiting`) and the instance in whose space they are
-    (`space`)."""
+    (`space`).  counts: see `Cost`; None compiles to nothing."""
     bvh: Any = geometry.bvh
     instances: Any = geometry.instances
     shapes = geometry.shapes
@@ -118,6 +143,8 @@ def _traverse(geometry: Geometry, ray: Ray, any_hit: bool) -> Hit:
     while True:
         while node >= 0:
             met = enter(bvh, node, local.slab_ray, closest.t, distances)
+            if counts is not None:
+                counts[0] += 1
             bottom = top
             if met == 0:
                 node = NOTHING
@@ -129,6 +156,8 @@ def _traverse(geometry: Geometry, ray: Ray, any_hit: bool) -> Hit:
                 for k in range(bottom, top):
                     space[k] = instance
         if is_triangle_leaf(node):
+            if counts is not None:
+                counts[1] += size_of(node)
             closest = nearest_of_triangle_leaf(
                 bvh.corners, bvh, shapes, node, local.shear, seen, instance, closest
             )
@@ -141,6 +170,8 @@ def _traverse(geometry: Geometry, ray: Ray, any_hit: bool) -> Hit:
                         stack[top], waiting[top], space[top] = instances.root[row], 0.0, row
                         top += 1
                         continue
+                if counts is not None:
+                    counts[1] += 1
                 closest = nearer_primitive(
                     bvh,
                     shapes,

@@ -13,19 +13,17 @@ from reference_rt.accel.crossing_order import (
     nothing_at,
     ordered_crossing,
 )
-from reference_rt.accel.geometry import STACK, Geometry, geometries, local_ray
+from reference_rt.accel.geometry import KINDS, STACK, Geometry, geometries, local_ray
 from reference_rt.accel.leaf import INSTANCE, SOLID
 from reference_rt.accel.single_ray import can_be_nearer, enter, nearest_child
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Hit, Ray
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.simd import VECTOR_WIDTH
-from reference_rt.shapes import TABLES, Shapes
+from reference_rt.shapes import Shapes
 from reference_rt.shapes.csg import Solids
 from reference_rt.shapes.dispatch import MAX_CROSSINGS, along, primitive_count
 from reference_rt.shapes.meshes.watertight import Shear, shear_of
-
-KINDS = len(TABLES)
 
 
 @geometries.operation

@@ -255,7 +255,9 @@ def film_offset(setup: Any, u: float) -> tuple[float, float]:
     return dx, weight
 
 
-LayerName = Literal["albedo", "normal", "position", "depth", "id", "variance"]
+LayerName = Literal[
+    "albedo", "normal", "position", "depth", "id", "variance", "bvh_steps", "intersections"
+]
 
 
 def _each_once(value: Any) -> Any:
@@ -285,5 +287,7 @@ class Film(Description):
     and normal maps, and position, the point in the world.  For the ray through the centres of pixel
     and lens: depth, the distance from the eye, inf for a miss, and id, the shape's index, -1 for a
     miss.  variance: of the pixel's mean, estimated from its samples; for `sobol` and `grid`, whose
-    samples are stratified, an upper estimate.  Ray casting writes its own layers instead.
+    samples are stratified, an upper estimate.  For the ray through the
+    centres, what it costs: bvh_steps, the nodes of the hierarchy whose boxes it is tested against,
+    and intersections, the primitives.  Ray casting writes its own layers, and these two.
     """

@@ -340,6 +340,7 @@ _OPERATIONS = {
     "sample": "samples",
     "sample_fixed": "light of fixed points",
     "surface": "surface points",
+    "traversal_cost": "what rays cost",
     "uv": "texture coordinates",
 }
 """Operations whose names say too little."""
@@ -358,6 +359,7 @@ _DRIVERS = {
     "render_tile": "driver of the picture",
     "first_hits_tile": "driver of albedo and normal",
     "aov_tile": "driver of ray casting",
+    "cost_tile": "driver of what rays cost",
 }
 
 

@@ -2,6 +2,7 @@
 
 import errno
 import functools
+import inspect
 import re
 import warnings
 from collections.abc import Callable, Iterator
@@ -56,6 +57,9 @@ def guarded(command: F) -> F:
             message = " ".join(str(error).split())
             _fail(f"internal error: {type(error).__name__}: {message}; please report it", 5)
 
+    # Typer breaks lines where the source does, besides at the terminal's width.
+    paragraphs = inspect.cleandoc(command.__doc__ or "").split("\n\n")
+    run.__doc__ = "\n\n".join(" ".join(one.split()) for one in paragraphs)
     return run  # type: ignore[return-value]
 
 

@@ -7,17 +7,34 @@ import os
 import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+import typer.core
 
-from reference_rt.cli import render_options
-from reference_rt.cli.adjusted import Defaults, SceneArgument, adjusted, by_name, without_blas
+from reference_rt.cli import options
 from reference_rt.cli.guarded import guarded, is_output_lost, lost_output, say
-from reference_rt.util.errors import ImageError
+from reference_rt.cli.options import Defaults, SceneArgument, adjusted, by_name, without_blas
+from reference_rt.util.errors import ImageError, meant_by
 from reference_rt.util.processes import catch_signals, exit_code_of
 
+
+class _Commands(typer.core.TyperGroup):
+    """Says what is meant by an option that there is not."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except Exception as found:
+            error: Any = found
+            if type(error).__name__ == "NoSuchOption" and error.ctx is not None:
+                known = [name for option in error.ctx.command.params for name in option.opts]
+                error.possibilities = meant_by(error.option_name, known)
+            raise
+
+
 app = typer.Typer(
+    cls=_Commands,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     help="An independent float64 reference ray tracer.\n\nExit codes: 0 success or agreement, "
@@ -62,24 +79,24 @@ def render(
     seed: Annotated[int | None, typer.Option(help="Seed of the random numbers.")] = None,
     threads: Threads = None,
     define: Defaults = None,
-    time_limit: render_options.TimeLimit = None,
-    target_error: render_options.TargetError = None,
-    checkpoint: render_options.CheckpointFolder = None,
-    no_checkpoint: render_options.NoCheckpoint = False,
-    resume: render_options.Resume = False,
-    more_spp: render_options.MoreSpp = None,
-    preview: render_options.Preview = None,
-    memory: render_options.Memory = None,
-    workers: render_options.NumberOfWorkers = None,
-    scheduler: render_options.Scheduler = None,
-    cluster: render_options.ClusterFile = None,
+    time_limit: options.TimeLimit = None,
+    target_error: options.TargetError = None,
+    checkpoint: options.CheckpointFolder = None,
+    no_checkpoint: options.NoCheckpoint = False,
+    resume: options.Resume = False,
+    more_spp: options.MoreSpp = None,
+    preview: options.Preview = None,
+    memory: options.Memory = None,
+    workers: options.NumberOfWorkers = None,
+    scheduler: options.Scheduler = None,
+    cluster: options.ClusterFile = None,
 ) -> None:
     """Render a scene to a file.
 
     Ctrl-C writes the picture so far, marked as partial in its header.
     """
+    from reference_rt.cli.options import Where
     from reference_rt.cli.render import Limited, Stored, render_to_file
-    from reference_rt.cli.render_options import Where
     from reference_rt.rendering.image import check_suffix
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.files import check_writable
@@ -118,17 +135,71 @@ def preview(
     ] = "1%",
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Default: all cores.")] = None,
+    watch: Annotated[
+        bool,
+        typer.Option("--watch", help="Begin again whenever the scene or one of its files changes."),
+    ] = False,
     define: Defaults = None,
 ) -> None:
     """Show a picture of a scene that becomes less noisy until it is closed or interrupted."""
     from reference_rt.cli import preview as previews
-    from reference_rt.cli.render_options import share_of
+    from reference_rt.cli.options import share_of
     from reference_rt.rendering.scene import Scene
 
-    loaded = adjusted(Scene.load(scene, by_name(define)), size=size)
+    def load() -> Scene:
+        return adjusted(Scene.load(scene, by_name(define)), size=size)
+
+    loaded = load()
     view = previews.view_of(to, loaded)
+    wanted = previews.Wanted(spp, share_of(target_error, "--target-error"), threads)
     with without_blas():
-        previews.preview(loaded, view, spp, share_of(target_error, "--target-error"), threads)
+        if watch:
+            previews.watch(load, scene, view, wanted)
+        else:
+            previews.preview(loaded, view, wanted)
+
+
+@app.command()
+@guarded
+def trace(
+    scene: SceneArgument,
+    pixel: Annotated[
+        str, typer.Option(metavar="X,Y", help="Column and row, from 0 on the left and the top.")
+    ],
+    sample: Annotated[int, typer.Option(min=0, help="Which of the pixel's samples.")] = 0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Also write a page that draws the rays in the scene."),
+    ] = None,
+    spp: Annotated[int | None, typer.Option(help="Samples per pixel.")] = None,
+    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
+    integrator: Annotated[
+        str | None, typer.Option(help="ray_cast, whitted, direct or path.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the random numbers.")] = None,
+    define: Defaults = None,
+) -> None:
+    """Show the rays of one sample of a pixel: what they hit, and what each adds to its value.
+
+    The numbers are those of `render`, to the last bit.
+    """
+    from reference_rt.cli import trace as tracing
+    from reference_rt.rendering.scene import Scene
+    from reference_rt.util.files import check_writable
+
+    loaded = adjusted(Scene.load(scene, by_name(define)), spp, size, integrator, seed)
+    if out is not None:
+        check_writable(out)
+    with without_blas():
+        tree = tracing.traced(loaded, pixel, sample)
+        if as_json:
+            typer.echo(tracing.as_json(tree))
+        else:
+            tracing.print_tree(loaded, tree)
+        if out is not None:
+            tracing.write_page(loaded, tree, out)
+            say(f"{out}: {len(tree['rays'])} rays", err=True)
 
 
 @app.command()

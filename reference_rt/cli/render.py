@@ -1,5 +1,6 @@
 """`reference-rt render`: a picture in a file, with limits, checkpoints and previews."""
 
+import itertools
 import math
 import time
 from contextlib import suppress
@@ -7,7 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from reference_rt.cli.render_options import (
+import numpy as np
+
+from reference_rt.cli.options import (
     Where,
     bytes_of,
     duration,
@@ -19,8 +22,11 @@ from reference_rt.jit.kernel_cache import cache_root
 from reference_rt.rendering import image
 from reference_rt.rendering.framebuffer import delete_old
 from reference_rt.rendering.loop import Limits
+from reference_rt.rendering.query import intersect
 from reference_rt.rendering.render import Session, Storage
 from reference_rt.rendering.scene import Scene
+from reference_rt.scene.build import BuiltScene
+from reference_rt.scene.likely_mistakes import likely_mistakes
 from reference_rt.util.console import ProgressLine
 from reference_rt.util.errors import ImageError, UsageError
 from reference_rt.util.files import check_writable
@@ -156,10 +162,29 @@ def _write(session: Session, output: Path, limits: Limits, code: int) -> str:
             + (", ..." if found.nonfinite > len(found.places) else "")
         )
     if found.black:
-        session.scene.warn("the picture is black: no light reaches the camera", "camera")
+        _warn_of_black(session.scene)
     if code:
         return f"interrupted; {output} is partial, {taken.partial}{goes_on}"
     return text + _reached(session, limits)
+
+
+def _warn_of_black(scene: BuiltScene) -> None:
+    """Issue a warning of a black picture, with its cause, unless one has said why already."""
+    if likely_mistakes(scene, scene.tables):
+        return
+    around = np.array([*itertools.product((-1.0, 0.1, 0.9), repeat=3)])
+    seen = intersect(scene.tables, scene.camera.eye, around)
+    leaving = seen.shape[(seen.n * around).sum(axis=1) > 0.0]
+    shape = int(np.bincount(leaving, minlength=1).argmax())
+    if (seen.shape >= 0).all() and np.count_nonzero(leaving == shape) > len(around) // 2:
+        kind = scene.shapes[shape].type
+        scene.warn(
+            f"the picture is black: the eye is inside shapes[{shape}], a {kind}; expected it "
+            "outside, or a light inside",
+            *("camera", "eye"),
+        )
+    else:
+        scene.warn("the picture is black: no light reaches the camera", "camera")
 
 
 def _reached(session: Session, limits: Limits) -> str:

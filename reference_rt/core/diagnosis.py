@@ -1,7 +1,7 @@
 """Validation errors for users: pydantic's error as one line, with the keys that lead to it."""
 
 import reprlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -24,8 +24,22 @@ _PLAIN = {
     "model_attributes_type": "keys with values",
     "dict_type": "keys with values",
     "tuple_type": "a list",
+    "string_type": "text",
 }
 """What is expected, for errors that pydantic words in terms of Python's types."""
+
+_NAMED = {
+    **dict.fromkeys(("material", "base", "back", "first", "second"), "materials"),
+    "group": "groups",
+    **dict.fromkeys(("texture", "height", "normals"), "textures"),
+}
+"""The part of the scene that has what a field names."""
+
+_ELSEWHERE = {
+    "area": "a lamp is a shape whose material has the type 'emissive'",
+    "spp": "samples per pixel are set in 'sampler', such as {type: sobol, spp: 64}",
+}
+"""Keys and types that are expected in another part of a scene."""
 
 
 MOST = 20
@@ -56,7 +70,7 @@ def _problem(model: type[BaseModel], first: Any, data: Any) -> tuple[str, Keys]:
         return message, (*keys, cause.field)
     if first["type"] == "extra_forbidden":
         known = _models_at(model, location[:-1])[0].__pydantic_fields__
-        near = meant(str(location[-1]), known)
+        near = _instead(str(location[-1]), known)
         message = f"unknown key; expected one of: {', '.join(known)}{near}"
     elif first["type"] == "missing":
         message = "missing; expected a value"
@@ -64,7 +78,7 @@ def _problem(model: type[BaseModel], first: Any, data: Any) -> tuple[str, Keys]:
         message = f"missing 'type'; expected one of: {_types(_models_at(model, location))}"
     elif first["type"] == "union_tag_invalid":
         known_types, tag = _types(_models_at(model, location)), first["ctx"]["tag"]
-        near = meant(tag, known_types.split(", "))
+        near = _instead(tag, known_types.split(", "))
         shown = tag if len(tag) <= _MOST_SHOWN else f"{tag[:_MOST_SHOWN]}..."
         message = f"unknown type '{shown}'; expected one of: {known_types}{near}"
     elif first["type"] == "too_long":
@@ -74,13 +88,39 @@ def _problem(model: type[BaseModel], first: Any, data: Any) -> tuple[str, Keys]:
     elif first["type"].startswith("recursion"):
         message = "nested too deeply; expected fewer levels"
     elif first["type"] in _PLAIN:
-        message = f"expected {_PLAIN[first['type']]}, got {_shown(first['input'])}"
+        expected = _PLAIN[first["type"]] + _such_as(model, first)
+        if first["type"] == "string_type" and keys and keys[-1] in _NAMED:
+            expected = f"the name of one of '{_NAMED[str(keys[-1])]}'"
+        message = f"expected {expected}"
+        message += f", got {_shown(first['input'])}"
     elif first["type"] == "transform_step" and isinstance(first["input"], dict):
         message += f", got {_shown(list(first['input']))}"
     elif not isinstance(first["input"], dict | BaseModel) and "got " not in message:
         joint = "; " if {":", ";"} & set(message) else ", "
         message += f"{joint}got {_shown(first['input'])}"
     return message, keys
+
+
+def _instead(word: str, known: Iterable[str]) -> str:
+    """What to write in place of a key or a type; nothing where that is unknown."""
+    return f"; {_ELSEWHERE[word]}" if word in _ELSEWHERE else meant(word, known)
+
+
+def _such_as(model: type[BaseModel], first: Any) -> str:
+    """An example of what is expected in place of a value of another type, made of that value."""
+    kind, value = first["type"], first["input"]
+    models = _models_at(model, first["loc"])
+    known = [name for name in map(_type_of, models) if name]
+    if kind == "tuple_type" and isinstance(value, dict):
+        fields = {name for one in models for name in one.__pydantic_fields__}
+        items = [value, *value.values()]
+        fitting = [one for one in items if isinstance(one, dict) and fields.issuperset(one)]
+        return f", such as [{_shown(fitting[0])}]" if fitting else ""
+    if kind == "dict_type" and known:
+        return f" by name, such as {{a: {{type: {known[0]}}}}}"
+    if kind.startswith("model") and known:
+        return f", such as {{type: {value if value in known else known[0]}}}"
+    return f": {', '.join(models[0].__pydantic_fields__)}" if kind.startswith("model") else ""
 
 
 def _items(count: int) -> str:

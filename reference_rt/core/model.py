@@ -10,11 +10,23 @@ import inspect
 import json
 import math
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, get_args, get_origin
+from textwrap import fill
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    Self,
+    cast,
+    get_args,
+    get_origin,
+)
 
 import numpy as np
 import numpy.typing as npt
@@ -196,7 +208,57 @@ def _fields(cls: ast.ClassDef) -> dict[str, str]:
     }
 
 
-class Description(BaseModel):
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+else:
+    ModelMetaclass = type(BaseModel)
+
+
+class _Helped(ModelMetaclass):
+    """What `help` shows of a description: its fields and what they mean, and the names of its
+    methods, in place of the hundred methods and attributes of pydantic."""
+
+    @property
+    def __doc__(self) -> str:  # type: ignore[override]
+        text = inspect.cleandoc(vars(self).get("__doc__") or "")
+        if "__pydantic_fields__" not in vars(self):
+            return text  # while the class is made
+        fields = vars(self)["__pydantic_fields__"]
+        parts = [
+            f"{name}: {' '.join(meaning.split())}"
+            for name, meaning in field_texts(cast(type[BaseModel], self)).items()
+            if name != "type"
+        ]
+        if "type" not in fields:  # the methods of others are for the tables
+            own = {n: None for base in self.__mro__ if base is not Description for n in vars(base)}
+            hidden = {*dir(BaseModel), *fields}
+            methods = [n for n in own if n[0] != "_" and n not in hidden]
+            parts += [f"methods: {', '.join(methods)}"] if methods else []
+        return "\n".join([text, "", *(fill(p, 98, subsequent_indent="    ") for p in parts)])
+
+    @property
+    def __signature__(self) -> inspect.Signature:
+        """Names and defaults; the types, those of pydantic, would take a page."""
+        empty, fields = inspect.Parameter.empty, cast(type[BaseModel], self).__pydantic_fields__
+        defaults = {
+            name: empty if field.is_required() else field.get_default(call_default_factory=True)
+            for name, field in fields.items()
+        }
+        kind = inspect.Parameter.KEYWORD_ONLY
+        return inspect.Signature(
+            [inspect.Parameter(name, kind, default=one) for name, one in defaults.items()]
+        )
+
+    @__signature__.setter
+    def __signature__(self, own: object) -> None:
+        """Pydantic sets one."""
+
+    def __dir__(self) -> Any:
+        is_help = sys._getframe(1).f_code is inspect.classify_class_attrs.__code__
+        return [] if is_help else super().__dir__()
+
+
+class Description(BaseModel, metaclass=_Helped):
     """A frozen part of a scene.  Unknown keys, wrong types, NaN and infinity are errors.
 
     In Python, arrays, NumPy scalars and paths may replace lists, numbers and strings.  Every error
@@ -268,6 +330,7 @@ class Description(BaseModel):
     ) -> dict[str, Any]:
         """The JSON Schema, with the docstrings below the fields as their descriptions."""
         schema = handler(core_schema)
+        handler.resolve_ref_schema(schema)["description"] = inspect.cleandoc(vars(cls)["__doc__"])
         properties = handler.resolve_ref_schema(schema).get("properties", {})
         for field, text in field_texts(cls).items():
             if field in properties:
@@ -297,6 +360,18 @@ def _three_numbers(value: Any) -> Any:
         raise ValueError("expected finite numbers") from None
 
 
+_HEX = re.compile("#[0-9a-fA-F]{6}")
+
+
+def as_linear(value: Any) -> str:
+    """Of a colour as web pages write it, "#aabbcc": ", here [r, g, b]"; else nothing."""
+    if not isinstance(value, str) or not _HEX.fullmatch(value):
+        return ""
+    encoded = [int(value[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]
+    rgb = [x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4 for x in encoded]
+    return f", here [{', '.join(f'{x:.3g}' for x in rgb)}]"
+
+
 def colour(value: Any) -> Any:
     """Linear sRGB of at least 0 from one number or three.  Raises ValueError."""
     if isinstance(value, int | float) and not isinstance(value, bool):
@@ -304,7 +379,8 @@ def colour(value: Any) -> Any:
     try:
         rgb = _three_numbers(value)
     except ValueError:
-        raise ValueError("expected one number or three [r, g, b] (linear sRGB)") from None
+        message = f"expected one number or three [r, g, b] (linear sRGB){as_linear(value)}"
+        raise ValueError(message) from None
     if not all(x >= 0.0 for x in rgb):  # also refuses NaN
         raise ValueError("expected numbers of at least 0")
     return rgb

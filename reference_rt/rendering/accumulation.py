@@ -15,7 +15,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators import INTEGRATORS, RayCast
 from reference_rt.integrators.path import PathSetup
 from reference_rt.integrators.scene_tables import LinkedScene
-from reference_rt.rendering.tiles import aov_tile, first_hits_tile, render_tile
+from reference_rt.rendering.tiles import aov_tile, cost_tile, first_hits_tile, render_tile
 from reference_rt.scene.build import BuiltScene
 
 Sums = dict[str, FloatArray]
@@ -35,6 +35,9 @@ _CENTRE_COLUMNS = {
 """What the AOV pass writes for each pixel: values, not sums."""
 
 _CENTRE_WIDTH = 10
+
+COSTS = {"bvh_steps": slice(0, 1), "intersections": slice(1, 2)}
+"""Layers of `cost_tile`, with its columns."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +82,12 @@ def jobs_of(scene: BuiltScene) -> list[Job]:
     def centres(tables: Any, view: Any, film_filter: Any) -> tuple[Any, ...]:
         return tables, view, shape
 
+    wanted = set(scene.film.layers)
+    asked: dict[str, slice] = {name: columns for name, columns in COSTS.items() if name in wanted}
+    costs = [Job(cost_tile, "cost", centres, (_CENTRE,), asked)] if asked else []
     if isinstance(scene.integrator, RayCast):
-        return [Job(aov_tile, "ray_cast", centres, (_CENTRE,), _CENTRE_COLUMNS)]
-    sampler, wanted = scene.resolved_sampler, set(scene.film.layers)
+        return [Job(aov_tile, "ray_cast", centres, (_CENTRE,), _CENTRE_COLUMNS), *costs]
+    sampler = scene.resolved_sampler
     has_variance = "variance" in wanted
     jobs = [radiance_job(scene.integrator.setup(), sampler, shape, has_variance)]
     if set(OF_FIRST_HITS) & wanted:
@@ -94,7 +100,7 @@ def jobs_of(scene: BuiltScene) -> list[Job]:
     if {"depth", "id"} & wanted:
         columns = {name: _CENTRE_COLUMNS[name] for name in ("distance", "id")}
         jobs.append(Job(aov_tile, "ray_cast", centres, (_CENTRE,), columns))
-    return jobs
+    return jobs + costs
 
 
 def radiance_job(setup: Any, sampler: Any, shape: tuple[int, int], has_variance: bool) -> Job:
@@ -113,9 +119,11 @@ def radiance_job(setup: Any, sampler: Any, shape: tuple[int, int], has_variance:
 
 def widths_of(scene: BuiltScene) -> dict[str, int]:
     """The names of a picture's sums, and the number of values that each has for a pixel."""
+    wanted = set(scene.film.layers)
+    costs = {name: 1 for name in COSTS if name in wanted}
     if isinstance(scene.integrator, RayCast):
-        return {name: k.stop - k.start for name, k in _CENTRE_COLUMNS.items()}
-    wanted, widths = set(scene.film.layers), {"colour": 3}
+        return {name: k.stop - k.start for name, k in _CENTRE_COLUMNS.items()} | costs
+    widths = {"colour": 3} | costs
     if "variance" in wanted:
         widths["m2"] = 3
     if set(OF_FIRST_HITS) & wanted:

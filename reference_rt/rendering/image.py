@@ -39,6 +39,8 @@ _CHANNELS: dict[str, tuple[str, ...]] = {
     "position": ("position.X", "position.Y", "position.Z"),
     "depth": ("depth.Z",),
     "variance": ("variance.R", "variance.G", "variance.B"),
+    "bvh_steps": ("bvh_steps.V",),
+    "intersections": ("intersections.V",),
 }
 
 
@@ -120,8 +122,9 @@ def display(picture: Layered) -> FloatArray:
 
     Radiance, albedo and variance: sRGB-encoded.  Distance and depth: from white (nearest) to dark
     grey.  Normals: (n + 1) / 2.  Position: each coordinate from 0 to 1 over what is hit.  Id: a
-    colour for each.  u and v: their fractional parts as red and green.  Misses of distances,
-    normals, positions and ids are black.
+    colour for each.  u and v: their fractional parts as red and green.  Of bvh_steps
+    and intersections: from blue for 0 by red to yellow for the most.  Misses of distances, normals,
+    positions and ids are black.
     """
     layer = picture.layers[picture.shown]
     if picture.shown in ("colour", "albedo", "variance"):
@@ -135,7 +138,16 @@ def display(picture: Layered) -> FloatArray:
         return _grey(_nearness(layer))
     if picture.shown == "uv":
         return np.concatenate([np.mod(layer, 1.0), np.zeros_like(layer[..., :1])], axis=-1)
+    if picture.shown in ("bvh_steps", "intersections"):
+        return _heat(layer)
     return _palette(layer.astype(np.int64))
+
+
+def _heat(values: FloatArray) -> FloatArray:
+    """From blue for 0 by red to yellow for the largest value."""
+    at = values / max(values.max(), 1.0)
+    ramps = (0.05, 0.45, 0.85, 1.0, 1.0), (0.05, 0.05, 0.25, 0.6, 1.0), (0.35, 0.55, 0.4, 0.1, 0.6)
+    return np.stack([np.interp(at, np.linspace(0.0, 1.0, 5), ramp) for ramp in ramps], axis=-1)
 
 
 def _spread(positions: FloatArray) -> FloatArray:

@@ -239,6 +239,8 @@ _COSTS = {
     "occluded": 0.6,
     "first_hits_tile": 0.4,
     "aov_tile": 0.4,
+    "cost_tile": 0.4,
+    "traversal_cost": 0.8,
 }
 _COST = 0.13
 _COST_SPECIALISED = 8.0

@@ -73,8 +73,8 @@ def linked_filter(linker: Linker, setup: Any) -> Link:
 
 
 def linked_scene(linker: Linker, tables: SceneTables, integrator: str) -> LinkedScene:
-    """A scene behind links.  integrator: `path`, `direct`, `whitted`, `first_hits` or `ray_cast`:
-    whose kernel takes it."""
+    """A scene behind links.  integrator: `path`, `direct`, `whitted`, `first_hits`, `ray_cast`
+    or `cost`: whose kernel takes it."""
     geometry, materials, lights = tables.geometry, tables.materials, tables.lights
     is_textured, is_oriented = tables.textures is not None, materials.oriented is not None
     textures = linked_textures(linker, tables.textures)
@@ -100,7 +100,9 @@ def _shapes(linker: Linker, tables: SceneTables, integrator: str) -> Link:
     geometry = tables.geometry
     blocks = integrator == "path"
     wanted = {"surface"}
-    if geometry.bvh is None:
+    if integrator == "cost":
+        wanted = {"primitive_count", "intersect", "owner", "face"}
+    elif geometry.bvh is None:
         wanted |= {"nearest_of_block", "complete_block"} if blocks else {"nearest_of_type"}
     else:
         wanted |= {"intersect", "owner", "face"}
@@ -115,7 +117,8 @@ def _shapes(linker: Linker, tables: SceneTables, integrator: str) -> Link:
     if tables.materials.oriented is not None:
         wanted |= {"tangents"}
     if tables.lights.areas is not None:
-        others = {"whitted": {"sample_fixed", "sample"}, "ray_cast": set(), "first_hits": set()}
+        others = {"whitted": {"sample_fixed", "sample"}}
+        others |= {name: set() for name in ("ray_cast", "first_hits", "cost")}
         wanted |= others.get(integrator, {"sample", "pdf"})
     return linked_shapes(linker, geometry.shapes, wanted)
 
@@ -139,6 +142,8 @@ def _geometry(
     wanted = {"closest_hits", "any_hits"} if integrator == "path" else {"closest_hit"}
     if integrator in ("direct", "whitted"):
         wanted |= {"occluded"}
+    if integrator == "cost":
+        wanted = {"traversal_cost"}
     if integrator == "ray_cast":
         wanted |= {"owner", "coordinates"}
     if geometry.parts is not None or geometry.instances is not None:

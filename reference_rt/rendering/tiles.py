@@ -10,7 +10,7 @@ import math
 from typing import Any, NamedTuple
 
 from reference_rt import sampling
-from reference_rt.accel.geometry import closest_hit
+from reference_rt.accel.geometry import closest_hit, traversal_cost
 from reference_rt.cameras import LENS_CENTRE, VIEWS, camera_ray, lens_sample
 from reference_rt.cameras.film import film_offset
 from reference_rt.core.arrays import FloatArray
@@ -277,3 +277,23 @@ def aov_tile(
         out[i, 3] = found.distance
         out[i, 4], out[i, 5], out[i, 6] = found.n
         out[i, 7], out[i, 8], out[i, 9] = found.id, found.u, found.v
+
+
+@entry_kernel
+def cost_tile(
+    scene: SceneTables,
+    view: Any,
+    shape: tuple[int, int],
+    out: FloatArray,
+    begin: int,
+    end: int,
+    first: int,
+    last: int,
+) -> None:
+    """What the rays of `aov_tile` cost, into the first two columns of out: see `geometry.Cost`."""
+    width, height = shape
+    for pixel in range(begin, end):
+        y, x = pixel // width, pixel % width
+        ray = camera_ray(_view_of(view), (x + 0.5) / width, (y + 0.5) / height, LENS_CENTRE)
+        found = traversal_cost(scene.geometry, ray)
+        out[pixel - begin, 0], out[pixel - begin, 1] = found.steps, found.tests

@@ -5,6 +5,7 @@ import importlib.metadata
 import json
 import warnings
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -13,7 +14,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from reference_rt.cameras import AnyCamera
 from reference_rt.cameras.film import Film
 from reference_rt.cameras.perspective import Perspective
-from reference_rt.core.model import AS_DIGEST, Description
+from reference_rt.core.model import AS_DIGEST, Description, as_linear
 from reference_rt.integrators import AnyIntegrator, Direct
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.lights import (
@@ -40,6 +41,7 @@ from reference_rt.util.errors import (
     SceneError,
     SceneWarning,
     meant,
+    meant_by,
     printable,
 )
 from reference_rt.util.files import read_text
@@ -49,11 +51,17 @@ MOST_NESTED = 100
 which each operation takes two."""
 
 
-def no_such(kind: str, name: str, known: Iterable[str]) -> str:
-    """The message for a name that the scene does not define."""
+_NAMES = (str, str | None)
+"""The types of fields that only name something."""
+
+
+def no_such(kind: str, name: str, known: Iterable[str], instead: str = "") -> str:
+    """The message for a name that the scene does not define.  instead: what might be in its place,
+    with ", or "."""
     known = [*known]
     listed = ", ".join(f"'{k}'" for k in known) or "none"
-    return f"there is no {kind} '{name}'; expected one of: {listed}{meant(name, known)}"
+    text = f"there is no {kind} '{name}'; expected {instead}one of: {listed}{meant(name, known)}"
+    return text if known else f"{text}; '{kind}s' describes them by name"
 
 
 class SceneModel(Description):
@@ -148,7 +156,10 @@ class SceneModel(Description):
         """Check that the textures that a material or a light names exist."""
         for field, texture in texture_names(part).items():
             if texture not in self.textures:
-                raise SceneError(no_such("texture", texture, self.textures), (*path, *field))
+                only_names = type(part).__pydantic_fields__[str(field[0])].annotation in _NAMES
+                instead = "" if only_names else f"numbers{as_linear(texture)}, or "
+                message = no_such("texture", texture, self.textures, instead)
+                raise SceneError(message, (*path, *field))
 
     def _check_parts(self, name: str, material: Material) -> None:
         """Check that the textures and materials that a material names exist and fit."""
@@ -287,9 +298,15 @@ class SceneModel(Description):
         try:
             text = read_text(path)
         except OSError as error:
-            raise SceneError(
-                f"cannot be read: {error.strerror}; expected a scene file", file=str(path)
-            ) from None
+            near = ""
+            with suppress(OSError):
+                scenes = {
+                    p.stem: p.name for p in path.parent.iterdir() if p.suffix in OWN and p.is_file()
+                }
+                stem = "".join(meant_by(path.stem, scenes))
+                near = f"; did you mean '{scenes[stem]}'?" if stem else ""
+            message = f"cannot be read: {error.strerror}; expected a scene file{near}"
+            raise SceneError(message, file=str(path)) from None
         except UnicodeDecodeError:
             raise SceneError("is not text; expected UTF-8", file=str(path)) from None
         return cls.parse(text, str(path), path.parent)

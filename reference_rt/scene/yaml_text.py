@@ -225,6 +225,11 @@ def _unknown_tag(event: Any) -> MalformedError:
     return _malformed(f"unknown tag '{tag}'; expected data without tags", event)
 
 
+def _indented_by_tab(text: str, line: int) -> bool:
+    content = text.splitlines()[line - 1 : line]
+    return bool(content) and "\t" in content[0][: len(content[0]) - len(content[0].lstrip())]
+
+
 class Events:
     """The events of a text.  Raises MalformedError."""
 
@@ -240,6 +245,10 @@ class Events:
             problem = " ".join(str(error.problem or error.context).split())
             if "nesting depth" in problem:  # libyaml since 0.2.6, which reads ahead of its events
                 problem = _TOO_DEEP
+            elif line is not None and _indented_by_tab(self.text, line):
+                problem = "a tab at the beginning of the line; YAML indents with spaces"
+            elif "mapping values are not allowed" in problem:
+                problem += "; expected the keys of one part below each other, and text in quotes"
             elif problem.startswith(("but ", "did not ")) and error.context:
                 problem = f"{error.context}, {problem}"
             raise MalformedError(problem, line) from None

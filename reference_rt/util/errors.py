@@ -20,10 +20,55 @@ _MOST_KEYS = 16
 """The most keys of a path into a scene that a message shows; the middle ones are left out."""
 
 
+_OURS = """
+eye origin center: position location origin from
+target: look_at lookat to
+reflectance base_colour radiance intensity irradiance: color colour albedo
+radiance intensity irradiance: emission brightness power intensity radiance
+alpha: roughness
+interior_ior eta: ior index
+file: filename
+spp: samples samples_per_pixel
+--spp: --samples
+--size: --resolution
+width+height: resolution size
+max_depth: max_bounces bounces depth
+transform: translate rotation scale
+shapes: objects world
+lights: background
+box: cube
+disk: circle
+rectangle: quad
+mesh: obj ply gltf
+diffuse: lambertian matte
+dielectric: glass
+conductor: metal
+mirror: specular
+principled: disney
+emissive lights: light emitter area_light
+directional: sun
+constant: sky
+environment_map: envmap hdri
+path: path_tracer pathtracer
+"""
+"""Our words, and those of other programs and of beginners for the same.  Of several of ours the
+first that is possible is meant; a plus joins two keys that are both meant."""
+
+
 def meant(name: str, known: Iterable[str]) -> str:
-    """ "; did you mean 'NAME'?", if one of the known names is near; else nothing."""
-    near = difflib.get_close_matches(name, [*known], n=1)
-    return f"; did you mean '{near[0]}'?" if near else ""
+    """ "; did you mean 'NAME'?", with the names of `meant_by`; nothing if there are none."""
+    quoted = " and ".join(f"'{one}'" for one in meant_by(name, known))
+    return f"; did you mean {quoted}?" if quoted else ""
+
+
+def meant_by(name: str, known: Iterable[str]) -> list[str]:
+    """The known names, mostly one, that mean the same as `name`, or the one that is near."""
+    known = [*known]
+    lines = [line.split(":") for line in _OURS.strip().splitlines()]
+    ours = [word for word, theirs in lines if name.lower() in theirs.split()]
+    words = [word.split("+") for word in " ".join(ours).split()]
+    same = [word for word in words if {*word} <= {*known} and word != [name]]
+    return same[0] if same else difflib.get_close_matches(name, known, n=1)
 
 
 class ReferenceRtError(Exception):

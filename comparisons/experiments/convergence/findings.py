@@ -35,7 +35,8 @@ MEDIAN_ERROR = math.sqrt(math.pi / 2.0)
 class Step(NamedTuple):
     """A rung in numbers.
 
-    seconds: the median of the warm pictures' and their extremes;  mse, relmse: expectations, with
+    seconds: the median of the warm pictures' and their extremes, NaN where they are `disturbed`;
+    mse, relmse: expectations, with
     bands;  variance: the mean over pixels of the weighted variance of one picture, which relmse is
     where there is no bias;  efficiency: 1 / (variance times seconds), 1/s.
     """
@@ -48,6 +49,7 @@ class Step(NamedTuple):
     relmse: Estimate
     variance: float
     efficiency: float
+    disturbed: bool = False
 
 
 class Target(NamedTuple):
@@ -109,15 +111,21 @@ def findings_of(
 ) -> Findings:
     """The findings from at least one rung;  independent: whether the method's samples are."""
     weight = weights(reference.mean)
-    steps = tuple(_step(rung, reference, weight) for rung in rungs)
-    points = {
-        "mse": points_of(rungs, "mse", common_error(reference, 1.0)),
-        "relmse": points_of(rungs, "relmse", common_error(reference, weight)),
-    }
-    slopes = {
-        name: {"spp": _slope(p, p.spp), "seconds": _slope(p, p.seconds)}
-        for name, p in points.items()
-    }
+    wrong = disturbed([r.warm.min() for r in rungs], [float(np.median(r.warm)) for r in rungs])
+    steps = tuple(
+        _step(rung, reference, weight, is_wrong)
+        for rung, is_wrong in zip(rungs, wrong, strict=True)
+    )
+    common = {"mse": common_error(reference, 1.0), "relmse": common_error(reference, weight)}
+    steady = [rung for rung, is_wrong in zip(rungs, wrong, strict=True) if not is_wrong]
+    points = {name: points_of(steady, name, error) for name, error in common.items()}
+    slopes = {}
+    for name, error in common.items():
+        of_all, timed = points_of(rungs, name, error), points[name]
+        slopes[name] = {
+            "spp": _slope(of_all, of_all.spp),
+            "seconds": _slope(timed, timed.seconds),
+        }
     relative_bias = bias_of(rungs[-1], reference, weight)
     return Findings(
         steps,
@@ -128,8 +136,14 @@ def findings_of(
     )
 
 
-def _step(rung: Rung, reference: Reference, weight: FloatArray) -> Step:
-    warm = rung.warm
+def disturbed(least: Sequence[float], medians: Sequence[float]) -> list[bool]:
+    """Which rungs, in the order of their samples, were timed while something else ran: even the
+    fastest picture took longer than half of those of a later rung, which have more samples."""
+    return [any(later < low for later in medians[k + 1 :]) for k, low in enumerate(least)]
+
+
+def _step(rung: Rung, reference: Reference, weight: FloatArray, is_disturbed: bool) -> Step:
+    warm = rung.warm if not is_disturbed else np.array([math.nan])
     seconds = Estimate(float(np.median(warm)), float(warm.min()), float(warm.max()))
     variance = float((weight * rung.variance).mean())
     return Step(
@@ -141,6 +155,7 @@ def _step(rung: Rung, reference: Reference, weight: FloatArray) -> Step:
         mean_of(rung.relmse, common_error(reference, weight)),
         variance,
         1.0 / (variance * seconds.value) if variance > 0.0 else math.inf,
+        is_disturbed,
     )
 
 
@@ -342,8 +357,8 @@ Starts = Mapping[str, Mapping[str, Mapping[str, float]]]
 
 
 class GridStep(NamedTuple):
-    """Our picture of a deterministic scene on a grid of spp samples per pixel: its seconds, and its
-    errors against the finest grid."""
+    """Our picture of a deterministic scene on a grid of spp samples per pixel: its seconds, NaN
+    where they are `disturbed`, and its errors against the finest grid."""
 
     spp: int
     seconds: float

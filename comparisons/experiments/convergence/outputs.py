@@ -28,10 +28,16 @@ def lines_of(curves: Curves) -> list[str]:
         known = [_against(r) for r in ratios.get(name, []) if r.times is not None]
         against = f"; ours / this: {', '.join(known)}" if known else ""
         lines.append(f"{name}: {times}{against}")
+        if wrong := ", ".join(str(step.spp) for step in found.steps if step.disturbed):
+            lines.append(
+                f"{name}: times with {wrong} samples are disturbed and left out: more samples took "
+                "less"
+            )
     lines += [f"no data for {line}" for line in curves.missing]
     if curves.grids is not None:
         lines += [
-            f"ours, {step.spp} samples: {percent(step.relmse**0.5)} in {step.seconds:.3g} s"
+            f"ours, {step.spp} samples: {percent(step.relmse**0.5)} "
+            + (f"in {step.seconds:.3g} s" if step.seconds > 0.0 else "(time disturbed)")
             for step in curves.grids.steps
         ]
         lines += [
@@ -108,7 +114,7 @@ def write_results(
                      "reference": {"spp", "pictures", "relmse", "seconds"} or null,
                      "contestants": {name: {"title", "sampler", "side",
                          "rungs": [{"asked_spp", "spp", "replicates",
-                                    "seconds": {"median", "min", "max"},
+                                    "seconds": {"median", "min", "max"}, "disturbed",
                                     "mse", "relmse": {"value", "low", "high"},
                                     "relative_variance", "efficiency"}],
                          "slopes": {"mse" and "relmse": {"spp" and "seconds":
@@ -207,6 +213,7 @@ def _method(one: Curves, name: str) -> dict[str, Any]:
                 "spp": step.spp,
                 "replicates": step.replicates,
                 "seconds": dict(zip(("median", "min", "max"), step.seconds, strict=True)),
+                "disturbed": step.disturbed,
                 "mse": step.mse._asdict(),
                 "relmse": step.relmse._asdict(),
                 "relative_variance": step.variance,

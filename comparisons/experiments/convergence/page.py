@@ -146,8 +146,8 @@ def _view(one: Curves, targets: Sequence[str]) -> dict[str, Any]:
     columns = ("samples", "seconds", "least", "most", "MSE", "relMSE", "from", "to")
     rungs: list[list[str]] = [["Method", *columns, "relative variance", "efficiency"]]
     for title, s in steps:
-        values = (s.spp, *s.seconds, s.mse.value, *s.relmse, s.variance, s.efficiency)
-        rungs.append([title, *map(shown, values)])
+        values = map(shown, (s.mse.value, *s.relmse, s.variance, s.efficiency))
+        rungs.append([title, shown(s.spp), *map(_seconds, s.seconds), *values])
     view["rungs"] = rungs if steps else []
     return view
 
@@ -167,6 +167,10 @@ _SLOPES = (
     "upper: 99 %); where no bias is significant, the upper bound is shown. The last column is the "
     "efficiency at the last rung."
 )
+
+
+def _seconds(seconds: float) -> str:
+    return shown(seconds) if seconds > 0.0 else "disturbed"
 
 
 def _tables(one: Curves, targets: Sequence[str]) -> list[Table]:
@@ -196,7 +200,14 @@ def _tables(one: Curves, targets: Sequence[str]) -> list[Table]:
         some: list[tuple[str, Any, str]] = [("ours", step, finest) for step in one.grids.steps]
         some += [(f"Mitsuba {p.variant}", p, f"{p.spp}") for p in one.grids.points]
         rows: list[list[Any]] = [
-            [who, *map(shown, (p.spp, p.seconds, p.mse, p.relmse)), f"ours, {exact} samples"]
+            [
+                who,
+                shown(p.spp),
+                _seconds(p.seconds),
+                shown(p.mse),
+                shown(p.relmse),
+                f"ours, {exact} samples",
+            ]
             for who, p, exact in some
         ]
         head = ["Renderer", "samples per pixel", "seconds", "MSE", "relMSE", "against"]
@@ -228,8 +239,9 @@ def ladder_plots(one: Curves) -> list[str]:
         for over, x_label in (("seconds", SECONDS), ("spp", SAMPLES)):
             curves = []
             for number, (method, found) in enumerate(one.findings.items()):
-                bands = [getattr(step, name) for step in found.steps]
-                x = [s.seconds.value if over == "seconds" else s.spp for s in found.steps]
+                steps = [s for s in found.steps if over == "spp" or not s.disturbed]
+                bands = [getattr(step, name) for step in steps]
+                x = [s.seconds.value if over == "seconds" else s.spp for s in steps]
                 curves.append(
                     Curve(
                         one.methods[method].title,
@@ -249,6 +261,7 @@ def grid_plots(one: Curves) -> list[str]:
     assert one.grids is not None
     steps = one.grids.steps
     plots = []
+    steps = tuple(step for step in steps if step.seconds > 0.0)
     for text, values in (("relMSE", [s.relmse for s in steps]), ("MSE", [s.mse for s in steps])):
         for x_label, x in (
             (SECONDS, [s.seconds for s in steps]),

@@ -1,5 +1,6 @@
 """The convergence of one scene, with chance or without, from the scene to its curves."""
 
+import math
 import time
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
@@ -16,6 +17,7 @@ from comparisons.experiments.convergence.findings import (
     Grids,
     GridStep,
     crops_of,
+    disturbed,
     findings_of,
 )
 from comparisons.experiments.convergence.methods import (
@@ -102,12 +104,22 @@ def grids_of(
         steps = tuple(GridStep(*step) for step in stored["steps"])
         points = tuple(GridPoint(*point) for point in stored["points"])
         finest = np.asarray(finest, np.float64)
-        return Grids(steps, points, stored["finest"], finest), stored["left_out"]
+        return _timed_well(Grids(steps, points, stored["finest"], finest)), stored["left_out"]
     grids, left_out = _made(scene, settings, say)
     store.keep_picture("grid", grids.picture)
     fact = {"steps": grids.steps, "points": grids.points, "finest": grids.finest}
     store.keep_fact("grids", {**fact, "left_out": left_out}, question)
-    return grids, left_out
+    return _timed_well(grids), left_out
+
+
+def _timed_well(grids: Grids) -> Grids:
+    """The grids without seconds that are `disturbed`."""
+    seconds = [step.seconds for step in grids.steps]
+    steps = tuple(
+        step._replace(seconds=math.nan) if is_wrong else step
+        for step, is_wrong in zip(grids.steps, disturbed(seconds, seconds), strict=True)
+    )
+    return replace(grids, steps=steps)
 
 
 def _made(scene: Scene, settings: Settings, say: Progress) -> tuple[Grids, list[str]]:

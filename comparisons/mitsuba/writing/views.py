@@ -112,8 +112,8 @@ def integrator(scene: Scene, surfaces: Surfaces) -> Element:
     if getattr(chosen, "sampling", "both") != "both":
         surfaces.note("'sampling' of the integrator is left out: the mean is the same")
     layers = [name for name in scene.film.layers if name in AOVS]
-    if "variance" in scene.film.layers:
-        surfaces.note("the layer 'variance' is left out: Mitsuba has none")
+    for name in [name for name in scene.film.layers if name not in AOVS]:
+        surfaces.note(f"the layer '{name}' is left out: Mitsuba has none")
     if layers:
         aovs = ", ".join(f"{name}:{AOVS[name]}" for name in layers)
         return Element("integrator", "aov", {"aovs": aovs}, [found])

@@ -165,6 +165,39 @@ def told(tmp_path_factory):
     return headline, page, json.loads((folder / "results.json").read_text()), curves
 
 
+class Interrupted(Fake):
+    """A renderer that takes ten times as long for its pictures of 8 samples."""
+
+    def __call__(self, spp, replicate):
+        shot = super().__call__(spp, replicate)
+        return shot._replace(seconds=shot.seconds * (10.0 if spp == 8 else 1.0))
+
+
+def test_times_that_fall_as_samples_rise_are_left_out(tmp_path):
+    """Of the rungs of 4, 8 and 16 samples the times of 4 and 16 make the curve, and the errors of
+    all."""
+    some = climbs(ours=Interrupted(), mitsuba_llvm=Fake())
+    climb(some, EXACT, 8, Store(None, ""))
+    wrong, right = (findings_of(c.rungs, EXACT, (MEASURED,), False) for c in some.values())
+    assert [step.disturbed for step in wrong.steps] == [False, True, False]
+    assert math.isnan(wrong.steps[1].seconds.value)
+    assert not any(step.disturbed for step in right.steps)
+    # Fakes take 1e-3 s a sample.
+    assert wrong.targets[0].seconds.value == pytest.approx(1e-3 * wrong.targets[0].spp)
+    assert wrong.slopes["mse"]["spp"] == right.slopes["mse"]["spp"]
+    assert wrong.slopes["mse"]["seconds"] != right.slopes["mse"]["seconds"]
+    curves = Curves("box", (16, 12), {"ours": BY_NAME["ours"]}, {"ours": wrong}, EXACT)
+    (said,) = [line for line in lines_of(curves) if "disturbed" in line]
+    assert said.startswith("box: ours: times with 8 samples are disturbed")
+    settings = Settings(targets=(MEASURED,))
+    write_results(tmp_path / "results.json", [curves], settings, {})
+    stored = json.loads((tmp_path / "results.json").read_text())
+    rung = stored["scenes"][0]["contestants"]["ours"]["rungs"][1]
+    assert (rung["disturbed"], rung["seconds"]["median"]) == (True, None)
+    write_page(tmp_path / "page.html", [curves], settings, {})
+    assert (tmp_path / "page.html").read_text().count("<td>disturbed</td>") == 1
+
+
 @pytest.mark.slow
 def test_the_page_can_be_read_by_everybody(told, tmp_path, check_page):
     (tmp_path / "page.html").write_text(told[1], encoding="utf-8")

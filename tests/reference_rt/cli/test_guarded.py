@@ -3,9 +3,10 @@
 import warnings
 
 import pytest
+import typer
 from typer.testing import CliRunner
 
-from reference_rt.cli.guarded import MOST_ALIKE, scene_warnings
+from reference_rt.cli.guarded import MOST_ALIKE, guarded, scene_warnings
 from reference_rt.cli.main import app
 from reference_rt.util.errors import SceneWarning
 
@@ -71,3 +72,27 @@ def test_a_scene_of_many_damaged_meshes(tmp_path):
     lines = [line for line in result.stderr.splitlines() if "have no area" in line]
     assert len(lines) == MOST_ALIKE + 1
     assert lines[-1].endswith("(46 more warnings of this kind are left out)")
+
+
+@pytest.mark.parametrize("width", [50, 200])
+def test_help_is_wrapped_where_the_terminal_ends(width, monkeypatch):
+    """A paragraph is one line on a wide terminal, however long the lines of the source are."""
+
+    def command() -> None:
+        """Do it.
+
+        The first line of a paragraph in the source ends at about its hundredth column, and the
+        paragraph goes on.
+        """
+
+    monkeypatch.setenv("COLUMNS", str(width))
+    monkeypatch.setattr("typer.rich_utils.MAX_WIDTH", width)
+    program = typer.Typer()
+    program.command()(guarded(command))
+    lines = CliRunner().invoke(program, ["--help"]).stdout.splitlines()
+    (first,) = [k for k, one in enumerate(lines) if "The first" in one]
+    (last,) = [k for k, one in enumerate(lines) if "goes on." in one]
+    assert max(map(len, lines)) <= width
+    # A line ends only where the next word, of ten letters at most, would not fit.
+    assert all(len(one.rstrip()) >= width - 12 for one in lines[first:last])
+    assert (first == last) == (width == 200)

@@ -1,5 +1,6 @@
 """`reference-rt preview`: to a file, to a terminal, to a window that is closed."""
 
+import functools
 import os
 import re
 import shutil
@@ -127,12 +128,70 @@ def test_a_window_that_is_closed_ends_it(updates, monkeypatch):
     window = previews.Window(root, "box")
     scene = rt.Scene.load(BOX)
     film = scene.film.model_copy(update={"width": 12, "height": 8})
-    previews.preview(scene.changed(film=film), window, 4, 0.0, 1)
+    previews.preview(scene.changed(film=film), window, previews.Wanted(4, 0.0, 1))
     assert root.ended
     shown = window._label.shown
     assert all(image.shape == (8, 12, 3) for image in shown)
     if updates == 200:  # the picture was finished, and the window was left open
         assert "4 samples" in root.titles[-1]
+
+
+class Author:
+    """A view whose user edits a file after each picture, and closes it after the last one.
+
+    edits: functions that change files;  seen: the mean of each new picture.
+    """
+
+    def __init__(self, *edits):
+        self.edits, self.seen, self.is_new = list(edits), [], False
+
+    def show(self, picture):
+        mean = float(picture.colour.mean())
+        if self.seen[-1:] != [mean]:  # a picture may be shown twice
+            self.seen.append(mean)
+            self.is_new = True
+
+    def pump(self):
+        if self.is_new:
+            self.is_new = False
+            if not self.edits:
+                raise previews.Closed
+            self.edits.pop(0)()
+
+
+def test_a_scene_that_is_watched_is_shown_again(tmp_path, monkeypatch):
+    """After an edit of the scene, of a file that it names, and of one that was wrong meanwhile."""
+    path, sky = tmp_path / "a.yaml", tmp_path / "sky.npy"
+    begin = (
+        "camera: {type: perspective}\nfilm: {width: 2, height: 2}\nintegrator: {type: whitted}\n"
+    )
+
+    def write(text):
+        path.write_text(f"{begin}lights: [{text}]\n")
+
+    def glow(value):
+        np.save(sky, np.full((2, 4, 3), value, np.float32))
+
+    said = []
+
+    def say(text, err):
+        said.append(text)
+        write("{type: constant, radiance: 50}")
+
+    monkeypatch.setattr(previews, "say", say)
+    glow(1.0)
+    write("{type: constant, radiance: 3}")
+    edits = (
+        lambda: write("{type: environment_map, file: sky.npy}"),
+        lambda: glow(7.0),
+        lambda: write("{type: lamp}"),
+    )
+    view = Author(*edits)
+    load = functools.partial(rt.Scene.load, path)
+    previews.watch(load, path, view, previews.Wanted(1, 0.0, 1))
+    assert view.seen == [3.0, 1.0, 7.0, 50.0]
+    assert len(said) == 1
+    assert "unknown type 'lamp'" in said[0]
 
 
 @pytest.fixture

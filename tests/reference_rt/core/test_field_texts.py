@@ -2,6 +2,7 @@
 
 import importlib
 import pkgutil
+import pydoc
 import re
 
 import reference_rt as rt
@@ -66,8 +67,20 @@ def test_the_schema_has_the_same_texts():
 
 def test_every_class_says_what_it_is():
     for cls in ALL:
-        assert cls.__doc__
-        assert cls.__doc__ != cls.__base__.__doc__
+        assert vars(cls)["__doc__"]
+        assert vars(cls)["__doc__"] != vars(cls.__base__).get("__doc__")
+
+
+def test_help_says_in_forty_lines_what_the_fields_mean():
+    for cls in ALL:
+        said = pydoc.render_doc(cls, renderer=pydoc.plaintext)
+        assert said.count("\n") <= 40, cls
+        words = " ".join(said.replace("|", " ").split())
+        for name, text in field_texts(cls).items():
+            assert name == "type" or f"{name}: {' '.join(text.replace('|', ' ').split())}" in words
+    assert " load, " in pydoc.render_doc(rt.Scene, renderer=pydoc.plaintext)
+    assert "model_validate" not in pydoc.render_doc(rt.Scene, renderer=pydoc.plaintext)
+    assert "model_validate" in dir(rt.Scene)
 
 
 def test_a_docstring_of_ones_own_replaces_an_inherited_one():

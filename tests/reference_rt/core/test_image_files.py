@@ -179,7 +179,10 @@ def test_files_of_every_fault(tmp_path, refused):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("materials: {m: {type: diffuse, reflectance: wood}}", "no texture 'wood'; expected one"),
+        (
+            "materials: {m: {type: diffuse, reflectance: wood}}",
+            "no texture 'wood'; expected numbers",
+        ),
         ("textures: {t: {type: marble}}", "unknown type 'marble'"),
         ("textures: {t: {type: bitmap}}", "textures.t.file"),
         ("textures: {t: {type: bitmap, file: a.png, wrap: fold}}", "textures.t.wrap"),

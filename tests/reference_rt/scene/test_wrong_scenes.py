@@ -28,7 +28,7 @@ SCENES = [
     ("film: {width: 4.5}", 1, "film.width", "expected a valid integer, got 4.5"),
     ("film: {width: '4'}", 1, "film.width", "expected a valid integer, got '4'"),
     ("film: {width: true}", 1, "film.width", "expected a valid integer, got True"),
-    ("film: 7", 1, "film", "expected keys with values, got 7"),
+    ("film: 7", 1, "film", "expected keys with values .. got 7"),
     ("film: [1]", 1, "film", "expected keys with values"),
     ("shapes: {a: 1}", 1, "shapes", "expected a list, got "),
     ("film:\n  width: 0", 2, "film.width", "expected greater than or equal to 1, got 0"),
@@ -123,7 +123,7 @@ SCENES = [
     ("film: {layers: [albedo, albedo]}", 1, "film.layers",
      "'albedo' is named twice .. got ['albedo', 'albedo']"),
     ("film: {layers: [ghosts]}", 1, "film.layers[0]", "expected 'albedo', 'normal' .. 'ghosts'"),
-    ("integrator: path", 1, "integrator", "expected keys with values, got 'path'"),
+    ("integrator: path", 1, "integrator", "expected keys with values .. got 'path'"),
     (BOX + "5", 3, "shapes[0].transform", "expected a list, got 5"),
     (BOX + "[{scale: [1, 2]}]", 3, "shapes[0].transform[0].scale",
      "expected three numbers .. got [1, 2]"),
@@ -243,7 +243,11 @@ MATERIALS = [
     ("type: blend, first: m, second: m, weight: .nan", ".weight", "expected a number from 0 to 1"),
     ("type: bump, base: m", ".height", "missing; expected a value"),
     ("type: bump, base: m, height: t", ".height", "there is no texture 't'; expected one of: none"),
-    ("type: normal_map, base: m, normals: 3", ".normals", "expected a valid string, got 3"),
+    (
+        "type: normal_map, base: m, normals: 3",
+        ".normals",
+        "expected the name of one of 'textures', got 3",
+    ),
 ]
 
 # (what stands before it, the material m and others, the rest of the keys, the fact)

@@ -24,8 +24,8 @@ import numpy as np
 import typer
 
 from comparisons.experiments.stability.harness.core import Outcome, outcome
-from reference_rt.cli.adjusted import adjusted
 from reference_rt.cli.guarded import guarded
+from reference_rt.cli.options import adjusted
 from reference_rt.integrators import RayCast
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering import image
@@ -280,7 +280,7 @@ def _mitsubas(path: Path, _: str | None, clock: Any) -> dict[str, Any]:
     from comparisons.mitsuba import translate
     from comparisons.mitsuba.scene import picture
     from comparisons.mitsuba.translate.textures import UntranslatableError
-    from reference_rt.cli.adjusted import adjusted
+    from reference_rt.cli.options import adjusted
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.errors import ReferenceRtError
 

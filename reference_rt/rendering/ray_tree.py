@@ -1,0 +1,375 @@
+"""The rays of one sample of a pixel: what `reference-rt trace` shows.
+
+A second process runs the kernel of a tile as plain Python (NUMBA_DISABLE_JIT=1), which gives the
+same bits as compiled kernels, and reads the local variables of kernels when they return, as a
+debugger does.  So no kernel is written twice, and none is slower for it.
+
+Each ray is a dictionary:
+
+- kind: camera, mirrored, refracted, scattered or shadow;  parent: the number of the ray at whose
+  end it begins, None for the camera's;  depth: edges before it;
+- o, d, t_max;  t, end: where it ends, None where it hits nothing;
+- weight: the share of its radiance in the sample: of a path the throughput;
+- hit: shape, instance, part, face, material, p, n of the surface, None for a miss;  of a shadow ray
+  instead occluded;
+- adds: (what, value) of each term that it adds to the sample's radiance;
+- numbers: by name, the pdfs, MIS weights and probabilities behind these terms;
+- steps: the nodes of the BVH that a ray meets when it is traced alone, each with its box in world
+  space, None within instances;  tests: how many primitives are tested.
+
+The sum of all `adds`, ray after ray from 0, is the sample's radiance, to the last bit.
+"""
+
+import functools
+import inspect
+import math
+import os
+import pickle
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from types import CodeType, FrameType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from reference_rt import lights as any_light
+from reference_rt import materials as any_material
+from reference_rt.accel import geometry as geometries
+from reference_rt.accel.block_query import any_hits
+from reference_rt.accel.bvh import CENTER, CHILDREN, child_of, size_of
+from reference_rt.accel.leaf import nearer_primitive, nearest_of_triangle_leaf
+from reference_rt.accel.single_ray import enter
+from reference_rt.core.ray import Ray, at
+from reference_rt.core.vec3 import Vec3, is_black
+from reference_rt.integrators import (
+    RayCast,
+    direct,
+    direct_light,
+    path,
+    ray_cast,
+    shading,
+    whitted,
+)
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.jit.simd import VECTOR_WIDTH
+from reference_rt.rendering import tiles
+from reference_rt.rendering.accumulation import jobs_of
+from reference_rt.rendering.executor import build_and_check
+from reference_rt.scene.build import BuiltScene
+
+RayRecord = dict[str, Any]
+
+CAMERA, MIRRORED, REFRACTED = "camera", "mirrored", "refracted"
+SCATTERED, SHADOW = "scattered", "shadow"
+
+
+def ray_trees(scene: BuiltScene, places: Sequence[tuple[int, int, int]]) -> list[dict[str, Any]]:
+    """What samples are made of, each given by its pixel's column and row and its number: its
+    `rays`, its radiance, the filter_weight, and value, the product of both.  Raises SceneError."""
+    film = scene.film
+    tables = build_and_check(scene, None)
+    given = tables, scene.camera.setup(film.width, film.height), film.filter.setup()
+    asked = [((film.width * y + x), sample) for x, y, sample in places]
+    is_cast = isinstance(scene.integrator, RayCast)
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", f"from {__name__} import _answer; _answer()"],
+        input=pickle.dumps((is_cast, jobs_of(scene)[0].arguments(*given), asked)),
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(sys.path)},
+        stdout=subprocess.PIPE,
+        check=True,
+    )
+    found: list[dict[str, Any]] = pickle.loads(done.stdout)
+    return found
+
+
+def _answer() -> None:
+    """The second process: from the arguments of a kernel on standard input to trees."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # the first process says that it was interrupted
+    is_cast, arguments, asked = pickle.load(sys.stdin.buffer)
+    with np.errstate(all="ignore"):
+        trees = [_tree(is_cast, arguments, *one) for one in asked]
+    sys.stdout.buffer.write(pickle.dumps(trees))
+
+
+def _tree(is_cast: bool, arguments: Any, pixel: int, sample: int) -> dict[str, Any]:
+    kernel: Any = tiles.aov_tile if is_cast else tiles.render_tile
+    out: Any = [np.zeros((1, 10))] if is_cast else [np.zeros((1, 3)), None]
+    recorder, scene = _Recorder(), arguments[0 if is_cast else 1]
+    recorder.run(lambda: kernel(*arguments, *out, pixel, pixel + 1, sample, sample + 1))
+    radiance = Vec3(0.0, 0.0, 0.0)
+    for ray in recorder.rays:
+        for _, value in ray["adds"]:
+            radiance = radiance + Vec3(*value)
+    tree: dict[str, Any] = _plain(
+        {
+            "rays": [_described(ray, scene) for ray in recorder.rays],
+            "radiance": radiance,
+            "filter_weight": recorder.filter_weight,
+            "value": out[0][0, :3],
+        }
+    )
+    return tree
+
+
+def _plain(value: Any) -> Any:
+    """The same of Python's own types."""
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return [*map(_plain, value)] if isinstance(value, tuple | list) else value
+
+
+class _Return(NamedTuple):
+    """A function that returns: its local variables and its result; the code and the local variables
+    of its caller."""
+
+    own: dict[str, Any]
+    result: Any
+    caller: CodeType
+    outer: dict[str, Any]
+
+
+def _code(function: Any) -> CodeType:
+    code: CodeType = inspect.unwrap(function).__code__
+    return code
+
+
+def _watch(run: Callable[[], object], handlers: Mapping[Any, Callable[[_Return], Any]]) -> None:
+    """Run a function; whenever one of certain functions returns, its handler is called."""
+    by_code = {_code(function): handler for function, handler in handlers.items()}
+
+    def on_event(frame: FrameType, event: str, result: Any) -> None:
+        if event == "return" and frame.f_code in by_code:
+            caller = frame.f_back
+            while caller is not None and caller.f_code.co_name == "choose":
+                caller = caller.f_back  # of `ByClass` and `Linkable`
+            assert caller is not None
+            found = _Return(dict(frame.f_locals), result, caller.f_code, caller.f_locals)
+            by_code[frame.f_code](found)
+
+    sys.setprofile(on_event)
+    try:
+        run()
+    finally:
+        sys.setprofile(None)
+
+
+_WHITTED, _DIRECT = _code(whitted.radiance), _code(direct.radiance)
+_WHOLE = Vec3(1.0, 1.0, 1.0)
+
+
+class _Recorder:
+    """rays: see above, each with its `Ray` as "ray" and its `Hit` as "found"."""
+
+    def __init__(self) -> None:
+        self.rays: list[RayRecord] = []
+        self.filter_weight = 1.0
+        self._surface: int | None = None
+        """The ray at whose end others begin."""
+        self._waiting: dict[int, tuple[int | None, str]] = {}
+        """By places of Whitted's stack: parent and kind of a ray."""
+        self._last: dict[str, _Return] = {}
+        """What was returned for the ray that comes next."""
+
+    def run(self, kernel: Callable[[], object]) -> None:
+        keep = {
+            name: functools.partial(self._last.__setitem__, name)
+            for name in ("occluded", "share", "emission", "light", "scatter")
+        }
+        handlers: dict[Any, Callable[[_Return], Any]] = {
+            tiles._camera_film_ray: self._film_ray,
+            shading.shade: self._shade,
+            geometries.closest_hit: self._closest_hit,
+            geometries.occluded: keep["occluded"],
+            any_light.background: self._emission,
+            any_light.emitted: self._emission,
+            any_material.ambient: keep["share"],
+            any_light.ambient: self._ambient,
+            direct_light.direct_from: self._direct_from,
+            whitted._push: self._push,
+            whitted._direct_light: self._direct_light,
+            direct._light_sample: self._light_sample,
+            direct._bsdf_sample: self._bsdf_sample,
+            path._environment_emission: keep["emission"],
+            path._hit_emission: keep["emission"],
+            path._next_event_estimation: keep["light"],
+            path._scatter: keep["scatter"],
+            path._edge: self._edge,
+            any_hits: self._any_hits,
+            ray_cast.cast: self._cast,
+        }
+        _watch(kernel, handlers)
+
+    def _ray(self, kind: str, parent: int | None, ray: Ray, weight: Vec3, **more: Any) -> RayRecord:
+        depth = 0 if parent is None else self.rays[parent]["depth"] + 1
+        record = {"kind": kind, "parent": parent, "depth": depth, "ray": ray, "weight": weight}
+        self.rays.append(record | {"adds": [], "numbers": {}, **more})
+        if kind != SHADOW:
+            self._surface = len(self.rays) - 1
+        return self.rays[-1]
+
+    def _shadow(self, ray: Ray, occluded: bool) -> RayRecord:
+        assert self._surface is not None
+        weight = self.rays[self._surface]["weight"]
+        return self._ray(SHADOW, self._surface, ray, weight, occluded=occluded)
+
+    def _film_ray(self, r: _Return) -> None:
+        self.filter_weight = r.result.weight
+
+    def _shade(self, r: _Return) -> None:
+        if r.caller in (_WHITTED, _DIRECT):
+            self.rays[-1]["point"] = r.result.point
+        else:
+            self._last["point"] = r
+
+    # ---- Whitted and direct illumination --------------------------------------------------------
+
+    def _push(self, r: _Return) -> None:
+        kind = REFRACTED if r.own["weight"] is r.outer.get("refracted") else MIRRORED
+        is_first = r.own["depth"] == 0
+        self._waiting[r.own["top"]] = (None, CAMERA) if is_first else (self._surface, kind)
+
+    def _closest_hit(self, r: _Return) -> None:
+        ray = r.own["ray"]
+        if r.caller is _WHITTED:
+            parent, kind = self._waiting[r.outer["top"]]
+            self._ray(kind, parent, ray, r.outer["weight"], found=r.result)
+        elif r.caller is _DIRECT:
+            self._ray(CAMERA, None, ray, _WHOLE, found=r.result)
+        elif r.caller is _code(direct._bsdf_sample):
+            self._ray(SCATTERED, 0, ray, r.outer["scattered"].weight, found=r.result)
+
+    def _emission(self, r: _Return) -> None:
+        if r.caller in (_WHITTED, _DIRECT):
+            what = "emitted" if "q" in r.own else "background"
+            _add(self.rays[-1], what, r.outer.get("weight", _WHOLE) * r.result)
+
+    def _ambient(self, r: _Return) -> None:
+        light = self._last.pop("share").result * r.result
+        _add(self.rays[-1], "ambient", r.outer["weight"] * light)
+
+    def _direct_from(self, r: _Return) -> None:
+        if (query := self._last.pop("occluded", None)) is not None:
+            record = self._shadow(query.own["ray"], query.result)
+            record["numbers"] = {"light": r.outer.get("k"), "light pdf": r.result.light.pdf}
+
+    def _direct_light(self, r: _Return) -> None:
+        assert self._surface is not None
+        _add(self.rays[self._surface], "direct light", r.outer["weight"] * r.result)
+
+    def _light_sample(self, r: _Return) -> None:
+        if "sample" in r.own and "selection" not in (numbers := self.rays[-1]["numbers"]):
+            sample = r.own["sample"]
+            numbers |= _of_light(r.own, sample.light, sample)
+            _add(self.rays[-1], "direct light", r.result)
+
+    def _bsdf_sample(self, r: _Return) -> None:
+        if "hit" not in r.own:
+            return
+        self._surface = 0
+        record, scattered = self.rays[-1], r.own["scattered"]
+        pdf = 0.0 if scattered.is_delta else scattered.pdf
+        record["point"], record["numbers"] = r.own.get("there"), _of_emission(r.own, pdf)
+        _add(record, "emitted" if r.own["hit"].kind >= 0 else "background", r.result)
+
+    # ---- path tracing, ray casting --------------------------------------------------------------
+
+    def _edge(self, r: _Return) -> None:
+        own, state = r.own, r.own["state"]
+        kind = CAMERA if own["depth"] == 0 else SCATTERED
+        record = self._ray(kind, self._surface, own["ray"], state.throughput, found=own["hit"])
+        if own["hit"].kind >= 0:
+            record["point"] = self._last.pop("point").result.point
+        if (emission := self._last.pop("emission", None)) is not None:
+            record["numbers"] |= _of_emission(emission.own, state.bsdf_pdf)
+        if (scatter := self._last.pop("scatter", None)) is not None:
+            record["numbers"]["sampled pdf"] = scatter.own["scattered"].pdf
+            record["numbers"] |= {k: scatter.own[k] for k in ("survival",) if k in scatter.own}
+        _add(record, "emitted" if own["hit"].kind >= 0 else "background", r.result.emitted)
+        self._last["edge"] = r
+
+    def _any_hits(self, r: _Return) -> None:
+        if r.own["n"] > 0:
+            connection = self._last.pop("edge").result.connection
+            record = self._shadow(connection.shadow, bool(r.own["hits"].codes[0] >= 0))
+            own = self._last.pop("light").own
+            record["numbers"] = _of_light(own, own["light"], own["sample"])
+            if not record["occluded"]:
+                _add(record, "direct light", connection.light)
+
+    def _cast(self, r: _Return) -> None:
+        record = self._ray(CAMERA, None, r.own["ray"], _WHOLE, found=r.own["hit"])
+        record["point"] = r.own.get("point")
+        _add(record, "colour", r.result.colour)
+
+
+def _add(record: RayRecord, what: str, value: Vec3) -> None:
+    if not is_black(value):
+        record["adds"].append((what, value))
+
+
+def _of_light(own: dict[str, Any], light: Any, sample: Any) -> dict[str, float]:
+    return {
+        "light": own["picked"].light,
+        "selection": own["picked"].probability,
+        "light pdf": light.pdf,
+        "bsdf pdf": 0.0 if light.is_delta else sample.bsdf_pdf,
+        "MIS weight": own.get("weight", 1.0),
+    }
+
+
+def _of_emission(own: dict[str, Any], bsdf_pdf: float) -> dict[str, float]:
+    pdfs = {"bsdf pdf": bsdf_pdf, "light pdf": own["light_pdf"]} if bsdf_pdf > 0.0 else {}
+    return pdfs | {"MIS weight": own["weight"]}
+
+
+# ---- what a ray meets ----------------------------------------------------------------------------
+
+
+def _described(record: RayRecord, scene: SceneTables) -> RayRecord:
+    """The ray as it is shown, of numbers, names and tuples."""
+    ray, hit = record.pop("ray"), record.pop("found", None)
+    point = record.pop("point", None)
+    is_hit = hit is not None and hit.kind >= 0
+    record |= {"o": ray.o, "d": ray.d, "t_max": ray.t_max, "hit": None, "t": None, "end": None}
+    if is_hit:
+        ids = geometries.owner(scene.geometry, hit)._asdict()
+        record["hit"] = ids | {"material": point.material, "p": point.p, "n": point.n}
+        record["t"], record["end"] = hit.t, point.p
+    elif record["kind"] == SHADOW and ray.t_max < math.inf:
+        record["end"] = at(ray, ray.t_max)
+    return record | _met(ray, record["kind"] == SHADOW, scene)
+
+
+def _met(ray: Ray, any_hit: bool, scene: SceneTables) -> dict[str, Any]:
+    """The `steps` and `tests` of a ray that is traced alone."""
+    geometry = scene.geometry
+    if geometry.bvh is None:
+        count = sum(len(table.owner) for table in geometry.shapes if table is not None)
+        return {"steps": [], "tests": count}
+    steps: list[tuple[int, Any]] = []
+    tests: list[int] = []
+    boxes: dict[int, Any] = {}
+
+    def entered(r: _Return) -> None:
+        bvh, node = r.own["bvh"], r.own["node"]
+        if r.outer["instance"] >= 0:
+            steps.append((node, None))
+            return
+        center = bvh.frames[0 if node != bvh.unbounded else node, CENTER : CENTER + 3]
+        planes = bvh.boxes[node, :CHILDREN].reshape(2, 3, VECTOR_WIDTH) + center[:, None]
+        for lane in range(VECTOR_WIDTH):
+            boxes[child_of(bvh, node, lane)] = (*planes[0, :, lane], *planes[1, :, lane])
+        steps.append((node, boxes.get(node, (*planes[0].min(axis=1), *planes[1].max(axis=1)))))
+
+    query = geometries.occluded if any_hit else geometries.closest_hit
+    handlers: dict[Any, Callable[[_Return], Any]] = {
+        enter: entered,
+        nearer_primitive: lambda r: tests.append(1),
+        nearest_of_triangle_leaf: lambda r: tests.append(size_of(r.own["node"])),
+    }
+    _watch(lambda: query(geometry, ray), handlers)
+    return {"steps": steps, "tests": sum(tests)}
