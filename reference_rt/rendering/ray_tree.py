@@ -190,7 +190,7 @@ class _Recorder:
             any_light.ambient: self._ambient,
             direct_light.direct_from: self._direct_from,
             whitted._push: self._push,
-            whitted._direct_light: self._direct_light,
+            direct_light.fixed_lights: self._fixed_lights,
             direct._light_sample: self._light_sample,
             direct._bsdf_sample: self._bsdf_sample,
             path._environment_emission: keep["emission"],
@@ -256,9 +256,10 @@ class _Recorder:
             record = self._shadow(query.own["ray"], query.result)
             record["numbers"] = {"light": r.outer.get("k"), "light pdf": r.result.light.pdf}
 
-    def _direct_light(self, r: _Return) -> None:
+    def _fixed_lights(self, r: _Return) -> None:
         assert self._surface is not None
-        _add(self.rays[self._surface], "direct light", r.outer["weight"] * r.result)
+        weight = r.outer.get("weight", _WHOLE)  # Whitted's; `direct` on a grid has none
+        _add(self.rays[self._surface], "direct light", weight * r.result)
 
     def _light_sample(self, r: _Return) -> None:
         if "sample" in r.own and "selection" not in (numbers := self.rays[-1]["numbers"]):

@@ -147,7 +147,7 @@ def _view(one: Curves, targets: Sequence[str]) -> dict[str, Any]:
     rungs: list[list[str]] = [["Method", *columns, "relative variance", "efficiency"]]
     for title, s in steps:
         values = map(shown, (s.mse.value, *s.relmse, s.variance, s.efficiency))
-        rungs.append([title, shown(s.spp), *map(_seconds, s.seconds), *values])
+        rungs.append([title, shown(s.spp), *map(_timed, s.seconds), *values])
     view["rungs"] = rungs if steps else []
     return view
 
@@ -169,7 +169,7 @@ _SLOPES = (
 )
 
 
-def _seconds(seconds: float) -> str:
+def _timed(seconds: float) -> str:
     return shown(seconds) if seconds > 0.0 else "disturbed"
 
 
@@ -196,9 +196,9 @@ def _tables(one: Curves, targets: Sequence[str]) -> list[Table]:
         head = ["Method", *columns, "1 / (relative variance × s)"]
         tables.append(("Slopes, bias, efficiency", head, laws, _SLOPES))
     if one.grids is not None:
-        finest = f"{one.grids.finest}"
+        finest = f"ours, {one.grids.finest} samples"
         some: list[tuple[str, Any, str]] = [("ours", step, finest) for step in one.grids.steps]
-        some += [(f"Mitsuba {p.variant}", p, f"{p.spp}") for p in one.grids.points]
+        some += [(f"Mitsuba {p.variant}", p, f"ours, {p.spp} samples") for p in one.grids.points]
         rows: list[list[Any]] = [
             [
                 who,
