@@ -93,14 +93,20 @@ class PageError(Exception):
     """What is wrong with the page, its picture or the browser."""
 
 
-def launched(chromium: "BrowserType") -> "Browser":
-    """Chromium, in its sandbox where the machine permits one.  Raises PageError."""
-    from playwright.sync_api import Error
-
+def chromium_program() -> str:
+    """The browser: CHROMIUM, or the first of BROWSERS.  Raises PageError."""
     named = os.environ.get("CHROMIUM")
     found = named or next(filter(None, map(shutil.which, BROWSERS)), None)
     if not found:
         raise PageError(f"no browser: set CHROMIUM, or install one of {', '.join(BROWSERS)}")
+    return found
+
+
+def launched(chromium: "BrowserType") -> "Browser":
+    """Chromium, in its sandbox where the machine permits one.  Raises PageError."""
+    from playwright.sync_api import Error
+
+    found = chromium_program()
     # Root, and containers without user namespaces, have no sandbox.
     for sandbox in (True, False) if os.geteuid() else (False,):
         try:
@@ -181,6 +187,8 @@ def main(page_file: str, folder: str, output: str, *numbers: str) -> None:
     seeds, *sizes = numbers
     spp, width, height = (None if text == "-" else int(text) for text in sizes)
     scene = None if data is None else f"{HOST}{SCENE}scene.json"
+    # The gate's temporary folder: where it kills this process, the browser's files go with it.
+    os.environ["TMPDIR"] = str(Path(output).absolute().parents[1])
     with sync_playwright() as playwright:
         browser = launched(playwright.chromium)
         context = browser.new_context(service_workers="block")
