@@ -8,7 +8,8 @@ from typing import Literal
 
 from comparisons.compare.compare import single_lights
 from comparisons.compare.judge import Lights
-from comparisons.compare.path_length import path_lengths
+from comparisons.compare.misreadings import misreadings
+from comparisons.compare.path_length import Lengths, path_lengths
 from comparisons.cycles.witness import Witness, witness_of
 from comparisons.gate import baselines, reference
 from comparisons.gate.digest import scene_digest
@@ -96,7 +97,7 @@ class Judge:
             limit=request.limit,
             name=request.name,
             lights=None if scene is None else _lights(scene, request.threads),
-            lengths=None if scene is None else path_lengths(scene, request.threads),
+            lengths=None if scene is None else _hypotheses(scene, request.threads),
             witness=self._witness(),
             rim=request.rim,
         )
@@ -153,3 +154,7 @@ def _baseline(
 
 def _lights(scene: Scene, threads: int | None) -> Lights:
     return lambda: single_lights(scene, LIGHT_SPP, threads)
+
+
+def _hypotheses(scene: Scene, threads: int | None) -> Lengths | None:
+    return path_lengths(scene, threads) or misreadings(scene, threads)
