@@ -115,24 +115,9 @@ shapes: [{type: rectangle, material: clay}]
 lights: [{type: point, position: [1, 2, 2], intensity: 9}]
 """
 
-PAGE = """<script>
-window.render = async (task) => {
-  const { film, camera, lights: [light], materials } = await (await fetch(task.scene)).json();
-  const { eye, right, up, back, view } = camera, { width, height } = film;
-  const [left, , bottom, ] = view, dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  const pixels = new Float32Array(3 * width * height), step = (view[1] - left) / width;
-  for (let k = 0; k < width * height; k++) {
-    const x = left + step * (k % width + 0.5), y = bottom + step * (Math.floor(k / width) + 0.5);
-    const d = eye.map((_, j) => x * right[j] + y * up[j] - back[j]), t = -eye[2] / d[2];
-    const p = eye.map((e, j) => e + t * d[j]), l = light.position.map((e, j) => e - p[j]);
-    if (Math.abs(p[0]) > 1 || Math.abs(p[1]) > 1) continue;
-    const f = light.intensity[0] * l[2] / dot(l, l) ** 1.5 / Math.PI;
-    materials.clay.reflectance.forEach((a, j) => { pixels[3 * k + j] = f * a; });
-  }
-  return { SIZE, pixels, bottomUp: true };
-};
-</script>"""
-"""Casts a ray to the square in each pixel."""
+DOCUMENTED = (Path(__file__).parents[3] / "docs" / "realtime.md").read_text(encoding="utf-8")
+PAGE = DOCUMENTED.partition("```html\n")[2].partition("```")[0]
+"""It casts a ray to the square in each pixel."""
 
 
 @pytest.mark.cases(1)
@@ -147,7 +132,7 @@ window.render = async (task) => {
 def test_the_gate_judges_what_a_page_makes_of_a_scene(
     page: Path, size: str, exit_code: int, verdict: str
 ) -> None:
-    page.write_text(PAGE.replace("SIZE", size))
+    page.write_text(PAGE.replace("{ width, height, pixels", f"{{ {size}, pixels"))
     Path("square.yaml").write_text(SCENE)
     result, found = run("--browser", "page.html", "--scene", "square.yaml")
     assert result.exit_code == exit_code, result.output
