@@ -7,7 +7,7 @@ seed.  DATA is the folder of scene.json, or - without a scene.  What goes wrong 
 exit code is 1.
 
 No port is opened: the browser's requests are answered here, from the page's folder and DATA, and
-all others fail.  WebGL is computed in software, so that all machines have the same pixels.
+all others fail.  WebGL and WebGPU compute in software, so that all machines have the same pixels.
 """
 
 import base64
@@ -28,10 +28,19 @@ if TYPE_CHECKING:
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 """Programs that are looked for where CHROMIUM names none."""
 
-SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
+SOFTWARE = (
+    *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"),
+    *("--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"),
+)
 
 HOST = "https://page.invalid"
 """A name that no server has; https, because WebGPU and others need a secure context."""
+
+ISOLATED = {
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Embedder-Policy": "require-corp",
+}
+"""Headers by which a page may share memory between threads."""
 
 SCENE = "/reference-rt-scene/"
 """Where the page finds the scene."""
@@ -131,7 +140,7 @@ def _answer(root: Path, data: Path | None, route: "Route") -> None:
         print(f"asked for {address}: the gate gives no network")
         route.abort()
     elif file.is_relative_to(folder) and file.is_file():
-        route.fulfill(path=file)
+        route.fulfill(path=file, headers=ISOLATED)
     else:
         print(f"asked for {address}: there is no file {file}")
         route.fulfill(status=404)

@@ -41,6 +41,7 @@ def test_a_page_gets_its_query_scene_and_seed_and_returns_every_bit(page: Path) 
         rendering("""
         const { first } = await (await fetch(scene)).json(), pixels = new Float32Array(72);
         const step = Number(new URLSearchParams(location.search).get("step"));
+        if (!crossOriginIsolated || !navigator.gpu) throw new Error("no threads, or no WebGPU");
         new Uint32Array(pixels.buffer).forEach((_, k, of) => { of[k] = first + step * k + seed; });
         return { width, height, pixels, bottomUp: seed > 1000 };""")
     )
