@@ -84,6 +84,10 @@ def test_codes_of_a_canvas(page: Path) -> None:
         (rendering("for (;;);"), "time limit of 3 s"),
         (rendering("const x = null; return x.y"), "TypeError: Cannot read properties of null"),
         (rendering("setTimeout(() => nothing); await new Promise(() => {})"), "nothing is not def"),
+        (
+            rendering("Promise.reject(Error('later')); await new Promise(() => {})"),
+            "uncaught error: Error: later",
+        ),
         ("<script>nothing()</script>", "uncaught error: .*nothing is not defined"),
         ('<script type="module">import "./no.js"</script>', "no.js: there is no file .*not loaded"),
         ('<script src="https://a.example/b.js"></script>', "gives no network .* was not loaded"),
