@@ -117,6 +117,12 @@ def gate(
         typer.Option(help="Smallest relative bias of the image mean that must be detectable."),
     ] = 0.005,
     noise_free: NoiseFree = False,
+    tolerance: Annotated[
+        float,
+        typer.Option(
+            help="Permitted relative error of a value in a picture of --scene without noise."
+        ),
+    ] = 0.001,
     witness: Witness = None,
     rim: Annotated[
         int,
@@ -219,6 +225,7 @@ def gate(
             baselines=baselines,
             limit=limit,
             noise_free=noise_free,
+            tolerance=tolerance,
             threads=threads,
             rim=rim,
             name=name,
