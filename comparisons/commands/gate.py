@@ -130,6 +130,12 @@ def gate(
         typer.Option(help="Smallest relative bias of the image mean that must be detectable."),
     ] = 0.005,
     noise_free: NoiseFree = False,
+    tolerance: Annotated[
+        float,
+        typer.Option(
+            help="Permitted relative error of a value in a picture of --scene without noise."
+        ),
+    ] = 0.001,
     witness: Witness = None,
     rim: Annotated[
         int,
@@ -242,6 +248,7 @@ def gate(
             baselines=baselines,
             limit=limit,
             noise_free=noise_free,
+            tolerance=tolerance,
             threads=threads,
             rim=rim,
             name=name,

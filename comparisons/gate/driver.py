@@ -16,10 +16,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from comparisons.gate.errors import RendererError
 from comparisons.gate.pictures_in import Picture, read_candidate
-from reference_rt.util.errors import ImageError, UsageError
+from reference_rt.util.errors import ImageError, ReferenceRtError, UsageError
 from reference_rt.util.files import temporary_folder
+
+
+class RendererError(ReferenceRtError):
+    """The renderer under test hung, crashed, or did not write the requested file."""
+
+    exit_code = 4
+
 
 PLACEHOLDERS = ("scene", "output", "seed", "seeds", "spp", "width", "height")
 

@@ -13,6 +13,7 @@ from comparisons.compare.path_length import Lengths, path_lengths
 from comparisons.cycles.witness import Witness, witness_of
 from comparisons.gate import baselines, reference
 from comparisons.gate.digest import scene_digest
+from comparisons.gate.edges import TOLERANCE, Edges, look_at
 from comparisons.gate.gate import LIMIT, gate_pictures
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes
@@ -34,8 +35,9 @@ class Request:
 
     variance: a file with the variance of a single reference;  baselines: their folder;  limit: the
     smallest relative bias of the image mean that must be detectable;  noise_free: the renderer uses
-    no random numbers;  rim: how many of the outermost pixels are left out;  name: the case's;
-    witness: a third renderer, of the scene, with a box filter.
+    no random numbers;  tolerance: relative error of a value of such a picture;  rim: how many of
+    the outermost pixels are left out;  name: the case's;  witness: a third renderer, of the scene,
+    with a box filter.
     """
 
     scene: Scene | None = None
@@ -45,6 +47,7 @@ class Request:
     baselines: Path = Path("baselines")
     limit: float = LIMIT
     noise_free: bool = False
+    tolerance: float = TOLERANCE
     threads: int | None = None
     rim: int = 0
     name: str = "candidate"
@@ -66,6 +69,11 @@ class Request:
             raise UsageError(
                 f"the limit is {self.limit:g}; expected a fraction above {permitted:g}, the "
                 "bias of the image mean that is permitted, such as 0.005"
+            )
+        if not 0.0 <= self.tolerance < 1.0:
+            raise UsageError(
+                f"the tolerance is {self.tolerance:g}; expected a fraction from 0 to below 1, such "
+                f"as {TOLERANCE:g}"
             )
         if self.baseline:
             baselines.check_name(self.baseline)
@@ -93,11 +101,13 @@ class Judge:
     def case(self, gate: Callable[..., Case]) -> Case:
         """The verdict by `gate_pictures` or `judged`, whose other arguments are given already."""
         request, scene = self.request, self.scene
+        look = look_at(scene, request.threads) if scene and self.reference.noise_free else None
         return gate(
             limit=request.limit,
             name=request.name,
             lights=None if scene is None else _lights(scene, request.threads),
             lengths=None if scene is None else _hypotheses(scene, request.threads),
+            edges=None if look is None else Edges(look, request.tolerance),
             witness=self._witness(),
             rim=request.rim,
         )

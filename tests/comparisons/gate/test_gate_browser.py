@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from gate_checks import run
 
-from comparisons.gate.driver import Command, Driver
-from comparisons.gate.errors import RendererError
+from comparisons.gate.driver import Command, Driver, RendererError
 
 pytestmark = pytest.mark.usefixtures("chromium")
 
