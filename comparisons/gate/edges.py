@@ -13,8 +13,8 @@ with NODES x NODES rays. Their spacing is SNAP: a surface may be a node away fro
 - *All edges* together are sampled about the centres of their pixels, by the one of RULES that
   explains the candidate best. What it leaves, as a share of each pixel's contrast, is MOST_LEFT in
   no more pixels than CHOICES, and has no mean along one of MODES: a mean beyond MARGIN and
-  STANDARD_ERRORS is a bias. Pixels that show what only those around them see count among CHOICES:
-  the tip of a triangle is thinner than SNAP.
+  STANDARD_ERRORS is a bias. What only the pixels around see, as the tip of a triangle that was
+  moved, counts among CHOICES.
 
 These intervals are widened by the tolerance, relative to the value, and for pictures of 8 bits by
 half a code.
@@ -69,15 +69,15 @@ MOST = 1 << 16
 wrong, these would have one with a probability of 99.9 %."""
 
 AROUND = 24
-"""`REACH` of a second look at pixels that are wrong, which takes in the pixels around.  A tip of a
-triangle is thinner than SNAP, and its vertex, once moved, may put it on a sample."""
+"""Nodes to each side of the centre that take in the pixels around.  The tip of a triangle is
+thinner than SNAP, and may be on a sample once it is moved."""
 
-MOST_AGAIN = 1 << 9
+MOST_TIPS = 1 << 9
 """Pixels that are looked at so: of a picture with more, not tips are wrong."""
 
 CHOICES = 0.01
 """Share of edge pixels, or one of them, of which a rule may leave MOST_LEFT, or that show what only
-the pixels around see."""
+the pixels around them see."""
 
 MOST_LEFT = 0.75
 """Of the contrast.  One sample at the centre is a rule, and leaves nothing; two or more around the
@@ -87,7 +87,7 @@ MARGIN = 0.01
 """Permitted bias, in pixels or shares of the contrast.  The smallest coverage of the nodes, half of
 SNAP, is within what each rule permits already."""
 
-STANDARD_ERRORS = 5.0
+STANDARD_ERRORS = 6.0
 """Of a mode's mean, where pixels of equal coverage and direction count as one: an edge along an
 axis is sampled alike in all its pixels."""
 
@@ -200,12 +200,9 @@ def edges_rung(
         seen.step[:, None], law.beyond(values, *seen.edge), law.beyond(values, low, high)
     )
     wrong = np.asarray(outside.any(axis=-1))
-    tips = 0
-    if 0 < np.count_nonzero(wrong) <= MOST_AGAIN:
-        again = np.flatnonzero(wrong)
-        wrong[again] = ~_is_tip(edges.look, law, row[again], column[again], values[again])
-        tips = int(np.count_nonzero(~wrong[again]))
-    outside[~wrong] = 0.0
+    tips = np.flatnonzero(wrong)[:MOST_TIPS]
+    tips = tips[_are_tips(edges.look, law, row[tips], column[tips], values[tips])]
+    wrong[tips], outside[tips] = False, 0.0
     numbers = {
         "pixels": differs.size,
         "chosen": int(chosen.sum()),
@@ -216,7 +213,7 @@ def edges_rung(
         "inside_wrong": int((wrong & ~seen.step).sum()),
         "edge": int(seen.step.sum()),
         "edge_wrong": int((wrong & seen.step).sum()),
-        **_of_all(seen, tips),
+        **_of_all(seen, len(tips)),
     }
     at = None
     if wrong.any():
@@ -240,10 +237,8 @@ def _crossed(look: Look, law: _Law, shape: tuple[int, ...]) -> BoolArray:
         found[i : i + 2 * height - 1 : 2, j : j + 2 * width - 1 : 2]
         for i in range(3)
         for j in range(3)
-    ]).reshape(3, 3, height, width, 3)  # fmt: skip
-    low, high = nine.min(axis=(0, 1)), nine.max(axis=(0, 1))
-    step = np.maximum(*(np.abs(np.diff(nine, axis=k)).max(axis=(0, 1)) for k in (0, 1)))
-    return np.asarray(_is_step(law, low, high, step, COARSE))
+    ], axis=2).reshape(-1, 3, 3, 3)  # fmt: skip
+    return _is_step(law, *_range(nine), COARSE).reshape(shape)
 
 
 def _is_step(
@@ -279,7 +274,7 @@ def _nodes(
     return np.asarray(corners + np.stack(np.meshgrid(along, along), axis=-1))
 
 
-def _is_tip(
+def _are_tips(
     look: Look,
     law: _Law,
     row: npt.NDArray[np.int64],
@@ -290,8 +285,7 @@ def _is_tip(
     found = [np.empty(0, np.bool_)]
     for k in range(0, len(row), 64):
         some = slice(k, k + 64)
-        radiance, _ = look(_nodes(row[some], column[some], AROUND))
-        low, high, step = _range(radiance)
+        low, high, step = _range(look(_nodes(row[some], column[some], AROUND))[0])
         outside = law.beyond(values[some], low, high).any(axis=-1)
         found.append(_is_step(law, low, high, step, STEP) & ~outside)
     return np.concatenate(found)
@@ -353,7 +347,7 @@ def _reduced(radiance: FloatArray, distance: FloatArray, law: _Law, values: Floa
 
 def _of_all(seen: _Seen, tips: int) -> dict[str, Any]:
     """The rule that explains all edges best, and the means of what it leaves;  tips: pixels that
-    show a surface of those around."""
+    show what is seen around them."""
     left = seen.left[seen.step]
     if not len(left):
         return {"rule": None, "choices": tips, "modes": {}}
@@ -408,7 +402,7 @@ def _words(numbers: dict[str, Any]) -> str:
         "footprints see"
     )
     if numbers["rule"]:
-        text += f"; the edges are sampled as by {numbers['rule']}"
+        text += f"; edges are explained best by {numbers['rule']}"
     if numbers["looked_at"] < numbers["chosen"]:
         text += f"; {numbers['looked_at']:,} of {numbers['chosen']:,} candidates were looked at"
     return text

@@ -138,6 +138,11 @@ def test_one_wrong_choice_is_lawful_and_many_are_not() -> None:
     found = judged(scene, candidate)
     assert found.status == "differ"
     assert "show another surface than one sample at the centre" in found.reason
+    candidate = right.copy()
+    y, x = flipped[7]
+    candidate[y, x] = 2.0
+    found = judged(scene, candidate)
+    assert f"1 of {found.numbers['edge']:,} pixels on edges show what none of" in found.reason
     corners = [scene.picture(shift=(x, y)) for x in (-0.6, 0.6) for y in (-0.6, 0.6)]
     flat = np.argwhere(np.ptp(corners, axis=0).max(axis=-1) < 0.01)
     candidate = right.copy()
@@ -149,11 +154,23 @@ def test_one_wrong_choice_is_lawful_and_many_are_not() -> None:
     assert f"the worst, at x, y = ({x}, {y})" in found.reason
 
 
-def nearest(scene: Triangles, reach: float, n: int) -> FloatArray:
-    """Each pixel shows the nearest surface of n x n points, up to `reach` pixels from its centre;
-    where that is the one at the centre, its own shade."""
+def test_the_tip_of_a_triangle_that_was_moved() -> None:
+    """It lies between the nodes of its pixel, and is moved onto a sample."""
+    scene = Triangles(5, 4)
+    scene.corners[3] = [[20.1, 20.34], [26.0, 20.2], [26.0, 20.5]]
+    moved = scene.corners - np.array([0.0, 0.03])
+    found = judged(scene, scene.picture(RULES["8 samples"], moved))
+    assert found.status == "agree", found.reason
+    assert found.numbers["choices"] == 1
+
+
+def nearest(
+    scene: Triangles, reach: float, n: int, offset: tuple[float, float] = (0.0, 0.0)
+) -> FloatArray:
+    """Each pixel shows the nearest surface of n x n points, up to `reach` pixels from its centre
+    and the offset; where that is the one there, its own shade."""
     y, x = np.mgrid[0:HEIGHT, 0:WIDTH] + 0.5
-    at = np.stack([x, y], axis=-1)
+    at = np.stack([x, y], axis=-1) + np.array(offset)
     seen, best = scene.look(at)
     for u in np.linspace(-reach, reach, n):
         for v in np.linspace(-reach, reach, n):
@@ -175,6 +192,29 @@ FAULTS = {
     "a triangle culled": lambda s: s.picture(corners=s.corners[:5]),
     "painted in the wrong order": lambda s: s.picture(corners=s.corners[::-1]),
 }  # fmt: skip
+
+
+def grown(scene: Triangles, reach: float) -> FloatArray:
+    """Surfaces that are `reach` pixels too large, with 16 samples."""
+    return np.asarray(np.mean([
+        nearest(scene, reach, 5, (x / 16, y / 16)) for x, y in RULES["4 x 4 samples"]
+    ], axis=0))  # fmt: skip
+
+
+BIASES = {
+    "shift in x of +": lambda s: s.picture(RULES["4 x 4 samples"], shift=(0.2, 0.0)),
+    "shift in y of -": lambda s: s.picture(RULES["4 x 4 samples"], shift=(0.0, -0.2)),
+    "growth of what is near of +": lambda s: grown(s, 0.2),
+}
+
+
+@pytest.mark.parametrize("name", BIASES)
+def test_a_bias_that_no_single_pixel_shows(name: str) -> None:
+    scene = Triangles(7, 14)
+    scene.slopes[:] = 0.0  # flat: what is inside does not change
+    found = judged(scene, BIASES[name](scene))
+    assert found.status == "differ"
+    assert f"edges have a bias: {name}" in found.reason
 
 
 @pytest.mark.parametrize("name", FAULTS)
