@@ -262,7 +262,9 @@ def convert(
     ],
     output: Annotated[
         Path,
-        typer.Option("--output", "-o", help="A .yaml, .json, .xml (for Mitsuba) or .pbrt file."),
+        typer.Option(
+            "--output", "-o", help="A .yaml, .json, .xml (for Mitsuba), .pbrt, .glb or .gltf file."
+        ),
     ],
     to: Annotated[
         Literal["scene", "json"],
@@ -270,15 +272,20 @@ def convert(
             help="scene: by the file's suffix; json: everything resolved, shapes as triangles."
         ),
     ] = "scene",
+    float32: Annotated[
+        bool,
+        typer.Option("--float32", help="With --to json: meshes of float32, which browsers read."),
+    ] = False,
     define: Defaults = None,
     allow_missing: AllowMissing = False,
 ) -> None:
-    """Write a scene in our format, for Mitsuba (.xml) or pbrt-v4 (.pbrt), or as data for other
-    renderers (--to json), with its meshes and images in a folder beside it.
+    """Write a scene in our format, for Mitsuba (.xml) or pbrt-v4 (.pbrt), as glTF (.glb, .gltf), or
+    as data for other renderers (--to json), with its meshes and images in a folder beside it.
 
     Scenes in our format render without Mitsuba.
     """
     with compare_extra("converting"):
+        from comparisons.gltf import write_gltf
         from comparisons.mitsuba.writing import write_xml
         from comparisons.mitsuba.writing.files import SUFFIXES, check_name, folder_of, write_scene
         from comparisons.mitsuba.writing.resolved import write_resolved
@@ -286,7 +293,9 @@ def convert(
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.files import check_writable
 
-    others = {".xml": write_xml, ".pbrt": write_pbrt}
+    if float32 and to != "json":
+        raise UsageError("--float32: is of --to json; expected that, too")
+    others = {".xml": write_xml, ".pbrt": write_pbrt, ".glb": write_gltf, ".gltf": write_gltf}
     write = others.get(output.suffix.lower()) if to == "scene" else None
     if to == "scene" and write is None:
         check_name(output, (*SUFFIXES, *others))
@@ -297,7 +306,7 @@ def convert(
         for note in notes:
             say(f"note: {note}", err=True)
     elif to == "json":
-        count = write_resolved(found, output)
+        count = write_resolved(found, output, float32)
     else:
         count = write_scene(found, output)
     files = f", and {count} files in {folder_of(output)}" if count else ""

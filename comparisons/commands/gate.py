@@ -257,7 +257,7 @@ def gate(
         with ProgressLine() as progress:
             if run is not None:
                 if browser is not None and described is not None:
-                    write_resolved(described, run.scene or out)
+                    write_resolved(described, run.scene or out, float32=True)
                 driver = Driver(run, out / "candidates", progress.line)
                 case = gated_renderer(request, driver, rounds, progress.line, progress)
             else:

@@ -37,6 +37,7 @@ from reference_rt.lights import Ambient
 from reference_rt.materials import AnyMaterial, Emissive
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import Grid, Sobol
 from reference_rt.scene.build import build_tables
 
 __all__ = ["Evidence", "Say", "Subject", "budgeted", "compare_scene", "gather"]
@@ -201,6 +202,8 @@ def budgeted(scene: Scene, budget: Budget) -> Scene:
     if budget.size is not None:
         film |= dict(zip(("width", "height"), budget.size, strict=True))
     sampler = scene.resolved_sampler
+    if isinstance(sampler, Grid) and not scene.integrator.deterministic:
+        sampler = Sobol()
     if budget.spp is not None and not scene.integrator.deterministic:
         sampler = sampler.model_copy(update={"spp": budget.spp})
     return scene.changed(film=scene.film.model_copy(update=film), sampler=sampler)
@@ -266,6 +269,8 @@ def _gather(
         notes = [*counterpart.notes(), *changes]
     if not isinstance(subject.scene.film.filter, BoxFilter):
         notes.insert(0, "compared with a box filter")
+    if not scene.integrator.deterministic and isinstance(subject.scene.sampler, Grid):
+        notes.insert(0, "compared with random samples in place of a grid, as Mitsuba has them")
     if moved > 0.0:
         notes.append(
             f"compared with the vertices of meshes rounded to float32, as Mitsuba holds them: they "

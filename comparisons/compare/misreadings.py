@@ -19,6 +19,7 @@ from reference_rt.lights import Directional
 from reference_rt.materials import NormalMap
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import Grid
 from reference_rt.textures import Bitmap
 from reference_rt.textures.image_file import linear
 from reference_rt.util.files import temporary_folder
@@ -102,7 +103,7 @@ TEXTURES: dict[str, _OfField] = {
 
 def misreadings(scene: Scene, threads: int | None = None) -> Lengths | None:
     """Hypotheses about a scene; None unless its pictures have no noise."""
-    if not scene.integrator.deterministic:
+    if not isinstance(scene.resolved_sampler, Grid):
         return None
 
     def hypotheses(reference: Any) -> Iterator[Hypothesis]:

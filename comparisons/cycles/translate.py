@@ -133,6 +133,8 @@ def bounces_of(integrator: Any) -> int:
     if getattr(integrator, "hide_emitters", False):
         raise IneligibleError("lamps that cameras do not see")
     if isinstance(integrator, Direct):
+        if not integrator.shadows:
+            raise IneligibleError("direct light without shadows")
         if not (integrator.light_samples and integrator.bsdf_samples):
             raise IneligibleError("direct light by one strategy alone")
         return 0

@@ -18,6 +18,7 @@ import reference_rt
 from comparisons.gate.pictures_in import Picture
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import Grid
 from reference_rt.util.files import read_input
 
 _URI = re.compile(rb'"uri"\s*:\s*"([^"]+)"')
@@ -29,7 +30,7 @@ def scene_digest(scene: Scene) -> str:
     description = json.loads(scene.to_json())
     for key in ("description", "hierarchy"):
         description.pop(key, None)
-    if not scene.integrator.deterministic:
+    if not (scene.integrator.deterministic or isinstance(scene.sampler, Grid)):
         description.pop("sampler", None)
     digest = hashlib.sha256(json.dumps(description, sort_keys=True).encode())
     for path in _files(description, scene.folder):

@@ -30,10 +30,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+from comparisons.gate.reference import is_noise_free
 from comparisons.results.case import FloatArray, RungResult
 from comparisons.statistics.scales import CHANNELS
 from reference_rt.cameras.film import BoxFilter
-from reference_rt.integrators import RayCast
+from reference_rt.integrators import Direct, RayCast
 from reference_rt.rendering.image import srgb
 from reference_rt.rendering.scene import Scene
 from reference_rt.textures.image_file import linear
@@ -117,13 +118,16 @@ def look_at(scene: Scene, threads: int | None = None) -> Look | None:
     footprint, or whose picture shows something else."""
     integrator = scene.integrator
     shows = not isinstance(integrator, RayCast) or integrator.show == "colour"
-    if not (integrator.deterministic and shows and isinstance(scene.film.filter, BoxFilter)):
+    if not (is_noise_free(scene) and shows and isinstance(scene.film.filter, BoxFilter)):
         return None
+    # A ray draws one of several lights at random, where it is no pixel of a grid.
+    alone = [scene.changed(lights=[light]) for light in scene.lights]
+    parts = alone if isinstance(integrator, Direct) and alone else [scene]
 
     def look(points: FloatArray) -> tuple[FloatArray, FloatArray]:
         rays = scene.camera_rays(points - 0.5, threads=threads)
         return (
-            scene.radiance(*rays, spp=1, threads=threads).mean,
+            sum(part.radiance(*rays, spp=1, threads=threads).mean for part in parts),
             scene.first_hits(*rays, threads=threads).t,
         )
 

@@ -18,6 +18,7 @@ from comparisons.gate.gate import LIMIT, gate_pictures
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes
 from comparisons.gate.rim import check_rim
+from comparisons.gate.terms import missing_terms
 from comparisons.results.case import Case
 from comparisons.statistics import Margins
 from reference_rt.rendering.render import Progress
@@ -98,15 +99,34 @@ class Judge:
     reference: Reference
     scene: Scene | None
 
-    def case(self, gate: Callable[..., Case]) -> Case:
-        """The verdict by `gate_pictures` or `judged`, whose other arguments are given already."""
+    def case(self, gate: "partial[Case]") -> Case:
+        """The verdict by `gate_pictures` or `judged`, whose candidates and reference are given
+        already; a difference from our own pictures may be of terms that the renderer lacks."""
+        request = self.request
+        found = self._case(gate)
+        if found.verdict != "differ" or request.references or request.baseline:
+            return found
+        assert self.scene is not None
+        candidates = gate.args[0]
+
+        def judged(scene: Scene) -> Case:
+            ours = reference.of_scene(scene, request.limit, threads=request.threads)
+            plain = Judge(replace(request, witness=None), ours, scene)
+            return plain._case(partial(gate_pictures, candidates, ours), diagnosed=False)
+
+        cause = missing_terms(self.scene, found, request.rim, request.threads, judged)
+        return found if cause is None else replace(found, cause=cause)
+
+    def _case(self, gate: Callable[..., Case], diagnosed: bool = True) -> Case:
+        """The verdict.  diagnosed: whether the cause of a difference is sought by rendering."""
         request, scene = self.request, self.scene
+        known = scene if diagnosed else None
         look = look_at(scene, request.threads) if scene and self.reference.noise_free else None
         return gate(
             limit=request.limit,
             name=request.name,
-            lights=None if scene is None else _lights(scene, request.threads),
-            lengths=None if scene is None else _hypotheses(scene, request.threads),
+            lights=None if known is None else _lights(known, request.threads),
+            lengths=None if known is None else _hypotheses(known, request.threads),
             edges=None if look is None else Edges(look, request.tolerance),
             witness=self._witness(),
             rim=request.rim,

@@ -18,7 +18,6 @@ from comparisons.pbrt.shapes import shapes_of
 from comparisons.pbrt.surfaces import Writing
 from comparisons.pbrt.views import camera_of, film_of, integrator_of, lights_of, sampler_of
 from reference_rt.rendering.scene import Scene
-from reference_rt.util.errors import SceneError
 
 
 def write_pbrt(scene: Scene, path: Path) -> tuple[int, list[str]]:
@@ -46,9 +45,7 @@ def write_pbrt(scene: Scene, path: Path) -> tuple[int, list[str]]:
         if writing.one_sided:
             behind = ", ".join(f"'{name}'" for name in sorted(writing.one_sided))
             writing.note(f"black from behind, and not so in pbrt: {behind}")
-        if writing.reasons:
-            first, *others = writing.reasons.values()
-            raise SceneError(first.message, first.path, first.file, first.line, others)
+        writing.check()
         notes.extend(writing.notes)
         comments = [f"Written by reference-rt from the scene {scene.name}."]
         comments += [f"Note: {note}." for note in notes]

@@ -5,6 +5,7 @@ round where its transform mirrors space, and its samples of lights not: so no tr
 here mirrors, but that of one with a texture, whose orientation is reversed.
 """
 
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -12,12 +13,11 @@ import numpy as np
 
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import Leaf, Member, copies_of
-from comparisons.mitsuba.writing.files import ply
-from comparisons.mitsuba.writing.resolved import Tessellated, tessellated
-from comparisons.pbrt.surfaces import Params, UnwritableError, Writing, words
+from comparisons.mitsuba.writing.files import UnwritableError, ply
+from comparisons.mitsuba.writing.resolved import Tessellated, placed, tessellated
+from comparisons.pbrt.surfaces import Params, Writing, words
 from reference_rt.materials import Emissive
 from reference_rt.shapes import Cylinder, Disk, Plane, Shape, Sphere
-from reference_rt.shapes.meshes.files.data import MeshData
 
 INLINE = 32
 """Most triangles that stand in the scene file itself."""
@@ -159,7 +159,7 @@ def _mesh(
         raise UnwritableError("a mesh without texture coordinates under a texture")
     if distance > 0.0:
         writing.note(f"a shape '{kind}' is written as triangles, up to {distance:.1g} off it")
-    mesh = _placed(mesh, outer)
+    mesh = replace(placed(mesh, outer), colours=None)
     if len(mesh.faces) > INLINE:
         file = writing.files.write("mesh.ply", lambda path: path.write_bytes(ply(mesh)))
         return words("Shape", "plymesh", params={"string filename": file})
@@ -167,10 +167,3 @@ def _mesh(
     arrays = {key: a.ravel().tolist() for key, a in columns.items() if a is not None}
     indices = {"integer indices": mesh.faces.ravel().tolist()}
     return words("Shape", "trianglemesh", params={**indices, **arrays})
-
-
-def _placed(mesh: MeshData, outer: affine.Affine) -> MeshData:
-    """A mesh under a map, without its colours."""
-    faces = mesh.faces[:, ::-1] if affine.mirrors(outer) else mesh.faces
-    normals = None if mesh.normals is None else affine.apply_normals(outer, mesh.normals)
-    return MeshData(affine.apply_points(outer, mesh.vertices), faces, normals, mesh.uv)

@@ -1,32 +1,23 @@
 """The words of pbrt-v4's file format, and materials and textures in them."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from comparisons.geometry import affine
-from comparisons.mitsuba.writing.files import Files
+from comparisons.mitsuba.writing.files import Files, Losses, UnwritableError
 from reference_rt import materials
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.exr import write_exr
 from reference_rt.core.vec3 import Vec3, luminance
-from reference_rt.rendering.scene import Scene
 from reference_rt.textures import Bitmap, Checker
-from reference_rt.util.errors import ReferenceRtError, SceneError
-
-T = TypeVar("T")
 
 Params = dict[str, Any]
 """By type and name, such as "rgb L": a bool, a number, a string, or several of them."""
-
-
-class UnwritableError(ReferenceRtError):
-    """A part of a scene that pbrt cannot express."""
 
 
 def words(
@@ -51,42 +42,17 @@ def _word(value: Any) -> str:
 
 
 @dataclass
-class Writing:
+class Writing(Losses):
     """A scene being written.  lines: of textures and materials;  names: those that are taken, by
     the part that has each;  oriented: the names of materials that need texture coordinates;
-    one_sided: materials that are black from behind;  notes: what is not quite the same;
-    reasons: why pbrt cannot express it."""
+    one_sided: materials that are black from behind."""
 
-    scene: Scene
     files: Files
+    target: str = field(default="pbrt-v4", kw_only=True)
     lines: list[str] = field(default_factory=list)
     names: dict[tuple[str, ...], str] = field(default_factory=dict)
     oriented: set[str] = field(default_factory=set)
     one_sided: set[str] = field(default_factory=set)
-    notes: list[str] = field(default_factory=list)
-    reasons: dict[str, SceneError] = field(default_factory=dict)
-
-    @contextmanager
-    def collected(self, *path: str | int) -> Iterator[None]:
-        """Collects the reason of an UnwritableError in the part at this key path, so that all of a
-        scene are known; writing goes on."""
-        try:
-            yield
-        except UnwritableError as error:
-            message = f"pbrt-v4 cannot express {error}; expected a scene without it"
-            reason = self.scene.error(message, *path)
-            self.reasons.setdefault(str(reason), reason)
-
-    def read(self, make: Callable[[], T], *path: str | int) -> T:
-        """What `make` reads for the part at this key path.  Raises SceneError if it cannot."""
-        try:
-            return make()
-        except ValueError as error:
-            raise self.scene.error(str(error), *path) from None
-
-    def note(self, text: str) -> None:
-        if text not in self.notes:
-            self.notes.append(text)
 
     def name_for(self, *part: str) -> str:
         """A name for a part of the scene that is not taken: its last word without characters that

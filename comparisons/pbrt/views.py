@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from comparisons.pbrt.surfaces import Params, UnwritableError, Writing, words
+from comparisons.mitsuba.writing.files import UnwritableError
+from comparisons.pbrt.surfaces import Params, Writing, words
 from reference_rt import lights
 from reference_rt.cameras import Orthographic, Pinhole, ThinLens, film
 from reference_rt.cameras.view_rectangle import by_width
@@ -79,6 +80,8 @@ def integrator_of(integrator: Any) -> str:
     if getattr(integrator, "hide_emitters", False):
         raise UnwritableError("lamps that cameras do not see")
     match integrator:
+        case Direct(shadows=False):
+            raise UnwritableError("direct light without shadows")
         case Direct(light_samples=0) | Direct(bsdf_samples=0):
             raise UnwritableError("direct light by one strategy alone")
         case Direct():

@@ -285,7 +285,7 @@ def _integration(scene: Scene, tables: SceneTables, used: Lines, pruned: Lines) 
     if isinstance(integrator, RayCast):
         pruned.append(("sampler", "one ray through each pixel's centre"))
     elif isinstance(sampler, Grid):
-        pruned.append(("random numbers", "a deterministic integrator on a grid draws none"))
+        pruned.append(("random numbers", "none are drawn on a grid"))
         used.append(("samples", f"{sampler.spp} fixed per pixel"))
     else:
         used.append(("samples", f"{sampler.spp} per pixel, {sampler.type}, seed {sampler.seed}"))

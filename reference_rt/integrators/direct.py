@@ -2,6 +2,9 @@
 
 L = L_e + the integral of f |cos| L_e over directions, estimated at the first hit by n light samples
 and m BSDF samples with multiple importance sampling (`path` says which integral each one is).
+
+On a `grid`, which has no random numbers, the integral is a sum over all lights.  It is exact, for
+the scene is then checked to have no lights but points and directions, which no BSDF sample finds.
 """
 
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self
@@ -18,16 +21,22 @@ from reference_rt.core.ray import Ray, ray_from
 from reference_rt.core.vec3 import Vec3, max_component, to_world
 from reference_rt.integrators.direct_light import (
     behind_lamps,
-    direct,
+    direct_from,
+    fixed_lights,
     light_selection_normal,
     power_heuristic,
+    unshadowed,
 )
 from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
 from reference_rt.integrators.shading import place, shade
-from reference_rt.jit.kernel import kernel, local_floats
+from reference_rt.jit.kernel import ByClass, kernel, local_floats
 from reference_rt.materials import Shading
 from reference_rt.materials.textured import evaluate_textures, lookup_cache_size
 from reference_rt.sampling import Sample, draw_pair
+from reference_rt.sampling.blocks import BlockSample
+from reference_rt.sampling.grid import GridSample
+from reference_rt.sampling.independent import IndependentSample
+from reference_rt.sampling.sobol import SobolSample
 
 _Count = Annotated[int, Field(ge=0, le=1024)]
 
@@ -46,9 +55,14 @@ class Direct(Description):
     hide_emitters: bool = False
     """Whether lamps are not seen directly, and the background is black: camera rays pass through
     surfaces that emit.  Their light, mirrors that show them, and `layers` do not change."""
+    shadows: bool = True
+    """Whether surfaces block light.  Without shadows, as in rasterisers that compute none,
+    directions are not sampled from materials, so that mirrors are black."""
 
     @model_validator(mode="after")
     def _any(self) -> Self:
+        if not self.shadows and self.light_samples == 0:
+            raise ValueError("no shadows and no samples of lights; expected light_samples above 0")
         if self.light_samples + self.bsdf_samples == 0:
             raise ValueError("no samples at all; expected light_samples or bsdf_samples above 0")
         return self
@@ -56,16 +70,18 @@ class Direct(Description):
     @property
     def follows_scattered(self) -> bool:
         """Whether BSDF-sampled rays collect emission that light sampling can sample, too."""
-        return self.bsdf_samples > 0
+        return self.shadows and self.bsdf_samples > 0
 
     def setup(self) -> "DirectSetup":
-        return DirectSetup(self.light_samples, self.bsdf_samples, self.hide_emitters)
+        bsdf_samples = self.bsdf_samples if self.shadows else 0
+        return DirectSetup(self.light_samples, bsdf_samples, self.hide_emitters, self.shadows)
 
 
 class DirectSetup(NamedTuple):
     light_samples: int
     bsdf_samples: int
     hides_lamps: bool
+    shadows: bool
 
 
 @kernel
@@ -82,7 +98,15 @@ def radiance(setup: DirectSetup, scene: SceneTables, ray: Ray, sampler: Sample) 
         return behind
     kept = local_floats(any_material.scratch_floats(scene.materials))
     shading = shade(scene, ray, hit, kept)
-    total = any_light.emitted(lights, shading.point, shading.at, -ray.d)
+    emitted = any_light.emitted(lights, shading.point, shading.at, -ray.d)
+    scattered: Vec3 = _scattered(sampler, setup, scene, shading)
+    return emitted + scattered
+
+
+@kernel
+def _of_samples(sampler: Sample, setup: DirectSetup, scene: SceneTables, shading: Shading) -> Vec3:
+    """The scattered light, by samples of lights and of the material."""
+    total = Vec3(0.0, 0.0, 0.0)
     normal = light_selection_normal(scene, shading)
     if any_material.is_smooth(scene.materials, shading.point.material):
         for k in range(setup.light_samples):
@@ -91,6 +115,25 @@ def radiance(setup: DirectSetup, scene: SceneTables, ray: Ray, sampler: Sample) 
     for k in range(setup.bsdf_samples):
         total = total + _bsdf_sample(setup, scene, shading, normal, sampler, k, elsewhere)
     return total
+
+
+@kernel
+def _of_all_lights(
+    sampler: GridSample, setup: DirectSetup, scene: SceneTables, shading: Shading
+) -> Vec3:
+    """The same without random numbers."""
+    smooth = any_material.is_smooth(scene.materials, shading.point.material)
+    if setup.light_samples == 0 or not smooth:
+        return Vec3(0.0, 0.0, 0.0)
+    light: Vec3 = fixed_lights(scene, scene.lights.choice, shading, 0.5, 0.5, setup.shadows)
+    return light
+
+
+_choice = ByClass("scattered")
+for _sample in (SobolSample, BlockSample, IndependentSample):
+    _choice.register(_sample, _of_samples)
+_choice.register(GridSample, _of_all_lights)
+_scattered = _choice.function
 
 
 @kernel
@@ -107,7 +150,12 @@ def _light_sample(
     if picked.probability == 0.0:
         return black
     u0, u1 = draw_pair(sampler, dimension + sampling.LIGHT_POINT)
-    sample = direct(scene, shading, picked.light, u0, u1)
+    shapes, p = shapes_of(scene), shading.point.p
+    light = any_light.sample_one(scene.lights, picked.light, shapes, scene.textures, p, u0, u1)
+    if setup.shadows:
+        sample = direct_from(scene, shading, light)
+    else:
+        sample = unshadowed(scene, shading, light)
     if max_component(sample.contribution) == 0.0:
         return black
     pdf = sample.light.pdf * picked.probability

@@ -10,7 +10,7 @@ from reference_rt.core.ray import Hit, HitBlock, Ray, RayBlock, put_ray, ray_fro
 from reference_rt.core.vec3 import Vec3, is_black, to_local
 from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
 from reference_rt.jit.kernel import kernel
-from reference_rt.lights import LightSample, shadow_ray
+from reference_rt.lights import ENVIRONMENT, LightSample, LightSampler, shadow_ray
 from reference_rt.materials import Shading
 
 # ---- lamps that are not seen directly: camera rays go on behind them -----------------------------
@@ -101,6 +101,33 @@ def unshadowed(scene: SceneTables, shading: Shading, light: LightSample) -> Dire
     wi = to_local(shading.frame, light.wi)
     scattered = any_material.eval_pdf(scene.materials, shading, wi)
     return Direct(light, wi, scattered.value * light.radiance, scattered.density)
+
+
+@kernel
+def fixed_lights(
+    scene: SceneTables,
+    choice: LightSampler | None,
+    shading: Shading,
+    u0: float,
+    u1: float,
+    shadows: bool,
+) -> Vec3:
+    """Direct light without random numbers: of every point, spot and directional light, and of the
+    point (u0, u1) of every area light.  shadows: whether surfaces block it."""
+    total = Vec3(0.0, 0.0, 0.0)
+    if choice is None:
+        return total
+    shapes, p = shapes_of(scene), shading.point.p
+    for k in range(len(choice.kind)):
+        if choice.kind[k] != ENVIRONMENT and choice.probability[k] > 0.0:
+            light = any_light.sample_fixed(scene.lights, k, shapes, scene.textures, p, u0, u1)
+            if shadows:
+                sample = direct_from(scene, shading, light)
+            else:
+                sample = unshadowed(scene, shading, light)
+            if sample.light.pdf > 0.0:
+                total = total + sample.contribution * (1.0 / sample.light.pdf)
+    return total
 
 
 @kernel

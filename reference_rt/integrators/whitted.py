@@ -16,12 +16,10 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Description
 from reference_rt.core.ray import Ray, ray_from
 from reference_rt.core.vec3 import Vec3, max_component, to_world
-from reference_rt.integrators.direct_light import direct_from
-from reference_rt.integrators.scene_tables import SceneTables, shapes_of
+from reference_rt.integrators.direct_light import fixed_lights
+from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.integrators.shading import shade
 from reference_rt.jit.kernel import kernel, local_floats
-from reference_rt.lights import ENVIRONMENT, LightSampler
-from reference_rt.materials import Shading
 from reference_rt.sampling import Sample
 
 
@@ -95,7 +93,9 @@ def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: Sampl
         ambient = any_material.ambient(scene.materials, shading) * any_light.ambient(scene.lights)
         total = total + weight * ambient
         if any_material.is_smooth(scene.materials, point.material):
-            total = total + weight * _direct_light(whitted, scene, scene.lights.choice, shading)
+            u0, u1 = whitted.u0, whitted.u1
+            light = fixed_lights(scene, scene.lights.choice, shading, u0, u1, True)
+            total = total + weight * light
         if depth == whitted.max_depth:
             continue
         for k in range(any_material.branch_count(scene.materials, point.material)):
@@ -110,23 +110,4 @@ def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: Sampl
                 next_ray = ray_from(point, to_world(shading.frame, branch.refracted))
                 _push(stack, top, next_ray, refracted, depth + 1)
                 top += 1
-    return total
-
-
-@kernel
-def _direct_light(
-    whitted: WhittedSetup, scene: SceneTables, choice: LightSampler | None, shading: Shading
-) -> Vec3:
-    """Direct light of every point, spot and directional light, and of one point of every area
-    light."""
-    total = Vec3(0.0, 0.0, 0.0)
-    if choice is None:
-        return total
-    shapes, p, u0, u1 = shapes_of(scene), shading.point.p, whitted.u0, whitted.u1
-    for k in range(len(choice.kind)):
-        if choice.kind[k] != ENVIRONMENT and choice.probability[k] > 0.0:
-            light = any_light.sample_fixed(scene.lights, k, shapes, scene.textures, p, u0, u1)
-            sample = direct_from(scene, shading, light)
-            if sample.light.pdf > 0.0:
-                total = total + sample.contribution * (1.0 / sample.light.pdf)
     return total

@@ -405,7 +405,7 @@ def with_settings(
                 raise SceneError(message, ("integrator",))
             chosen = _INTEGRATORS[integrator]()
         parts["integrator"] = chosen
-        if chosen.deterministic != scene.integrator.deterministic:
+        if chosen.deterministic != isinstance(scene.resolved_sampler, Grid):
             parts["sampler"] = None
     scene = scene.changed(**parts)
     sampler = scene.resolved_sampler

@@ -17,7 +17,7 @@ def _square(n: int) -> int:
 
 class Grid(Description):
     """The centres of n x n equal cells of the pixel, without random numbers: for deterministic
-    integrators."""
+    integrators, and for `direct` where all lights are points, spots, projectors or directional."""
 
     type: Literal["grid"] = "grid"
     spp: Annotated[int, Field(ge=1, le=2**31), AfterValidator(_square)] = 1

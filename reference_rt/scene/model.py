@@ -14,9 +14,18 @@ from reference_rt.cameras import AnyCamera
 from reference_rt.cameras.film import Film
 from reference_rt.cameras.perspective import Perspective
 from reference_rt.core.model import AS_DIGEST, Description
-from reference_rt.integrators import AnyIntegrator
+from reference_rt.integrators import AnyIntegrator, Direct
 from reference_rt.integrators import Path as PathTracing
-from reference_rt.lights import AnyLight, Constant, EnvironmentMap
+from reference_rt.lights import (
+    Ambient,
+    AnyLight,
+    Constant,
+    Directional,
+    EnvironmentMap,
+    Point,
+    Projector,
+    Spot,
+)
 from reference_rt.materials import AnyMaterial, Emissive, Material, Wrapper
 from reference_rt.materials.nested.paths import material_paths
 from reference_rt.sampling import AnySampler, Grid, Sobol
@@ -104,12 +113,36 @@ class SceneModel(Description):
         if sum(isinstance(light, Constant | EnvironmentMap) for light in self.lights) > 1:
             raise SceneError("more than one environment; expected at most one", ("lights",))
         if isinstance(self.sampler, Grid) and not self.integrator.deterministic:
+            self._check_on_grid()
+        return self
+
+    def _check_on_grid(self) -> None:
+        """Check that an integrator that may need random numbers has no use for them."""
+        kind = self.integrator.type
+        if not isinstance(self.integrator, Direct):
             raise SceneError(
-                f"'{self.integrator.type}' needs random numbers, which 'grid' does not have; "
+                f"'{kind}' needs random numbers, which 'grid' does not have; "
                 "expected 'sobol' or 'independent'",
                 ("sampler", "type"),
             )
-        return self
+        points = Point | Spot | Projector | Directional | Ambient
+        extended: list[tuple[tuple[str | int, ...], str]] = [
+            (("lights", i), light.type)
+            for i, light in enumerate(self.lights)
+            if not isinstance(light, points)
+        ]
+        extended += [
+            (("materials", name), "emissive")
+            for name, material in self.materials.items()
+            if isinstance(material, Emissive)
+        ]
+        for path, light in extended:
+            raise SceneError(
+                f"'{kind}' needs random numbers for the light '{light}', which 'grid' does not "
+                "have; expected 'sobol' or 'independent', or lights without extent alone (point, "
+                "spot, projector, directional)",
+                path,
+            )
 
     def _check_textures(self, part: Description, *path: str | int) -> None:
         """Check that the textures that a material or a light names exist."""

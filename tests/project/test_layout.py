@@ -16,7 +16,17 @@ FLOORS = {
         *("materials", "lights", "integrators", "scene", "rendering", "textbook", "cli"),
     ),
     "comparisons": (
-        *("results", "geometry", "statistics", "mitsuba", "pbrt", "runs", "cycles", "rungs"),
+        *(
+            "results",
+            "geometry",
+            "statistics",
+            "mitsuba",
+            "pbrt",
+            "gltf",
+            "runs",
+            "cycles",
+            "rungs",
+        ),
         *("report", "compare", "gate", "truth", "suites", "experiments", "commands"),
     ),
 }

@@ -74,6 +74,7 @@ class Assembly:
             found["sampling"] = "both"
         if self.draw.chance(0.8):  # else Mitsuba's own integrator is hardly compared
             found.pop("hide_emitters", None)
+        found.pop("shadows", None)  # Mitsuba has no integrator without
         return found
 
     def _film(self, integrator: str) -> Data:

@@ -29,6 +29,8 @@ def _(integrator: Path) -> dict[str, Any]:
 
 @translate_integrator.register
 def _(integrator: Direct) -> dict[str, Any]:
+    if not integrator.shadows:
+        raise UntranslatableError("direct without shadows", "integrator")
     lights, bsdfs = integrator.light_samples, integrator.bsdf_samples
     found = {"type": "direct", "emitter_samples": lights, "bsdf_samples": bsdfs}
     return found | _hiding(integrator)
@@ -100,6 +102,7 @@ def of_solids(integrator: Path | Direct) -> dict[str, Any]:
     scenes with solids, with masks, and with hidden lamps."""
     if isinstance(integrator, Path):
         return {**(translate_integrator(integrator) or {}), "type": "path_of_solids"}
+    translate_integrator(integrator)  # refuses what has no counterpart
     return {
         "type": "path_of_solids",
         "max_depth": 2,

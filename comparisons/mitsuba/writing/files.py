@@ -1,13 +1,13 @@
-"""The files of a scene that is written: a scene file, of ours or Mitsuba's, and beside it a folder
-of meshes and images, whole or not at all."""
+"""The files of a scene that is written: a scene file, of ours or another renderer's, and beside it
+a folder of meshes and images, whole or not at all; and what the format cannot express of it."""
 
 import secrets
 import shutil
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -15,11 +15,12 @@ import numpy as np
 from comparisons.mitsuba.reading.parse import LookAt, Step
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.transform import Affine
+from reference_rt.rendering.scene import Scene
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes import Mesh, Shape
 from reference_rt.shapes.csg import Solid
 from reference_rt.shapes.meshes.files.data import MeshData
-from reference_rt.util.errors import ImageError, SceneError, UsageError
+from reference_rt.util.errors import ImageError, ReferenceRtError, SceneError, UsageError
 from reference_rt.util.files import check_writable, replacing
 
 # ---- elements of a Mitsuba scene file, and their XML with every bit of their numbers -------------
@@ -236,6 +237,56 @@ class Files:
         return f"{self.name}/{name}"
 
 
+# ---- what a format cannot express ----------------------------------------------------------------
+
+T = TypeVar("T")
+
+
+class UnwritableError(ReferenceRtError):
+    """A part of a scene that another renderer's format cannot express."""
+
+
+@dataclass
+class Losses:
+    """What is lost of a scene in a format.  target: its name;  notes: what is not quite the same;
+    reasons: why it cannot be written."""
+
+    scene: Scene
+    target: str = field(kw_only=True)
+    notes: list[str] = field(default_factory=list, kw_only=True)
+    reasons: dict[str, SceneError] = field(default_factory=dict, kw_only=True)
+
+    @contextmanager
+    def collected(self, *path: str | int) -> Iterator[None]:
+        """Collects the reason of an UnwritableError in the part at this key path, so that all of a
+        scene are known; writing goes on."""
+        try:
+            yield
+        except UnwritableError as error:
+            message = f"{self.target} cannot express {error}; expected a scene without it"
+            reason = self.scene.error(message, *path)
+            self.reasons.setdefault(str(reason), reason)
+
+    def check(self) -> None:
+        """Raises SceneError with all reasons, if there are any."""
+        if self.reasons:
+            first, *others = self.reasons.values()
+            raise SceneError(first.message, first.path, first.file, first.line, others)
+
+    def read(self, make: Callable[[], T], *path: str | int) -> T:
+        """What `make` reads for the part at this key path.  Raises SceneError if it cannot."""
+        try:
+            return make()
+        except ValueError as error:
+            raise self.scene.error(str(error), *path) from None
+
+    def note(self, text: str) -> None:
+        if text not in self.notes:
+            self.notes.append(text)
+
+
+# ---- meshes --------------------------------------------------------------------------------------
+
 COLOURS = ("red", "green", "blue")
 """The names of our reader; Mitsuba's are `ATTRIBUTE`."""
 
@@ -243,10 +294,13 @@ ATTRIBUTE = ("color_0", "color_1", "color_2")
 """Of the attribute "vertex_color" in Mitsuba's files."""
 
 
-def ply(mesh: MeshData | Mesh, of_colours: tuple[str, str, str] = COLOURS) -> bytes:
+def ply(
+    mesh: MeshData | Mesh, of_colours: tuple[str, str, str] = COLOURS, float32: bool = False
+) -> bytes:
     """A binary .ply file of doubles, which our reader reads to the same bits.
 
-    mesh: with arrays;  of_colours: the names of colours.
+    mesh: with arrays;  of_colours: the names of colours;  float32: rounded to floats.  Raises
+    ValueError for numbers beyond their range.
     """
     assert mesh.vertices is not None
     assert mesh.faces is not None
@@ -262,14 +316,17 @@ def ply(mesh: MeshData | Mesh, of_colours: tuple[str, str, str] = COLOURS) -> by
         "ply",
         "format binary_little_endian 1.0",
         f"element vertex {len(mesh.vertices)}",
-        *(f"property double {name}" for name, _ in columns),
+        *(f"property {'float' if float32 else 'double'} {name}" for name, _ in columns),
         f"element face {len(mesh.faces)}",
         "property list uchar int vertex_indices",
         "end_header",
     ]
     faces = np.empty(len(mesh.faces), [("count", "u1"), ("corners", "<i4", 3)])
     faces["count"], faces["corners"] = 3, mesh.faces
-    table = np.column_stack([values for _, values in columns]).astype("<f8")
+    with np.errstate(over="ignore"):
+        table = np.column_stack([x for _, x in columns]).astype("<f4" if float32 else "<f8")
+    if not np.isfinite(table).all():
+        raise ValueError("has numbers beyond the range of float32; expected smaller ones")
     return "\n".join(lines).encode() + b"\n" + table.tobytes() + faces.tobytes()
 
 

@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from comparisons.geometry import affine
+from comparisons.geometry.affine import Affine
 from comparisons.geometry.flatten import Leaf, Tree, copies_of
 from comparisons.mitsuba.translate.shapes.meshes import Soup, polygon_soup
 from comparisons.mitsuba.translate.shapes.native import box_of_triangles, sphere_surface
@@ -26,7 +28,7 @@ from comparisons.mitsuba.writing.files import Files, check_name, ply, write_file
 from reference_rt.cameras import Orthographic, Pinhole, ThinLens
 from reference_rt.cameras.view_rectangle import CentralCamera
 from reference_rt.core import transform
-from reference_rt.core.arrays import FloatArray
+from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.lights import EnvironmentMap
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import (
@@ -204,7 +206,8 @@ def _joined(soups: Sequence[Soup]) -> MeshData:
         faces.append(soup.faces + count)
         uvs.append(np.zeros((len(soup.positions), 2)) if soup.uvs is None else soup.uvs)
         if any_normals:
-            normals.append(unit(_flat_normals(soup) if soup.normals is None else soup.normals))
+            flat = flat_normals(soup.positions, soup.faces)
+            normals.append(unit(flat if soup.normals is None else soup.normals))
         count += len(soup.positions)
     return MeshData(
         np.concatenate(vertices),
@@ -214,13 +217,21 @@ def _joined(soups: Sequence[Soup]) -> MeshData:
     )
 
 
-def _flat_normals(soup: Soup) -> FloatArray:
+def flat_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """(n, 3) at the vertices of a part whose neighbouring triangles are in one plane."""
-    found = np.zeros((len(soup.positions), 3))
-    of_faces = geometric_normals(soup.positions[soup.faces].reshape(-1, 9))
+    found = np.zeros((len(vertices), 3))
+    of_faces = geometric_normals(vertices[faces].reshape(-1, 9))
     for corner in range(3):
-        found[soup.faces[:, corner]] = of_faces
+        found[faces[:, corner]] = of_faces
     return found
+
+
+def placed(mesh: MeshData, outer: Affine) -> MeshData:
+    """A mesh under a map; its front stays its front."""
+    faces = mesh.faces[:, ::-1] if affine.mirrors(outer) else mesh.faces
+    normals = None if mesh.normals is None else affine.apply_normals(outer, mesh.normals)
+    vertices = affine.apply_points(outer, mesh.vertices)
+    return MeshData(vertices, faces, normals, mesh.uv, mesh.colours)
 
 
 # ---- the document --------------------------------------------------------------------------------
@@ -229,22 +240,46 @@ def _flat_normals(soup: Soup) -> FloatArray:
 FORMAT, VERSION = "reference_rt resolved scene", 1
 
 
-def write_resolved(scene: Scene, path: Path) -> int:
+def write_resolved(scene: Scene, path: Path, float32: bool = False) -> int:
     """Write a scene as .json, whole or not at all; how many files it has besides.
 
-    Raises SceneError, UsageError, ImageError.
+    float32: meshes are rounded to it, since readers for browsers take no doubles.  Raises
+    SceneError, UsageError, ImageError.
     """
     check_name(path, (".json",))
 
     def text(files: Files) -> str:
-        return json.dumps(_Document(scene, files).whole(), indent=1, allow_nan=False) + "\n"
+        return (
+            json.dumps(_Document(scene, files, float32).whole(), indent=1, allow_nan=False) + "\n"
+        )
 
     return write_files(scene, path, text)
 
 
+def camera_of(scene: Scene) -> dict[str, Any]:
+    """Position, basis and view rectangle: at distance 1, of an orthographic one through the
+    eye."""
+    camera, film = scene.camera, scene.film
+    right, up, back = camera.basis.tolist()
+    found: dict[str, Any] = {"type": camera.type, "eye": list(camera.eye)}
+    if isinstance(camera, Pinhole):
+        # What it sees, upside down, as a rectangle in front of it.
+        half = camera.film_width / camera.film_distance / 2.0
+        tall = half * film.height / film.width
+        found["type"], edges = "perspective", [-half, half, -tall, tall]
+        right, up = [-x for x in right], [-x for x in up]
+    else:
+        assert isinstance(camera, CentralCamera | Orthographic)
+        edges = list(camera.rectangle(film.width, film.height))
+    found |= {"right": right, "up": up, "back": back, "view": edges}
+    if isinstance(camera, ThinLens):
+        found |= {"aperture_radius": camera.aperture_radius, "focus_distance": camera.focus}
+    return found
+
+
 class _Document:
-    def __init__(self, scene: Scene, files: Files) -> None:
-        self.scene, self.files = scene, files
+    def __init__(self, scene: Scene, files: Files, float32: bool) -> None:
+        self.scene, self.files, self.float32 = scene, files, float32
         self.meshes: list[dict[str, Any]] = []
         self.known: dict[int, int] = {}
 
@@ -255,7 +290,7 @@ class _Document:
             "format": FORMAT,
             "version": VERSION,
             "description": scene.description,
-            "camera": self.camera(),
+            "camera": camera_of(scene),
             "film": scene.film.model_dump(mode="json"),
             "sampler": scene.resolved_sampler.model_dump(mode="json"),
             "integrator": scene.integrator.model_dump(mode="json"),
@@ -265,26 +300,6 @@ class _Document:
             "shapes": shapes,
             "lights": [self.light(light, k) for k, light in enumerate(scene.lights)],
         }
-
-    def camera(self) -> dict[str, Any]:
-        """Position, basis and view rectangle: at distance 1, of an orthographic one through the
-        eye."""
-        camera, film = self.scene.camera, self.scene.film
-        right, up, back = camera.basis.tolist()
-        found: dict[str, Any] = {"type": camera.type, "eye": list(camera.eye)}
-        if isinstance(camera, Pinhole):
-            # What it sees, upside down, as a rectangle in front of it.
-            half = camera.film_width / camera.film_distance / 2.0
-            tall = half * film.height / film.width
-            found["type"], edges = "perspective", [-half, half, -tall, tall]
-            right, up = [-x for x in right], [-x for x in up]
-        else:
-            assert isinstance(camera, CentralCamera | Orthographic)
-            edges = list(camera.rectangle(film.width, film.height))
-        found |= {"right": right, "up": up, "back": back, "view": edges}
-        if isinstance(camera, ThinLens):
-            found |= {"aperture_radius": camera.aperture_radius, "focus_distance": camera.focus}
-        return found
 
     def texture(self, name: str) -> dict[str, Any]:
         texture = self.scene.textures[name]
@@ -349,7 +364,8 @@ class _Document:
         if id(shape) not in self.known:
             found = tessellated(shape, self.scene.folder)
             kind = type(shape).__name__.lower()
-            file = self.files.write(f"{kind}.ply", lambda path: path.write_bytes(ply(found.mesh)))
+            content = ply(found.mesh, float32=self.float32)
+            file = self.files.write(f"{kind}.ply", lambda path: path.write_bytes(content))
             self.known[id(shape)] = len(self.meshes)
             self.meshes.append(
                 {

@@ -5,10 +5,12 @@ import pytest
 
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, budgeted, compare_scene, single_lights
+from reference_rt.integrators import Direct, RayCast
 from reference_rt.integrators import Path as PathTracing
-from reference_rt.integrators import RayCast
+from reference_rt.lights import Point
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import Grid, Sobol
 
 TWO_LIGHTS = """
 camera: {type: perspective, eye: [0, 2, 5], target: [0, 0.4, 0], fov: 40}
@@ -89,6 +91,10 @@ def test_a_budget_changes_size_samples_and_filter(scene: Scene) -> None:
     other = budgeted(scene, Budget(size=(16, 12), spp=4))
     assert (other.film.width, other.film.height, other.resolved_sampler.spp) == (16, 12, 4)
     assert other.film.filter.type == "box"
+    lamp = Point(position=(0.0, 3.0, 0.0), intensity=(1.0, 1.0, 1.0))
+    dark = {"materials": {}, "shapes": (), "lights": (lamp,)}
+    fixed = scene.changed(integrator=Direct(), sampler=Grid(), **dark)
+    assert budgeted(fixed, Budget(spp=4)).sampler == Sobol(spp=4)
     cast = scene.changed(integrator=RayCast(), sampler=None)
     assert budgeted(cast, Budget(spp=4)).resolved_sampler.spp == cast.resolved_sampler.spp
     assert isinstance(other.integrator, PathTracing)

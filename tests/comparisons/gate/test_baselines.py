@@ -272,9 +272,12 @@ def test_the_digest_is_of_what_the_picture_depends_on(here: Path) -> None:
     assert scene_digest(Scene.parse(same)) == first
     assert scene_digest(Scene.parse(SCENE.replace("radius: 1", "radius: 2"))) != first
     grid = SCENE.replace("sobol", "grid") + "integrator: {type: whitted}\n"
-    assert scene_digest(Scene.parse(grid)) != scene_digest(
-        Scene.parse(grid.replace("spp: 4", "spp: 16"))
-    )
+    point = "{type: point, position: [0, 3, 0], intensity: 1}"
+    lamp = grid.replace("whitted", "direct").replace("{type: constant, radiance: 1}", point)
+    for text in (grid, lamp):
+        assert scene_digest(Scene.parse(text)) != scene_digest(
+            Scene.parse(text.replace("spp: 4", "spp: 16"))
+        )
     with_file = SCENE.replace("type: sphere, radius: 1", "type: mesh, file: m.gltf")
     digests = set()
     for mesh, buffer in (("{}", b"1"), ('{"uri": "b.bin"}', b"1"), ('{"uri": "b.bin"}', b"2")):

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 import reference_rt as rt
+from comparisons.cycles.translate import IneligibleError, bounces_of
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import trace
 from comparisons.mitsuba.scene import render
 from comparisons.mitsuba.translate import UntranslatableError, load, to_mitsuba
 from comparisons.mitsuba.translate.lights import ambient_of
+from comparisons.pbrt import write_pbrt
 from comparisons.rungs import geometry
 from reference_rt.cameras.camera import Camera
 from reference_rt.cameras.film import AnyFilter, BoxFilter, Film, GaussianFilter, TentFilter
@@ -253,3 +255,21 @@ def test_a_spot_along_any_axis_lights_what_lies_there(axis: tuple[float, float, 
     it.p = mi.Point3f(*(2.0 * direction).tolist())
     _, weight = light.sample_direction(it, mi.Point2f(0.5, 0.5))
     np.testing.assert_allclose(np.ravel(weight), 0.25, rtol=1e-5)
+
+
+@pytest.mark.parametrize("masked", [False, True])
+def test_light_without_shadows_has_no_counterpart(masked: bool, tmp_path: Path) -> None:
+    """Nor in the formats of other renderers; masks have an integrator of ours in Mitsuba."""
+    scene = Scene(
+        integrator=rt.Path(max_depth=2) if masked else rt.Direct(shadows=False),
+        materials={"a": rt.Diffuse(), "m": rt.Mask(base="a")},
+        shapes=(rt.Union(of=(Sphere(), Sphere()), material="m") if masked else Sphere(),),
+    ).changed(integrator=rt.Direct(shadows=False))
+    with pytest.raises(UntranslatableError, match="without shadows"):
+        to_mitsuba(scene)
+    with pytest.raises(SceneError) as caught:
+        write_pbrt(scene, tmp_path / "s.pbrt")
+    reasons = str(caught.value), *map(str, caught.value.others)
+    assert sum("direct light without shadows" in reason for reason in reasons) == 1
+    with pytest.raises(IneligibleError, match="without shadows"):
+        bounces_of(scene.integrator)

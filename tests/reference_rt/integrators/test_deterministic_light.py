@@ -75,6 +75,54 @@ def test_deterministic_lights(name):
     assert (np.abs(direct - expected) <= 1e-12 * np.maximum(expected, 1e-3 * scale)).all()
 
 
+def test_direct_on_a_grid():
+    """`direct` has the light of all lights at once, at the grid's points, in two samples a side."""
+    scene = rt.Scene(
+        camera=rt.Orthographic(eye=(0, 5, 0), target=(0, 0, 0), up=(0, 0, -1), width=4.0),
+        film=rt.Film(width=16, height=16),
+        integrator=rt.Direct(),
+        sampler=rt.Grid(spp=4),
+        materials={"floor": rt.Diffuse(reflectance=tuple(RHO))},
+        shapes=(FLOOR,),
+        lights=tuple(LIGHTS.values()),
+    )
+    along = (np.arange(32) + 0.5) / 8.0 - 2.0
+    z, x = np.meshgrid(along, along, indexing="ij")
+    p = np.stack([x, 0.0 * x, z], axis=-1).reshape(-1, 3)
+    exact = RHO / math.pi * sum(arriving(light, p) for light in LIGHTS.values())
+    expected = exact.reshape(16, 2, 16, 2, 3).mean(axis=(1, 3))
+    # The angle at a spot's rim, as above, counts relative to the brightest pixel.
+    permitted = 1e-12 * expected.max()
+    assert np.abs(rt.render(scene).colour - expected).max() <= permitted
+    # A wall that the camera sees edge-on blocks light, unless there are no shadows.
+    wall = rt.Rectangle(
+        transform=(*facing((0, 1, 0), 90), transform.Translate(translate=(1, 1, 0)))
+    )
+    scene = scene.changed(shapes=(FLOOR, wall))
+    dark = expected - rt.render(scene).colour
+    assert (dark >= -permitted).all()
+    assert (dark > 0.1 * expected.max()).any()
+    bright = rt.render(scene.changed(integrator=rt.Direct(shadows=False))).colour
+    assert np.abs(bright - expected).max() <= permitted
+
+
+def test_a_sky_without_shadows():
+    """In a corner, where half of it is hidden."""
+    wall = rt.Rectangle(transform=(transform.Translate(translate=(0, 0.9, 0.1)),))
+    sky = rt.Constant(radiance=(1, 2, 3))
+    floor = {"floor": rt.Diffuse(reflectance=tuple(RHO))}
+    scene = rt.Scene(materials=floor, shapes=(FLOOR, wall), lights=(sky,))
+    o, d = rays_onto(np.zeros((1, 3)))
+    open_sky, hidden = (
+        query.radiance(scene, o, d, spp=16384, integrator=rt.Direct(shadows=shadows))
+        for shadows in (False, True)
+    )
+    expected = RHO * sky.radiance
+    assert (np.abs(open_sky.mean - expected) <= 5.0 * open_sky.standard_error).all()
+    assert (open_sky.standard_error < 0.02 * expected).all()
+    assert (hidden.mean < 0.6 * expected).all()
+
+
 @pytest.mark.parametrize("half_vector", [False, True])
 def test_phong(half_vector):
     """k_a I_a + the sum over lights of (k_d l·n + k_s (e·r or h·n)^p) E, written out."""

@@ -130,6 +130,9 @@ def test_an_integrator_may_be_a_name_or_a_description(scene):
     assert with_settings(scene, integrator="ray_cast").integrator == rt.RayCast()
     assert with_settings(scene, integrator=rt.Path(max_depth=3)).integrator.max_depth == 3
     assert with_settings(scene, integrator="path") == scene
+    fixed = rt.Scene(integrator=rt.Direct(), sampler=rt.Grid(spp=4))
+    assert with_settings(fixed, integrator="whitted").resolved_sampler == fixed.sampler
+    assert isinstance(with_settings(fixed, integrator="path").resolved_sampler, rt.Sobol)
 
 
 def test_scenes_have_a_preview(scene):

@@ -77,6 +77,14 @@ SCENES = [
      "materials.a.base", "'a' is emissive itself; expected"),
     ("integrator: {type: path}\nsampler: {type: grid}", 2, "sampler.type",
      "'path' needs random numbers, which 'grid' does not have; expected"),
+    ("integrator: {type: direct, light_samples: 0, shadows: false}", 1, "integrator",
+     "no shadows and no samples of lights; expected light_samples above 0"),
+    ("integrator: {type: direct}\nsampler: {type: grid}\n"
+     "lights:\n  - {type: constant, radiance: 1}",
+     4, "lights[0]", "'direct' needs random numbers for the light 'constant'"),
+    ("integrator: {type: direct}\nsampler: {type: grid}\nmaterials:\n"
+     "  lamp: {type: emissive, radiance: 1}",
+     4, "materials.lamp", "'direct' needs random numbers for the light 'emissive'"),
     ("sampler: {type: grid, spp: 3}", 1, "sampler.spp",
      "expected a square number .. got 3"),
     ("camera: {type: perspective, target: [0, 0, 1]}", 1, "camera",
@@ -143,8 +151,6 @@ SCENES = [
      "no samples at all; expected light_samples or bsdf_samples above 0"),
     ("integrator: {type: path, sampling: all}", 1, "integrator.sampling",
      "expected 'both', 'lights'"),
-    ("integrator: {type: direct}\nsampler: {type: grid}", 2, "sampler.type",
-     "'direct' needs random"),
     ("film: {filter: {type: mitchell, b: 2}}", 1, "film.filter.b",
      "expected less than or equal to 1"),
     ("film: {filter: {type: lanczos, lobes: 0}}", 1, "film.filter.lobes",

@@ -1,0 +1,396 @@
+"""Materials and textures in glTF's terms, and the buffer that images stand in."""
+
+import hashlib
+import io
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+from comparisons.geometry import affine
+from comparisons.mitsuba.writing.files import Losses, UnwritableError
+from reference_rt import materials
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.vec3 import Vec3, luminance
+from reference_rt.rendering.image import srgb
+from reference_rt.textures import Bitmap, Checker, VertexColours
+from reference_rt.textures.image_file import linear
+
+
+@dataclass
+class _Look:
+    """A material in glTF's terms.  Colours and numbers are constants or names of textures.
+
+    tint: a factor of `base`;  of_alpha: whether `roughness` is GGX's alpha, its square;  normals:
+    the name of a texture."""
+
+    base: Any = (0.5, 0.5, 0.5)
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    metallic: Any = 0.0
+    roughness: Any = 1.0
+    of_alpha: bool = False
+    opacity: Any = 1.0
+    radiance: Any = (0.0, 0.0, 0.0)
+    normals: str = ""
+    both_sides: bool = False
+    extensions: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+
+class Surface(NamedTuple):
+    """number: the material's;  maps: of each set of texture coordinates, (3, 3);  colours: those of
+    vertices, if it has them;  tangents: whether it has a normal map."""
+
+    number: int
+    maps: tuple[FloatArray, ...]
+    colours: VertexColours | None
+    tangents: bool
+    both_sides: bool
+
+
+MATTE = {"KHR_materials_specular": {"specularFactor": 0.0}}
+"""Without its highlight glTF's dielectric is exactly Lambert's law."""
+
+NEARLY = {
+    "mirror": "a smooth metal, white at grazing angles",
+    "conductor": "a smooth metal of Schlick's reflectance",
+    "rough_conductor": "a metal of Schlick's reflectance",
+    "dielectric": "KHR_materials_transmission",
+    "thin_dielectric": "KHR_materials_transmission",
+    "rough_dielectric": "KHR_materials_transmission",
+    "plastic": "a diffuse base below a highlight",
+    "rough_plastic": "a diffuse base below a highlight",
+    "principled": "base colour, metallic, roughness and index alone",
+    "principled_thin": "base colour and roughness alone",
+    "phong": "a matte surface",
+}
+
+
+def _look(losses: Losses, name: str | None) -> _Look:
+    """Raises UnwritableError."""
+    if name is None:
+        return _Look(extensions=dict(MATTE))
+    material: Any = losses.scene.materials[name]
+    kind = material.type
+    if kind in NEARLY:
+        losses.note(f"the material '{name}' ({kind}) is only nearly so in glTF: {NEARLY[kind]}")
+    match material:
+        case materials.TwoSided():
+            if material.back not in (None, material.base):
+                raise UnwritableError("another material behind than in front")
+            found = _look(losses, material.base)
+            found.both_sides = True
+            return found
+        case materials.Mask():
+            found = _look(losses, material.base)
+            found.opacity = material.opacity
+            return found
+        case materials.NormalMap():
+            found = _look(losses, material.base)
+            found.normals = material.normals
+            return found
+        case materials.Bump():
+            losses.note(f"the bumps of the material '{name}' are left out")
+            return _look(losses, material.base)
+        case materials.Emissive():
+            losses.note("few renderers of glTF light others with surfaces that shine")
+            black = _Look((0.0, 0.0, 0.0), extensions=dict(MATTE))
+            found = black if material.base is None else _look(losses, material.base)
+            found.radiance = material.radiance
+            return found
+        case materials.Diffuse():
+            return _Look(material.reflectance, extensions=dict(MATTE))
+        case materials.Mirror():
+            return _Look(material.reflectance, metallic=1.0, roughness=0.0)
+        case materials.Conductor() | materials.RoughConductor():
+            eta, k = np.array(material.eta), np.array(material.k)
+            head_on = ((eta - 1.0) ** 2 + k**2) / ((eta + 1.0) ** 2 + k**2)
+            alpha = getattr(material, "alpha", 0.0)
+            return _Look(material.reflectance, tuple(head_on.tolist()), 1.0, _one(alpha), True)
+        case materials.Dielectric() | materials.ThinDielectric() | materials.RoughDielectric():
+            passing = {"KHR_materials_transmission": {"transmissionFactor": 1.0}}
+            alpha = getattr(material, "alpha", 0.0)
+            more = passing | _index(material.interior_ior / material.exterior_ior)
+            return _Look(material.transmittance, (1, 1, 1), 0.0, _one(alpha), True, extensions=more)
+        case materials.Plastic() | materials.RoughPlastic():
+            more = _index(material.interior_ior / material.exterior_ior)
+            alpha = _one(getattr(material, "alpha", 0.0))
+            return _Look(material.reflectance, (1, 1, 1), 0.0, alpha, True, extensions=more)
+        case materials.Principled():
+            more = _index(material.relative_ior)
+            base, metallic, rough = material.base_colour, material.metallic, material.roughness
+            return _Look(base, (1, 1, 1), metallic, rough, extensions=more)
+        case materials.PrincipledThin():
+            return _Look(material.base_colour, roughness=material.roughness)
+        case materials.Phong() if not isinstance(material.diffuse, str):
+            seen = np.minimum(np.pi * np.array(material.diffuse), 1.0)
+            return _Look(tuple(seen.tolist()), extensions=dict(MATTE))
+    if kind == "gltf_pbr":
+        more = _index(material.ior)
+        if (material.specular, material.specular_color) != (1.0, (1.0, 1.0, 1.0)):
+            if isinstance(material.specular, str) or isinstance(material.specular_color, str):
+                raise UnwritableError("a textured strength or colour of the highlight")
+            strength = {"specularFactor": material.specular}
+            strength |= {"specularColorFactor": list(material.specular_color)}
+            more["KHR_materials_specular"] = strength
+        base = material.base_color
+        return _Look(base, (1, 1, 1), material.metallic, material.roughness, extensions=more)
+    raise UnwritableError(f"a material '{kind}'")
+
+
+def _one(alpha: Any) -> Any:
+    """The roughness of both directions: a texture, or the geometric mean."""
+    along, across = alpha if isinstance(alpha, tuple) else (alpha, alpha)
+    if along == across:
+        return along
+    if isinstance(along, str) or isinstance(across, str):
+        raise UnwritableError("two roughnesses of which one is a texture")
+    return float(np.sqrt(along * across))
+
+
+def _index(ior: float) -> dict[str, dict[str, Any]]:
+    """An index below 1 reflects as its inverse does, head-on."""
+    ior = 1.0 / ior if 0.0 < ior < 1.0 else ior
+    return {} if ior == 1.5 else {"KHR_materials_ior": {"ior": ior}}
+
+
+class _Parts(NamedTuple):
+    """A colour: the product of a constant, of images by name, and of the vertices' colours."""
+
+    factor: FloatArray
+    images: tuple[str, ...] = ()
+    colours: VertexColours | None = None
+
+
+class _Image(NamedTuple):
+    """Linear texels (height, width, 3);  scale: a factor of 8-bit codes in them;  uv: (3, 3), from
+    a shape's coordinates;  sampler: glTF's."""
+
+    texels: FloatArray
+    scale: float
+    uv: FloatArray
+    sampler: dict[str, int]
+
+
+LINEAR, NEAREST = 9729, 9728
+WRAPS = {"repeat": 10497, "clamp": 33071, "mirror": 33648}
+
+
+@dataclass
+class Surfaces(Losses):
+    """The materials of a document that is being written.  data: its buffer;  lists: its parts by
+    kind;  used: its extensions."""
+
+    target: str = field(default="glTF", kw_only=True)
+    data: bytearray = field(default_factory=bytearray)
+    lists: dict[str, list[Any]] = field(default_factory=dict)
+    used: set[str] = field(default_factory=set)
+    views: dict[bytes, int] = field(default_factory=dict)
+    surfaces: dict[str | None, Surface] = field(default_factory=dict)
+
+    def add(self, where: str, value: Any) -> int:
+        """The number of a value in a list of the document; equal parts of textures are one."""
+        some = self.lists.setdefault(where, [])
+        if where in ("images", "samplers", "textures") and value in some:
+            return some.index(value)
+        some.append(value)
+        return len(some) - 1
+
+    def view(self, content: bytes, **more: int) -> int:
+        """The number of a view of the buffer at a multiple of four bytes; equal ones are one."""
+        key = hashlib.sha256(content + repr(more).encode()).digest()
+        if key not in self.views:
+            view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(content)}
+            self.data += content + b"\0" * (-len(content) % 4)
+            self.views[key] = self.add("bufferViews", view | more)
+        return self.views[key]
+
+    # ---- materials and textures ------------------------------------------------------------------
+
+    def surface(self, name: str | None) -> Surface:
+        if name not in self.surfaces:
+            self.surfaces[name] = Surface(0, (), None, False, True)
+            with self.collected("materials", name or "default"):
+                self.surfaces[name] = self.material(_look(self, name), name or "default")
+        return self.surfaces[name]
+
+    def material(self, look: _Look, name: str) -> Surface:
+        maps: list[FloatArray] = []
+        pbr: dict[str, Any] = {}
+        found: dict[str, Any] = {"name": name, "pbrMetallicRoughness": pbr}
+        base, opacity = self.parts(look.base), self.parts(look.opacity)
+        tint = base.factor * look.tint
+        if base.images or opacity.images:
+            rgb, alpha = self.images(base.images), self.images(opacity.images)
+            shape, sampler, uv = _common(*rgb, *alpha)
+            colour = np.prod([one.texels for one in rgb], axis=0) if rgb else np.ones(shape)
+            scale = np.prod([one.scale for one in rgb])
+            codes, tint = self.coded(colour * tint, tint * scale, 1.0, name)
+            if alpha:
+                grey = np.prod([_grey(one.texels) for one in alpha], axis=0)
+                shares = self.rounded(grey * opacity.factor[0], name)
+                codes = np.concatenate([codes, shares[..., None]], axis=2)
+            pbr["baseColorTexture"] = self.texture(codes, sampler, uv, maps)
+        share = 1.0 if opacity.images else float(opacity.factor[0])
+        pbr["baseColorFactor"] = [*tint.tolist(), share]
+        cutoff = next((self.cutoff(image) for image in opacity.images), None)
+        if cutoff is not None:
+            found |= {"alphaMode": "MASK", "alphaCutoff": cutoff}
+        elif opacity.images or share < 1.0:
+            found["alphaMode"] = "BLEND"
+        rough, metal = self.parts(look.roughness), self.parts(look.metallic)
+        values = {"roughnessFactor": rough, "metallicFactor": metal}
+        if rough.images or metal.images:
+            planes = {key: self.images(part.images) for key, part in values.items()}
+            first = [one for some in planes.values() for one in some]
+            shape, sampler, uv = _common(*first)
+            codes = np.full(shape, 255, np.uint8)
+            for k, (key, some) in enumerate(planes.items(), 1):
+                if some:
+                    grey = np.prod([_grey(one.texels) for one in some], axis=0)
+                    grey = grey * values[key].factor[0]
+                    root = look.of_alpha and key == "roughnessFactor"
+                    codes[..., k] = self.rounded(np.sqrt(grey) if root else grey, name)
+            pbr["metallicRoughnessTexture"] = self.texture(codes, sampler, uv, maps)
+        for key, part in values.items():
+            number = float(part.factor[0])
+            root = look.of_alpha and key == "roughnessFactor"
+            pbr[key] = 1.0 if part.images else float(np.sqrt(number)) if root else number
+        if look.normals:
+            (one,) = self.images((look.normals,))
+            codes = self.rounded(one.texels, name)
+            found["normalTexture"] = self.texture(codes, one.sampler, one.uv, maps)
+        self.emission(look, found, maps, name)
+        if look.both_sides:
+            found["doubleSided"] = True
+        if rough.colours or metal.colours or opacity.colours:
+            raise UnwritableError("vertex colours that are no base colour")
+        if look.extensions:
+            found["extensions"] = found.get("extensions", {}) | look.extensions
+        self.used |= found.get("extensions", {}).keys()
+        number = self.add("materials", found)
+        return Surface(number, tuple(maps), base.colours, bool(look.normals), look.both_sides)
+
+    def emission(
+        self, look: _Look, found: dict[str, Any], maps: list[FloatArray], name: str
+    ) -> None:
+        shining = self.parts(look.radiance)
+        factor = shining.factor
+        if shining.colours:
+            raise UnwritableError("vertex colours that shine")
+        if shining.images:
+            some = self.images(shining.images)
+            _, sampler, uv = _common(*some)
+            texels = np.prod([one.texels for one in some], axis=0) * factor
+            scale = factor * np.prod([one.scale for one in some])
+            codes, factor = self.coded(texels, scale, np.inf, name)
+            found["emissiveTexture"] = self.texture(codes, sampler, uv, maps)
+        strength = max(1.0, float(factor.max()))
+        if factor.any():
+            found["emissiveFactor"] = (factor / strength).tolist()
+        if strength > 1.0:
+            more = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
+            found["extensions"] = more
+
+    def parts(self, value: Any) -> _Parts:
+        if not isinstance(value, str):
+            return _Parts(np.array(value, dtype=np.float64) * np.ones(3))
+        texture: Any = self.scene.textures[value]
+        if isinstance(texture, VertexColours):
+            return _Parts(np.ones(3), (), texture)
+        if texture.type != "product":
+            return _Parts(np.ones(3), (value,))
+        some = [self.parts(name) for name in texture.of]
+        colours = [part.colours for part in some if part.colours is not None]
+        if colours[1:]:
+            raise UnwritableError("vertex colours times vertex colours")
+        factor = np.prod([part.factor for part in some], axis=0) * texture.factor
+        images = tuple(name for part in some for name in part.images)
+        return _Parts(factor, images, colours[0] if colours else None)
+
+    def cutoff(self, name: str) -> float | None:
+        """The opacity from which a mask is opaque; None where it may be between."""
+        texture = self.scene.textures[name]
+        if isinstance(texture, Checker):
+            return 0.5 if {texture.first, texture.second} <= {(0.0,) * 3, (1.0,) * 3} else None
+        found: float | None = getattr(texture, "cutoff", None)
+        return found
+
+    def images(self, names: tuple[str, ...]) -> list[_Image]:
+        return [self.image(name) for name in names]
+
+    def image(self, name: str) -> _Image:
+        texture = self.scene.textures[name]
+        uv = affine.of_uv(texture.uv)
+        match texture:
+            case Checker():
+                pair = np.array([texture.first, texture.second])
+                scale = float(pair.max()) or 1.0
+                both = {"magFilter": NEAREST, "minFilter": NEAREST}
+                tiled = {"wrapS": WRAPS["repeat"], "wrapT": WRAPS["repeat"]}
+                return _Image(pair[[[1, 0], [0, 1]]], scale, uv, both | tiled)
+            case Bitmap():
+                read = partial(texture.read, self.scene.folder)
+                texels = self.read(read, "textures", name).linear
+                kind = LINEAR if texture.filter == "bilinear" else NEAREST
+                wrap: Any = texture.wrap
+                along = (wrap, wrap) if isinstance(wrap, str) else wrap
+                sampler = {"magFilter": kind, "minFilter": kind}
+                sampler |= {"wrapS": WRAPS[along[0]], "wrapT": WRAPS[along[1]]}
+                return _Image(texels, texture.scale, uv, sampler)
+        raise UnwritableError(f"a texture '{texture.type}'")
+
+    def coded(
+        self, values: FloatArray, scale: FloatArray, most: float, name: str
+    ) -> tuple[npt.NDArray[np.uint8], FloatArray]:
+        """8-bit sRGB of colours over a factor, and the factor: `scale` where colours and factor are
+        small enough, else the largest colours."""
+        highest = values.max(axis=(0, 1))
+        factor = scale if np.all(highest <= scale) and scale.max() <= most else highest
+        divisor = np.where(factor > 0.0, factor, 1.0)
+        codes = np.round(255.0 * srgb(values / divisor)).astype(np.uint8)
+        self.eight_bits(np.abs(linear(codes / 255.0) * factor - values).max(), name)
+        return codes, factor
+
+    def rounded(self, values: FloatArray, name: str) -> npt.NDArray[np.uint8]:
+        """8 bits of numbers from 0 to 1."""
+        codes = np.round(255.0 * np.clip(values, 0.0, 1.0)).astype(np.uint8)
+        self.eight_bits(np.abs(codes / 255.0 - values).max(), name)
+        return codes
+
+    def eight_bits(self, error: float, name: str) -> None:
+        if error > 1e-9:
+            self.note(f"a texture of '{name}' is rounded to 8 bits, by up to {error:.1g}")
+
+    def texture(
+        self,
+        codes: npt.NDArray[np.uint8],
+        sampler: dict[str, int],
+        uv: FloatArray,
+        maps: list[FloatArray],
+    ) -> dict[str, int]:
+        """A texture with its set of texture coordinates: those of the map `uv`."""
+        stream = io.BytesIO()
+        Image.fromarray(codes).save(stream, "PNG")
+        source = {"bufferView": self.view(stream.getvalue()), "mimeType": "image/png"}
+        number = {"source": self.add("images", source), "sampler": self.add("samplers", sampler)}
+        same = [k for k, other in enumerate(maps) if np.array_equal(other, uv)]
+        if not same:
+            maps.append(uv)
+        which = same[0] if same else len(maps) - 1
+        return {"index": self.add("textures", number), "texCoord": which}
+
+
+def _grey(texels: FloatArray) -> FloatArray:
+    return np.asarray(luminance(Vec3(*np.moveaxis(texels, -1, 0))))
+
+
+def _common(first: _Image, *others: _Image) -> tuple[Any, dict[str, int], FloatArray]:
+    """The shape, sampler and map of images that become one."""
+    for one in others:
+        same = one.texels.shape == first.texels.shape and one.sampler == first.sampler
+        if not (same and np.array_equal(one.uv, first.uv)):
+            raise UnwritableError("textures of several sizes, filters or maps in one")
+    return first.texels.shape, first.sampler, first.uv
