@@ -188,11 +188,11 @@ def main(page_file: str, folder: str, output: str, *numbers: str) -> None:
     from playwright.sync_api import Error, sync_playwright
 
     path, _, query = page_file.partition("?")
-    file, here = Path(path).absolute(), Path.cwd()
+    file, here = Path(path).resolve(), Path.cwd()
     if not file.is_file():
         raise PageError(f"{path}: there is no such page")
     root = here if file.is_relative_to(here) else file.parent
-    data = None if folder == "-" else Path(folder)
+    data = None if folder == "-" else Path(folder).resolve()
     seeds, *sizes = numbers
     spp, width, height = (None if text == "-" else int(text) for text in sizes)
     scene = None if data is None else f"{HOST}{SCENE}scene.json"

@@ -127,7 +127,7 @@ def look_at(scene: Scene, threads: int | None = None) -> Look | None:
     def look(points: FloatArray) -> tuple[FloatArray, FloatArray]:
         rays = scene.camera_rays(points - 0.5, threads=threads)
         return (
-            sum(part.radiance(*rays, spp=1, threads=threads).mean for part in parts),
+            np.sum([part.radiance(*rays, spp=1, threads=threads).mean for part in parts], axis=0),
             scene.first_hits(*rays, threads=threads).t,
         )
 

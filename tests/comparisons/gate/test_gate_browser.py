@@ -134,10 +134,15 @@ PAGE = DOCUMENTED.partition("```html\n")[2].partition("```")[0]
     ],
 )
 def test_the_gate_judges_what_a_page_makes_of_a_scene(
-    page: Path, size: str, exit_code: int, verdict: str
+    page: Path, size: str, exit_code: int, verdict: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Neither the page nor the outputs are named from the working folder down."""
     page.write_text(PAGE.replace("{ width, height, pixels", f"{{ {size}, pixels"))
     Path("square.yaml").write_text(SCENE)
-    result, found = run("--browser", "page.html", "--scene", "square.yaml")
+    Path("work").mkdir()
+    monkeypatch.chdir("work")
+    result, found = run(
+        *("--browser", "../page.html", "--scene", "../square.yaml", "--out", "../work/out")
+    )
     assert result.exit_code == exit_code, result.output
     assert found["cases"][0]["verdict"] == verdict
