@@ -286,6 +286,18 @@ def test_a_scene_through_the_gate() -> None:
         assert gated(0.5, rim).verdict == "differ"
 
 
+def test_a_dithered_picture_of_a_scene() -> None:
+    """It is off by a code on edges, too."""
+    scene = Scene.parse(SCENE)
+    look, reference = look_at(scene), of_scene(scene, 0.005)
+    assert look is not None
+    noise = np.random.default_rng(1).uniform(-0.5, 0.5, (30, 40, 3))
+    codes = np.clip(np.round(255.0 * srgb(np.clip(reference.pictures[0], 0, 1)) + noise), 0, 255)
+    shown = Picture(linear(codes / 255.0), quantised=True, displayed=True)
+    case = gate_pictures([shown], reference, edges=Edges(look))
+    assert case.verdict == "agree", case.reason
+
+
 def test_scenes_without_footprints() -> None:
     """Random radiance, wider filters, and pictures of other layers."""
     for old, new in (
