@@ -132,7 +132,7 @@ def judged(
     exact = reference.pictures[0]
     if reference.noise_free and candidates[0].displayed:
         if _is_dithered(candidates[0].radiance, reference.pictures[0]):
-            shown = candidates[0].radiance[np.newaxis]
+            shown, edges = candidates[0].radiance[np.newaxis], None
             notes.append(
                 "the candidate is stored as 8-bit sRGB: it is within a code of the reference "
                 "everywhere, and its errors have no mean, as those of dithering; they count as none"
