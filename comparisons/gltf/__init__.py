@@ -211,8 +211,10 @@ class _Document(Surfaces):
         that are moved."""
         key: str | int = copy.group or copy.shape
         gram = copy.outer[:, :3].T @ copy.outer[:, :3]
-        sheared = np.abs(gram - np.diag(np.diag(gram))).max() > 1e-9 * np.abs(gram).max()
-        if sheared:
+        moved = np.abs(gram - np.diag(np.diag(gram))).max() > 1e-9 * np.abs(gram).max()
+        if affine.mirrors(copy.outer):  # renderers compute bitangents in the world
+            moved |= any(self.surface(x.material).follow_v for m in copy.members for x in m.leaves)
+        if moved:
             number, m = self.mesh(copy, copy.outer), affine.IDENTITY
         else:
             if key not in self.meshes:
@@ -268,7 +270,7 @@ class _Document(Surfaces):
             mapped = np.column_stack([mesh.uv, np.ones(len(mesh.vertices))]) @ uv[:2].T
             attributes[f"TEXCOORD_{k}"] = self.numbers(mapped * [1.0, -1.0] + [0.0, 1.0])
         if surface.tangents:
-            attributes["TANGENT"] = self.numbers(_tangents(mesh))
+            attributes["TANGENT"] = self.numbers(_tangents(mesh, surface.follow_v))
         if (of := surface.colours) is not None:
             plain = np.tile(of.without, (len(mesh.vertices), 1))
             shown = plain if mesh.colours is None else mesh.colours * of.scale
@@ -297,19 +299,22 @@ class _Document(Surfaces):
         return self.add("accessors", accessor)
 
 
-def _tangents(mesh: MeshData) -> FloatArray:
-    """(n, 4): dp/du across the normals, and 1: our frames are right-handed."""
+def _tangents(mesh: MeshData, follow_v: bool) -> FloatArray:
+    """(n, 4): dp/du across the normals, and 1, as our frames are right-handed, or where they follow
+    v the side of dp/dv."""
     assert mesh.uv is not None
     assert mesh.normals is not None
     p, uv = mesh.vertices[mesh.faces], mesh.uv[mesh.faces]
     (a, b), (s, t) = ((x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]) for x in (p, uv))
     area = s[:, :1] * t[:, 1:] - t[:, :1] * s[:, 1:]
-    along = np.sign(area) * (a * t[:, 1:] - b * s[:, 1:])
-    found = np.zeros_like(mesh.vertices)
+    found, of_v = np.zeros_like(mesh.vertices), np.zeros_like(mesh.vertices)
     for corner in range(3):
-        np.add.at(found, mesh.faces[:, corner], along)
+        at = mesh.faces[:, corner]
+        np.add.at(found, at, np.sign(area) * (a * t[:, 1:] - b * s[:, 1:]))
+        np.add.at(of_v, at, np.sign(area) * (b * s[:, :1] - a * t[:, :1]))
     n = mesh.normals
     across = found - n * np.sum(n * found, axis=1, keepdims=True)
     lost = np.linalg.norm(across, axis=1) <= 1e-12 * np.linalg.norm(found, axis=1)
     across[lost] = np.cross(n, np.eye(3)[np.argmin(np.abs(n), axis=1)])[lost]
-    return np.column_stack([unit(across), np.ones(len(across))])
+    side = np.sum(np.cross(n, across) * of_v, axis=1)
+    return np.column_stack([unit(across), np.where(follow_v & (side < 0.0), -1.0, 1.0)])

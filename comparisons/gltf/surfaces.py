@@ -25,7 +25,7 @@ class _Look:
     """A material in glTF's terms.  Colours and numbers are constants or names of textures.
 
     tint: a factor of `base`;  of_alpha: whether `roughness` is GGX's alpha, its square;  normals:
-    the name of a texture."""
+    a `normal_map`."""
 
     base: Any = (0.5, 0.5, 0.5)
     tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -34,20 +34,22 @@ class _Look:
     of_alpha: bool = False
     opacity: Any = 1.0
     radiance: Any = (0.0, 0.0, 0.0)
-    normals: str = ""
+    normals: Any = None
     both_sides: bool = False
     extensions: dict[str, dict[str, Any]] = field(default_factory=dict)
 
 
 class Surface(NamedTuple):
     """number: the material's;  maps: of each set of texture coordinates, (3, 3);  colours: those of
-    vertices, if it has them;  tangents: whether it has a normal map."""
+    vertices, if it has them;  tangents: whether it has a normal map;  follow_v: whether green is
+    along dp/dv there."""
 
     number: int
     maps: tuple[FloatArray, ...]
     colours: VertexColours | None
     tangents: bool
     both_sides: bool
+    follow_v: bool = False
 
 
 MATTE = {"KHR_materials_specular": {"specularFactor": 0.0}}
@@ -89,7 +91,7 @@ def _look(losses: Losses, name: str | None) -> _Look:
             return found
         case materials.NormalMap():
             found = _look(losses, material.base)
-            found.normals = material.normals
+            found.normals = material
             return found
         case materials.Bump():
             losses.note(f"the bumps of the material '{name}' are left out")
@@ -258,10 +260,11 @@ class Surfaces(Losses):
             number = float(part.factor[0])
             root = look.of_alpha and key == "roughnessFactor"
             pbr[key] = 1.0 if part.images else float(np.sqrt(number)) if root else number
-        if look.normals:
-            (one,) = self.images((look.normals,))
+        if look.normals is not None:
+            one = self.image(look.normals.normals)
             codes = self.rounded(one.texels, name)
-            found["normalTexture"] = self.texture(codes, one.sampler, one.uv, maps)
+            texture = self.texture(codes, one.sampler, one.uv, maps)
+            found["normalTexture"] = texture | {"scale": getattr(look.normals, "scale", 1.0)}
         self.emission(look, found, maps, name)
         if look.both_sides:
             found["doubleSided"] = True
@@ -271,7 +274,10 @@ class Surfaces(Losses):
             found["extensions"] = found.get("extensions", {}) | look.extensions
         self.used |= found.get("extensions", {}).keys()
         number = self.add("materials", found)
-        return Surface(number, tuple(maps), base.colours, bool(look.normals), look.both_sides)
+        tangents = look.normals is not None
+        follow_v = getattr(look.normals, "follow_v", False)
+        colours = base.colours
+        return Surface(number, tuple(maps), colours, tangents, look.both_sides, follow_v)
 
     def emission(
         self, look: _Look, found: dict[str, Any], maps: list[FloatArray], name: str

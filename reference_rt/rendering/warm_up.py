@@ -138,8 +138,12 @@ def _pictures(scene: BuiltScene) -> Iterator[Call]:
     """The linked kernels of its pictures by all integrators, with its sampler where that fits."""
     for integrator in _INTEGRATORS:
         fits = integrator.deterministic or not isinstance(scene.sampler, Grid)
-        changes = {"integrator": integrator, "sampler": scene.sampler if fits else None}
-        yield from picture_calls(scene.model_copy(update=changes))
+        samplers = [scene.sampler if fits else None]
+        if isinstance(integrator, Direct) and not fits:
+            samplers.append(scene.sampler)
+        for sampler in samplers:
+            changes = {"integrator": integrator, "sampler": sampler}
+            yield from picture_calls(scene.model_copy(update=changes))
 
 
 # ---- queries -------------------------------------------------------------------------------------

@@ -188,7 +188,7 @@ class File:
             s = part.m @ at["TANGENT"][:3]
             s = s - n * (n @ s)
             s /= np.linalg.norm(s)
-            x, y, z = 2.0 * found - 1.0
+            x, y, z = (2.0 * found - 1.0) * [which["scale"], which["scale"], 1.0]
             n = x * s + y * np.cross(n, s) * at["TANGENT"][3] + z * n
             n /= np.linalg.norm(n)
         point, total = eye + t * d, np.zeros(3)
@@ -235,9 +235,15 @@ def look_of(part: SimpleNamespace) -> dict[str, int] | None:
     return part.look.get("normalTexture")  # type: ignore[no-any-return]
 
 
-def test_a_picture_of_the_file_is_ours(scene: rt.Scene, tmp_path: Path) -> None:
+NORMALS = rt.NormalMap.model_fields
+
+
+@pytest.mark.parametrize("follow_v", [False, True] if "follow_v" in NORMALS else [False])
+def test_a_picture_of_the_file_is_ours(scene: rt.Scene, tmp_path: Path, follow_v: bool) -> None:
     """Camera, triangles, instances (mirrored, sheared), textures and their maps, vertex colours,
     normal maps, lights."""
+    if follow_v:
+        scene = following_v(scene)
     write_gltf(scene, tmp_path / "out.glb")
     file = File((tmp_path / "out.glb").read_bytes())
     for node in file.json["nodes"]:  # as the specification demands: no shear
@@ -251,6 +257,22 @@ def test_a_picture_of_the_file_is_ours(scene: rt.Scene, tmp_path: Path) -> None:
     # Vertices, normals and coordinates are float32: relative errors of 6e-8, a dozen in a product.
     wrong = np.abs(found - expected).max(axis=2) > 2e-6 * expected.max()
     assert not wrong.any()
+
+
+def following_v(scene: rt.Scene) -> rt.Scene:
+    rough = scene.materials["rough"].model_copy(update={"follow_v": True, "scale": 0.7})
+    return scene.changed(materials=dict(scene.materials) | {"rough": rough})
+
+
+@pytest.mark.skipif("follow_v" not in NORMALS, reason="scenes of glTF are not read")
+def test_the_file_is_read_as_our_scene(scene: rt.Scene, tmp_path: Path) -> None:
+    scene = following_v(scene)
+    write_gltf(scene, tmp_path / "out.glb")
+    read = rt.Scene.load(tmp_path / "out.glb")
+    film = {"film": scene.film, "integrator": scene.integrator, "sampler": scene.sampler}
+    expected = rt.render(scene).colour
+    error = np.abs(rt.render(read.changed(**film)).colour - expected).max()
+    assert error <= 2e-6 * expected.max()  # as above
 
 
 def test_trimesh_reads_the_same_triangles(scene: rt.Scene, tmp_path: Path) -> None:
@@ -324,12 +346,14 @@ def test_materials(kind: str, tmp_path: Path) -> None:
 
 def test_gltf_pbr_is_written_as_it_is(tmp_path: Path) -> None:
     """Its textures of numbers share an image."""
-    values = {"base_color": (0.1, 0.2, 0.3), "metallic": "grey", "roughness": 0.25, "ior": 1.4}
+    values = {"base_color": "product", "metallic": "grey", "roughness": 0.25, "ior": 1.4}
     values |= {"specular": 0.5, "specular_color": (1.0, 0.5, 1.0)}
     material = SimpleNamespace(type="gltf_pbr", **values)
-    textures = {"grey": rt.Checker(first=(0.2,) * 3, second=(1.0,) * 3)}
+    product = SimpleNamespace(type="product", of=("vertices",), factor=(0.1, 0.2, 0.3))
+    textures = {"grey": rt.Checker(first=(0.2,) * 3, second=(1.0,) * 3), "product": product}
+    textures["vertices"] = rt.VertexColours()
     surfaces = Surfaces(SimpleNamespace(materials={"m": material}, textures=textures))
-    surfaces.surface("m")
+    assert surfaces.surface("m").colours == rt.VertexColours()
     (look,) = surfaces.lists["materials"]
     pbr = look["pbrMetallicRoughness"]
     assert pbr["baseColorFactor"] == [0.1, 0.2, 0.3, 1.0]

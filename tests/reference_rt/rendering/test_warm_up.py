@@ -207,7 +207,7 @@ def test_every_integrator_with_every_sampler(known):
         (setup.__name__, "LinkedScene", "LinkedView", "Link", sampler)
         for setup in INTEGRATORS
         for sampler in ("SobolSetup", "IndependentSetup", "GridSetup")
-        if setup.__name__ == "WhittedSetup" or sampler != "GridSetup"
+        if setup.__name__ in ("WhittedSetup", "DirectSetup") or sampler != "GridSetup"
     }
     assert drivers == expected
 
