@@ -73,12 +73,20 @@ def gate(
             "{seeds}, with which one start makes several pictures: %d in {output} is the seed."
         ),
     ] = None,
+    browser: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PAGE[?QUERY]",
+            help="Let this web page make the candidates, in Chromium: its window.render() gets the "
+            "scene as data and returns pixels, see docs/realtime.md.",
+        ),
+    ] = None,
     replicates: Annotated[
         int | None,
         typer.Option(
             min=1,
-            help="Pictures by --command at the first look; 1: no more. "
-            "(default: 8; 1 without noise)",
+            help="Pictures by --command or --browser at the first look; 1: no more. "
+            "(default: 8; 1 without noise or by --browser)",
         ),
     ] = None,
     fixed: Fixed = False,
@@ -102,12 +110,17 @@ def gate(
         typer.Option(
             min=0.1,
             metavar="SECONDS",
-            help="Add no pictures by --command beyond this time; also the limit of each. "
-            "(default: 600)",
+            help="Add no pictures by --command or --browser beyond this time; also the limit of "
+            "each. (default: 600)",
         ),
     ] = None,
     suffix: Annotated[
-        str | None, typer.Option(help="Suffix of {output}. (default: .exr)", metavar=".EXT")
+        str | None,
+        typer.Option(
+            help="Suffix of {output}. (default: .exr) Of --browser: .png if the page returns 8-bit "
+            "codes. (default: .npy)",
+            metavar=".EXT",
+        ),
     ] = None,
     layer: Layer = "",
     reference_layer: Annotated[
@@ -118,6 +131,12 @@ def gate(
         typer.Option(help="Smallest relative bias of the image mean that must be detectable."),
     ] = 0.005,
     noise_free: NoiseFree = False,
+    tolerance: Annotated[
+        float,
+        typer.Option(
+            help="Permitted relative error of a value in a picture of --scene without noise."
+        ),
+    ] = 0.001,
     witness: Witness = None,
     rim: Annotated[
         int,
@@ -154,6 +173,7 @@ def gate(
         from comparisons.gate.reference import SizeError, is_noise_free
         from comparisons.gate.request import Request, gated
         from comparisons.gate.rounds import Rounds, gated_renderer
+        from comparisons.mitsuba.writing.resolved import write_resolved
         from comparisons.renderers import witness_facts
         from comparisons.report import terminal
         from comparisons.results.case import trace_command
@@ -161,16 +181,19 @@ def gate(
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.console import ProgressLine
 
-    if (command is None) == (not candidates):
-        raise UsageError("expected either candidates or --command")
+    if [command is None, browser is None, not candidates].count(False) != 1:
+        raise UsageError("expected either candidates, --command or --browser")
+    driven = command is not None or browser is not None
     driving: dict[str, Any] = {"replicates": replicates, "seed": seed, "suffix": suffix}
     driving |= {"time-limit": time_limit, "fixed": fixed or None}
     given = [name for name, value in driving.items() if value is not None]
-    if command is None and given:
+    if not driven and given:
         raise UsageError(f"--{given[0]}: only applies to --command; expected that too")
+    if browser is not None and suffix not in (None, ".npy", ".png"):
+        raise UsageError(f"--suffix: {suffix} with --browser; expected .npy or .png")
     if scene is None and size is not None:
         raise UsageError("--size: only applies to --scene; expected that too")
-    if scene is None and command is None and spp is not None:
+    if scene is None and not driven and spp is not None:
         raise UsageError("--spp: only applies to --scene or --command; expected one of them")
     if truth is not None:
         others: dict[str, Any] = {
@@ -180,7 +203,7 @@ def gate(
             "size": size,
         }
         others |= {"baseline": baseline, "fixed": fixed, "noise-free": noise_free, "rim": rim}
-        others |= {"witness": witness}
+        others |= {"witness": witness, "browser": browser}
         for name, value in {**others, "junit": junit, "github": github, "define": define}.items():
             if value:
                 raise UsageError(f"--{name}: does not apply to --truth; expected one of them")
@@ -189,17 +212,23 @@ def gate(
                    seconds=time_limit, **numbers)  # fmt: skip
     described = None if scene is None else adjusted(Scene.load(scene, by_name(define)), spp, size)
     run, rounds = None, Rounds()
-    if command is not None:
+    if driven:
         noiseless = noise_free or (described is not None and is_noise_free(described))
         own, film = spp, None
         if described is not None:
             own = getattr(described.resolved_sampler, "spp", spp)
             film = (described.film.width, described.film.height)
-        run = Command(command, scene, own, suffix or ".exr", time_limit or SECONDS, film)
+        more: dict[str, Any] = {"spp": own, "size": film, "seconds": time_limit or SECONDS}
+        if browser is not None:
+            data = None if scene is None else out / "candidates" / "scene.json"
+            run = Command.of_page(browser, scene=data, suffix=suffix or ".npy", **more)
+        else:
+            run = Command(str(command), scene, suffix=suffix or ".exr", **more)
         run.arguments(out, 0)
+        one = noiseless or browser is not None
         rounds = Rounds(
             1 if seed is None else seed,
-            replicates or (1 if noiseless else Rounds().replicates),
+            replicates or (1 if one else Rounds().replicates),
             None if fixed else time_limit or SECONDS,
         )
 
@@ -224,6 +253,7 @@ def gate(
             baselines=baselines,
             limit=limit,
             noise_free=noise_free,
+            tolerance=tolerance,
             threads=threads,
             rim=rim,
             name=name,
@@ -231,6 +261,8 @@ def gate(
         )
         with ProgressLine() as progress:
             if run is not None:
+                if browser is not None and described is not None:
+                    write_resolved(described, run.scene or out, float32=True)
                 driver = Driver(run, out / "candidates", progress.line)
                 case = gated_renderer(request, driver, rounds, progress.line, progress)
             else:
@@ -251,6 +283,7 @@ def gate(
     facts = {"limit": limit, "candidates": names}
     facts |= {"baseline": baseline} if baseline else {}
     facts |= {"command": command} if command else {}
+    facts |= {"browser": browser} if browser else {}
     facts |= witness_facts(witness)
     results, report = outputs.write(case, out, facts, time.perf_counter() - started)
     outputs.for_ci(case, junit, "" if scene is None else scene.as_posix(), github)

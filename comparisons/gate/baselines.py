@@ -20,7 +20,6 @@ import numpy as np
 from pydantic import Field
 
 from comparisons.gate.digest import fingerprint
-from comparisons.gate.errors import BaselineEditedError, BaselineMissingError
 from comparisons.gate.pictures_in import Picture, read_candidate
 from comparisons.gate.reference import Reference, stacked, usable
 from comparisons.results.files import sealed, unsealed
@@ -28,7 +27,13 @@ from reference_rt.cli.options import adjusted
 from reference_rt.core.exr import write_exr
 from reference_rt.core.model import Description
 from reference_rt.rendering.scene import Scene
-from reference_rt.util.errors import ImageError, SceneError, UsageError, printable
+from reference_rt.util.errors import (
+    ImageError,
+    ReferenceRtError,
+    SceneError,
+    UsageError,
+    printable,
+)
 from reference_rt.util.files import check_writable, read_input, read_text, temporary_folder
 
 RECORD = "baseline.json"
@@ -40,6 +45,16 @@ _FILE = re.compile(r"picture-[0-9]{2}\.exr")
 """The names that `accept` gives to pictures.  A baseline may come from a stranger."""
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+
+
+class BaselineMissingError(ReferenceRtError):
+    """There is no such baseline, or its scene has changed since it was accepted."""
+
+    exit_code = 4
+
+
+class BaselineEditedError(ImageError):
+    """A baseline's files have changed since `accept` wrote them."""
 
 
 class SceneOf(Description):

@@ -14,11 +14,18 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from comparisons.gate.errors import RendererError
 from comparisons.gate.pictures_in import Picture, read_candidate
-from reference_rt.util.errors import ImageError, UsageError
+from reference_rt.util.errors import ImageError, ReferenceRtError, UsageError
 from reference_rt.util.files import temporary_folder
+
+
+class RendererError(ReferenceRtError):
+    """The renderer under test hung, crashed, or did not write the requested file."""
+
+    exit_code = 4
+
 
 PLACEHOLDERS = ("scene", "output", "seed", "seeds", "spp", "width", "height")
 
@@ -39,7 +46,8 @@ class Command:
 
     template: the command line, split like a shell's but run without a shell; the PLACEHOLDERS in
     its arguments are replaced;  scene: the file for {scene};  size: {width} and {height};  suffix:
-    the output's, from which most renderers derive the format;  seconds: time limit of one picture.
+    the output's, from which most renderers derive the format;  seconds: time limit of one picture;
+    name: the renderer's in messages, by default that of the program.
 
     With {seeds} the renderer makes several pictures in one start: {seeds} becomes "1,2,3", and
     {output} a file name with %d in place of the seed.
@@ -51,6 +59,19 @@ class Command:
     suffix: str = ".exr"
     seconds: float = 600.0
     size: tuple[int, int] | None = None
+    name: str = ""
+
+    @classmethod
+    def of_page(cls, page: str, **values: Any) -> "Command":
+        """A web page, with its `?query`, as a renderer;  values: those of `Command`, of which
+        `scene` is the file that the page gets, named scene.json."""
+        known = {"spp", "size"} & {key for key, value in values.items() if value is not None}
+        sizes = ("{width}", "{height}") if "size" in known else ("-", "-")
+        module = "comparisons.gate.browser"
+        data = "-" if values["scene"] is None else str(values["scene"].parent)
+        words = [sys.executable, "-P", "-m", module, page, data, "{output}", "{seeds}"]
+        words += ["{spp}" if "spp" in known else "-", *sizes]
+        return cls(shlex.join(words), name=Path(page.partition("?")[0]).name, **values)
 
     @property
     def together(self) -> bool:
@@ -143,7 +164,8 @@ class Driver:
             arguments = self._command.arguments(pattern, *seeds)
             begun = time.perf_counter()
             try:
-                _run(arguments, place / "said", self._command.seconds * len(seeds), which)
+                name = self._command.name or Path(arguments[0]).name
+                _run(arguments, place / "said", self._command.seconds * len(seeds), which, name)
                 for output in outputs:
                     _check_written(output, before, which)
             except RendererError:
@@ -176,7 +198,7 @@ def _named(seeds: Sequence[int]) -> str:
     return f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {', '.join(map(str, seeds))}"
 
 
-def _run(arguments: list[str], said: Path, seconds: float, which: str) -> None:
+def _run(arguments: list[str], said: Path, seconds: float, which: str, name: str) -> None:
     """Run the renderer; after the time limit, kill it and all processes that came from it.  said:
     the file for what it prints."""
     supervisor = Path(__file__).with_name("supervisor.py")
@@ -190,7 +212,6 @@ def _run(arguments: list[str], said: Path, seconds: float, which: str) -> None:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise RendererError(f"{arguments[0]}: cannot be started: {reason}") from None
-    name = Path(arguments[0]).name
     try:
         assert process.stdout is not None
         # It answers when the renderer has ended.

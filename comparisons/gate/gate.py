@@ -11,6 +11,7 @@ from comparisons.compare.judge import Lights, despite, likeliest_cause, with_vot
 from comparisons.compare.looks import Looks, level_of
 from comparisons.compare.path_length import Lengths
 from comparisons.gate.digest import Copies
+from comparisons.gate.edges import Edges, edges_rung
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes, size_of, stacked
 from comparisons.gate.rim import without_rim, without_rim_later
@@ -38,6 +39,7 @@ LIMIT = 0.005
 """The smallest relative bias of the image mean that must be detectable."""
 
 _NO_NOISE = "the scene is rendered without random numbers: there is no noise"
+_EACH_PIXEL = "each pixel is judged: metrics of the whole do not forgive edges"
 _UNKNOWN_NOISE = "the noise of a single picture is unknown"
 
 
@@ -49,6 +51,7 @@ def gate_pictures(
     name: str = "candidate",
     lights: Lights | None = None,
     lengths: Lengths | None = None,
+    edges: Edges | None = None,
     witness: Witness | None = None,
     notes: Sequence[str] = (),
     rim: int = 0,
@@ -56,10 +59,11 @@ def gate_pictures(
     """The verdict on candidates; several are replicates.
 
     limit: the smallest relative bias of the image mean that must be detectable;  lights, lengths:
-    for the diagnosis of a difference;  witness: a third renderer, where there is no rim;  rim: how
-    many of the outermost pixels are left out on each side.  Candidates that are copies of the
-    reference's pictures are `unchanged`.  Raises ImageError for candidates whose size is not the
-    reference's, UsageError for several candidates without noise and for a rim that leaves nothing.
+    for the diagnosis of a difference;  edges: for pictures without noise;  witness: a third
+    renderer, where there is no rim;  rim: how many of the outermost pixels are left out on each
+    side.  Candidates that are copies of the reference's pictures are `unchanged`.  Raises
+    ImageError for candidates whose size is not the reference's, UsageError for several candidates
+    without noise and for a rim that leaves nothing.
     """
     check_sizes(candidates, size_of(reference.pictures[0]), "as the reference")
     copies = Copies.of(reference.fingerprints)
@@ -75,6 +79,7 @@ def gate_pictures(
         name=name,
         lights=lights,
         lengths=lengths,
+        edges=edges,
         witness=witness,
         notes=notes,
         rim=rim,
@@ -109,6 +114,7 @@ def judged(
     name: str = "candidate",
     lights: Lights | None = None,
     lengths: Lengths | None = None,
+    edges: Edges | None = None,
     witness: Witness | None = None,
     notes: Sequence[str] = (),
     rim: int = 0,
@@ -121,10 +127,12 @@ def judged(
     if rim:
         candidates, reference = without_rim(candidates, reference, rim)
         lights, lengths = without_rim_later(lights, lengths, rim)
+        edges = None if edges is None else edges.without_rim(rim)
     notes = [*notes, *_notes(candidates)]
+    exact = reference.pictures[0]
     if reference.noise_free and candidates[0].displayed:
         if _is_dithered(candidates[0].radiance, reference.pictures[0]):
-            shown = candidates[0].radiance[np.newaxis]
+            shown, edges = candidates[0].radiance[np.newaxis], None
             notes.append(
                 "the candidate is stored as 8-bit sRGB: it is within a code of the reference "
                 "everywhere, and its errors have no mean, as those of dithering; they count as none"
@@ -146,10 +154,13 @@ def judged(
         rungs += despite(pictures, _judged_by(reference), limit) if not reference.noise_free else []
     else:
         metrics = image_metrics(images)
-        rungs += [
-            _statistics(pictures, reference, limit) if looks is None else looks.judged,
-            _images_rung(images, metrics, pictures, reference),
-        ]
+        rungs.append(_statistics(pictures, reference, limit) if looks is None else looks.judged)
+        if reference.noise_free and edges is not None:
+            rungs[-1] = edges_rung(pictures[0], exact, edges, candidates[0].displayed)
+        if rungs[-1].status == "agree" and "edge" in rungs[-1].numbers:
+            rungs.append(RungResult("images", "not-applicable", _EACH_PIXEL))
+        else:
+            rungs.append(_images_rung(images, metrics, pictures, reference))
         known = _replicates(reference)
         if witness is not None and known is not None and len(pictures) > 1:
             heard, third = witness((pictures, known), ("candidate's", reference.name))

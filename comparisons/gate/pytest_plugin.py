@@ -62,6 +62,7 @@ class ImageGate:
         variance: str | Path | None = None,
         limit: float = 0.005,
         noise_free: bool = False,
+        tolerance: float = 0.001,
         rim: int = 0,
         defaults: Mapping[str, str] | None = None,
     ) -> "Case":
@@ -73,9 +74,10 @@ class ImageGate:
         reference_rt renders as the reference;  baseline: the name of a baseline that `reference-rt
         accept` wrote;  reference: pictures, like `candidate`;  variance: a file with the variance
         of a single reference;  limit: the smallest relative bias of the image mean that must be
-        detectable;  noise_free: the candidates were rendered without random numbers;  rim: how many
-        of the outermost pixels are left out on each side;  defaults: values for the <default>
-        elements of a Mitsuba scene.
+        detectable;  noise_free: the candidates were rendered without random numbers;  tolerance:
+        relative error of a value of such a picture of a scene;  rim: how many of the outermost
+        pixels are left out on each side;  defaults: values for the <default> elements of a Mitsuba
+        scene.
 
         Pictures that are too noisy to tell fail too.  Returns the
         `comparisons.results.case.Case`.
@@ -106,6 +108,7 @@ class ImageGate:
                 baselines=self._baselines,
                 limit=limit,
                 noise_free=noise_free,
+                tolerance=tolerance,
                 rim=rim,
                 name=self._node.nodeid + (f" [{self._calls}]" if self._calls > 1 else ""),
             )

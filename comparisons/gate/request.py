@@ -9,10 +9,12 @@ from typing import Any
 
 from comparisons.compare.compare import single_lights
 from comparisons.compare.judge import Lights
+from comparisons.compare.misreadings import misreadings
 from comparisons.compare.one_scene import NotebookCase
-from comparisons.compare.path_length import path_lengths
+from comparisons.compare.path_length import Lengths, path_lengths
 from comparisons.gate import baselines, reference
 from comparisons.gate.digest import scene_digest
+from comparisons.gate.edges import TOLERANCE, Edges, look_at
 from comparisons.gate.gate import LIMIT, gate_pictures
 from comparisons.gate.pictures_in import Picture, pictures_of
 from comparisons.gate.reference import Reference, check_sizes
@@ -37,8 +39,9 @@ class Request:
 
     variance: a file with the variance of a single reference;  baselines: their folder;  limit: the
     smallest relative bias of the image mean that must be detectable;  noise_free: the renderer uses
-    no random numbers;  rim: how many of the outermost pixels are left out;  name: the case's;
-    witness: a third renderer, of the scene, with a box filter.
+    no random numbers;  tolerance: relative error of a value of such a picture;  rim: how many of
+    the outermost pixels are left out;  name: the case's;  witness: a third renderer, of the scene,
+    with a box filter.
     """
 
     scene: Scene | None = None
@@ -48,6 +51,7 @@ class Request:
     baselines: Path = Path("baselines")
     limit: float = LIMIT
     noise_free: bool = False
+    tolerance: float = TOLERANCE
     threads: int | None = None
     rim: int = 0
     name: str = "candidate"
@@ -69,6 +73,11 @@ class Request:
             raise UsageError(
                 f"the limit is {self.limit:g}; expected a fraction above {permitted:g}, the "
                 "bias of the image mean that is permitted, such as 0.005"
+            )
+        if not 0.0 <= self.tolerance < 1.0:
+            raise UsageError(
+                f"the tolerance is {self.tolerance:g}; expected a fraction from 0 to below 1, such "
+                f"as {TOLERANCE:g}"
             )
         if self.baseline:
             baselines.check_name(self.baseline)
@@ -144,11 +153,13 @@ class Judge:
         """The verdict.  diagnosed: whether the cause of a difference is sought by rendering."""
         request, scene = self.request, self.scene
         known = scene if diagnosed else None
+        look = look_at(scene, request.threads) if scene and self.reference.noise_free else None
         return gate(
             limit=request.limit,
             name=request.name,
             lights=None if known is None else _lights(known, request.threads),
-            lengths=None if known is None else path_lengths(known, request.threads),
+            lengths=None if known is None else _hypotheses(known, request.threads),
+            edges=None if look is None else Edges(look, request.tolerance),
             witness=self._witness(),
             rim=request.rim,
         )
@@ -207,3 +218,7 @@ def _baseline(
 
 def _lights(scene: Scene, threads: int | None) -> Lights:
     return lambda: single_lights(scene, LIGHT_SPP, threads)
+
+
+def _hypotheses(scene: Scene, threads: int | None) -> Lengths | None:
+    return path_lengths(scene, threads) or misreadings(scene, threads)

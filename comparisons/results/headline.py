@@ -148,6 +148,8 @@ def numbers_rows(case: Case) -> list[tuple[str, ...]]:
     rows, of the biases measured, those that would have been seen, and those that are permitted; []
     for a case without them."""
     rung = next((r for r in case.rungs if r.name == "statistics"), None)
+    if rung is not None and "edge_wrong" in rung.numbers:
+        return _of_edges(rung.numbers)
     seen = _detectable(rung)
     biases = {} if rung is None else rung.numbers.get("relative_bias")
     if rung is None or seen is None or not isinstance(biases, Mapping):
@@ -166,7 +168,28 @@ def numbers_rows(case: Case) -> list[tuple[str, ...]]:
             would = f"{_percent(half)} in half of them" if known and half is not None else ""
             column = (f"{cells['tested']:,} {what}", _worst(cells), would)
             columns.append((*column, _within(cells.get("worst_margin"))))
+    return _transposed(columns)
+
+
+def _transposed(columns: list[tuple[str, str, str, str]]) -> list[tuple[str, ...]]:
     return list(zip(("bias", "measured", "would have been seen", "limit"), *columns, strict=True))
+
+
+def _of_edges(numbers: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """The same of a picture without noise, whose edges are judged apart."""
+    inside, edge = (
+        f"{n:,} differ" if n else "none differs"
+        for n in (numbers["inside_wrong"], numbers["edge_wrong"])
+    )
+    bound = f"±{_percent(numbers['tolerance'])}{' and half a code' if numbers['codes'] else ''}"
+    columns = [
+        (f"{numbers['inside']:,} pixels inside surfaces", inside, "", bound),
+        (f"{numbers['edge']:,} pixels on edges", edge, "", "what their footprints see"),
+    ]
+    for name, mode in numbers["modes"].items():
+        found, would, margin = (mode[key] for key in ("bias", "detectable", "margin"))
+        columns.append((f"edges: {name}", f"{found:+.2g}", f"{would:.2g}", f"±{margin:g}"))
+    return _transposed(columns)
 
 
 def _worst(cells: Mapping[str, Any]) -> str:

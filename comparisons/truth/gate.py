@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from comparisons.gate.driver import Command, Driver
-from comparisons.gate.errors import RendererError
+from comparisons.gate.driver import Command, Driver, RendererError
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import stacked
 from comparisons.truth.case import Case

@@ -1,7 +1,5 @@
 """Fixtures that several test modules share."""
 
-import os
-import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +16,7 @@ from typer.testing import CliRunner, Result
 
 from comparisons.commands.compare import compare, report, suite
 from comparisons.gate import reference
+from comparisons.gate.browser import PageError, chromium_program
 from comparisons.mitsuba.backend import Backend
 from comparisons.mitsuba.translate import load
 from comparisons.report import write_report
@@ -68,23 +67,29 @@ def image_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 # ---- the page in a browser ----------------------------------------------------------------------
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 WIDE = {"width": 1200, "height": 900}
 
 
-@pytest.fixture(scope="module")
-def browser():
-    playwright = pytest.importorskip(
+@pytest.fixture(scope="session")
+def chromium() -> str:
+    """The browser's program; without one, and without Playwright, the test is skipped."""
+    pytest.importorskip(
         "playwright.sync_api",
         reason="playwright is not installed: pip install 'reference-rt[test]'",
     )
-    named = os.environ.get("CHROMIUM")
-    found = named or next(filter(None, map(shutil.which, BROWSERS)), None)
-    if not found:
-        pytest.skip(f"no browser: set CHROMIUM, or install one of {', '.join(BROWSERS)}")
-    with playwright.sync_playwright() as driver:
+    try:
+        return chromium_program()
+    except PageError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture(scope="module")
+def browser(chromium):
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
         # A sandbox needs rights that a container does not give; the page is our own.
-        yield driver.chromium.launch(executable_path=found, args=["--no-sandbox"])
+        yield driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
 
 
 @pytest.fixture(scope="module")

@@ -28,8 +28,7 @@ from comparisons.experiments.fuzz.finding import (
 )
 from comparisons.experiments.fuzz.generate import generate, parse
 from comparisons.experiments.fuzz.reduce import reduce
-from comparisons.gate.driver import Command, Driver
-from comparisons.gate.errors import RendererError
+from comparisons.gate.driver import Command, Driver, RendererError
 from comparisons.gate.reference import is_noise_free
 from comparisons.gate.request import Request as GateRequest
 from comparisons.gate.rounds import Rounds, gated_renderer

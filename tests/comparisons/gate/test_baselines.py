@@ -11,8 +11,8 @@ from typer.testing import CliRunner, Result
 
 from comparisons.commands.gate import accept
 from comparisons.gate import baselines
+from comparisons.gate.baselines import BaselineEditedError, BaselineMissingError
 from comparisons.gate.digest import scene_digest
-from comparisons.gate.errors import BaselineEditedError, BaselineMissingError
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.exr import write_exr
 from reference_rt.rendering.scene import Scene

@@ -115,10 +115,14 @@ def test_pictures_without_noise(suffix: str) -> None:
 
     result, found = run(written("right", picture), "--scene", "ball.yaml")
     assert result.exit_code == 0, result.output
-    assert status(found, "statistics") == "not-applicable"
+    assert status(found, "statistics") == "agree"
     assert ("8-bit sRGB" in str(found["cases"][0]["notes"])) == (suffix == "png")
     result, _ = run(written("wrong", 1.02 * picture), "--scene", "ball.yaml")
     assert result.exit_code != 0
+    result, _ = run(written("wrong", 1.02 * picture), "--scene", "ball.yaml", "--tolerance", "0.03")
+    assert result.exit_code == 0, result.output
+    result, _ = run(written("right", picture), "--scene", "ball.yaml", "--tolerance", "-1")
+    assert (result.exit_code, "the tolerance is -1" in result.output) == (2, True)
     both = [write("a.exr", picture), write("b.exr", picture)]
     result, _ = run(*both, "--scene", "ball.yaml")
     assert (result.exit_code, "of a picture without noise" in result.output) == (2, True)

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from comparisons.gate.driver import Command, Driver
-from comparisons.gate.errors import RendererError
+from comparisons.gate.driver import Command, Driver, RendererError
 from reference_rt.util.errors import ImageError, UsageError
 from reference_rt.util.files import temporary_folder
 

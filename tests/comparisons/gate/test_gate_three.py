@@ -1,0 +1,129 @@
+"""three.js through the gate, in the example's page: right pictures agree, planted faults are named.
+
+Skipped where the example's packages are not installed: `npm ci` in examples/three."""
+
+from pathlib import Path
+
+import pytest
+from gate_checks import run
+
+THREE = Path(__file__).parents[3] / "examples" / "three"
+
+pytestmark = [
+    pytest.mark.usefixtures("chromium", "gate_folder"),
+    pytest.mark.skipif(
+        not (THREE / "node_modules" / "three").is_dir(), reason="three is not installed: npm ci"
+    ),
+]
+
+SCENES = sorted(path.stem for path in (THREE / "scenes").glob("*.yaml"))
+
+
+def judged(scene: str, page: str = str(THREE / "page.html")) -> dict:
+    result, found = run(
+        "--browser", f"{page}?standard=textbook", "--scene", str(THREE / "scenes" / f"{scene}.yaml")
+    )
+    (case,) = found["cases"]
+    assert result.exit_code == {"agree": 0, "invalid": 3}.get(case["verdict"], 1), result.output
+    return case
+
+
+@pytest.mark.cases(1)
+@pytest.mark.parametrize("scene", SCENES)
+def test_right_pictures_agree(scene: str) -> None:
+    case = judged(scene)
+    assert case["verdict"] == "agree", case["reason"]
+
+
+FAULTS = {
+    "light times pi": (
+        "ball",
+        ("PointLight(linear(of.intensity), 1", "PointLight(linear(of.intensity), Math.PI"),
+        "constant gain of 3.14",
+    ),
+    "light over pi": (
+        "sun",
+        ("linear(of.irradiance), 1", "linear(of.irradiance), 1 / Math.PI"),
+        "constant gain of 0.31",
+    ),
+    "light from behind": (
+        "sun",
+        ("of.direction).normalize()", "of.direction).normalize().negate()"),
+        "directions of light are reversed",
+    ),
+    "gamma": (
+        "ball",
+        ("height, pixels,", "height, pixels: pixels.map((x) => x ** (1 / 2.2)),"),
+        "gamma of 0.45",
+    ),
+    "upside down": ("ball", ("bottomUp: true", "bottomUp: false"), "upside down"),
+    "angle of view of the other axis": (
+        "ball",
+        (
+            "view: [l, r, b, t] }, box) {",
+            "view }, box) { const [l, r, b, t] = view.map((x) => (x * 4) / 3);",
+        ),
+        "the angle of view is taken for that of the other axis",
+    ),
+    "half a pixel": (
+        "ball",
+        ("l * near, r * near,", "(l + (r - l) / 256) * near, (r + (r - l) / 256) * near,"),
+        "pixels are half a pixel off",
+    ),
+    "colours taken for sRGB": (
+        "ball",
+        ("material.color = linear(colour)", 'material.color.setRGB(...colour, "srgb")'),
+        "colours of materials are decoded from sRGB",
+    ),
+    "a texture taken for linear": (
+        "texture",
+        ("THREE.SRGBColorSpace", "THREE.NoColorSpace"),
+        "sRGB textures are taken for linear",
+    ),
+    "a texture upside down": (
+        "texture",
+        ("texture.generateMipmaps =", "texture.flipY = texture.generateMipmaps ="),
+        "textures are upside down",
+    ),
+    "green flipped": (
+        "normal_map",
+        ("material.normalMap =", "material.normalScale.y = -1, material.normalMap ="),
+        "green of normal maps is flipped",
+    ),
+    "normals taken for sRGB": (
+        "normal_map",
+        ("THREE.NoColorSpace", "THREE.SRGBColorSpace"),
+        "linear textures are taken for sRGB",
+    ),
+    "roughness squared": (
+        "metal",
+        ("roughness: of.roughness", "roughness: of.roughness ** 2"),
+        "roughness is squared once too often",
+    ),
+    "another F0": (
+        "metal",
+        (
+            "function cameraOf",
+            'patch("lights_physical_fragment", "vec3( 0.04 )", "vec3( 0.16 )");function cameraOf',
+        ),
+        "reflectance head-on (F0) is 4 times as large",
+    ),
+    "no metals": (
+        "metal",
+        ("metalness: of.metallic", "metalness: 0"),
+        "metals are taken for dielectrics",
+    ),
+}
+
+
+@pytest.mark.cases(1)
+@pytest.mark.parametrize("fault", FAULTS)
+def test_planted_faults_are_named(fault: str, tmp_path: Path) -> None:
+    scene, change, name = FAULTS[fault]
+    text = (THREE / "page.html").read_text(encoding="utf-8")
+    assert text.count(change[0]) == 1
+    (tmp_path / "page.html").write_text(text.replace(*change))
+    (tmp_path / "node_modules").symlink_to(THREE / "node_modules")
+    case = judged(scene, "page.html")
+    assert case["verdict"] == "differ"
+    assert name in case["cause"]["name"]
