@@ -15,7 +15,7 @@
 - Materials: Diffuse, Mirror, Dielectric, ThinDielectric, Conductor, RoughConductor,
   RoughDielectric, Plastic, RoughPlastic, Principled, PrincipledThin, Phong, Emissive; made of
   others: Mask, TwoSided, Blend, Bump, NormalMap
-- Textures: Checker, Bitmap, VertexColours
+- Textures: Checker, Bitmap, VertexColours, Product
 - Lights: Point, Spot, Projector, Directional, Constant, EnvironmentMap, Ambient
 - Integrators: Path, Direct, Whitted, RayCast
 - Samplers: Sobol, Independent, Grid

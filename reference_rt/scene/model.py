@@ -25,7 +25,7 @@ from reference_rt.scene.yaml_text import line_of
 from reference_rt.shapes import Shape
 from reference_rt.shapes.csg import AnyShape, Solid
 from reference_rt.shapes.instances import Instance
-from reference_rt.textures import AnyTexture, texture_names
+from reference_rt.textures import AnyTexture, Product, texture_names
 from reference_rt.util.errors import (
     ReferenceUnavailableError,
     SceneError,
@@ -91,6 +91,12 @@ class SceneModel(Description):
         for name, shapes in self.groups.items():
             for k, shape in enumerate(shapes):
                 self._check_shape(shape, "groups", name, k)
+        for name, texture in self.textures.items():
+            self._check_textures(texture, "textures", name)
+            for k, of in enumerate(texture.of if isinstance(texture, Product) else ()):
+                if isinstance(self.textures[of], Product):
+                    message = f"'{of}' is a product itself; expected textures of other types"
+                    raise SceneError(message, ("textures", name, "of", k))
         for name, material in self.materials.items():
             self._check_parts(name, material)
         for name, material in self.materials.items():
@@ -112,7 +118,7 @@ class SceneModel(Description):
         return self
 
     def _check_textures(self, part: Description, *path: str | int) -> None:
-        """Check that the textures that a material or a light names exist."""
+        """Check that the textures that a material, a light or a texture names exist."""
         for field, texture in texture_names(part).items():
             if texture not in self.textures:
                 raise SceneError(no_such("texture", texture, self.textures), (*path, *field))

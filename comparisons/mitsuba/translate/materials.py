@@ -5,8 +5,11 @@ from dataclasses import replace
 from functools import singledispatch
 from typing import Any
 
+import numpy as np
+
 import reference_rt as rt
 from comparisons.geometry import affine
+from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.plugins.exact_coat import COLOURS, SUBSTITUTE, accepted
 from comparisons.mitsuba.translate.textures import (
     TranslationContext,
@@ -273,7 +276,7 @@ def _tilt(material: Bump | NormalMap) -> dict[str, Any]:
 def _(material: Bump, context: TranslationContext) -> dict[str, Any]:
     base = _named(material.base, context)
     texture = context.textures[material.height]
-    if not isinstance(texture, Bitmap) or texture.filter != "bilinear":
+    if not isinstance(texture, Bitmap) or texture.filter != "bilinear" or texture.cutoff:
         return base  # no slopes
     if context.native:
         height = number(material.height, context)
@@ -295,9 +298,17 @@ def _(material: Bump, context: TranslationContext) -> dict[str, Any]:
 def _(material: NormalMap, context: TranslationContext) -> dict[str, Any]:
     base = _named(material.base, context)
     texture = context.textures[material.normals]
-    if not isinstance(texture, Bitmap):
+    if not isinstance(texture, Bitmap) or texture.cutoff is not None:
         raise UntranslatableError("NormalMap of a texture that is no image", "material")
+    if material.follow_v:
+        raise UntranslatableError("NormalMap with 'follow_v'", "material")
     normals = colour(material.normals, context)
+    if material.scale != 1.0:
+        if context.in_file is not None:
+            raise UntranslatableError("NormalMap with 'scale'", "material")
+        factors = np.array([material.scale, material.scale, 1.0])
+        texels = texture.read(context.folder).linear * factors + 0.5 * (1.0 - factors)
+        normals["bitmap"] = mitsuba().Bitmap(np.ascontiguousarray(texels, np.float32))
     return {"type": "normalmap", "normalmap": normals, "bsdf": base, **_tilt(material)}
 
 

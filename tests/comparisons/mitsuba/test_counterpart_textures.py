@@ -25,8 +25,7 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
 from reference_rt.textures import At, Bitmap, Checker, Texture, VertexColours
 from reference_rt.textures.lookup import lookup, lookup_gradient
-from reference_rt.textures.parameter import MayBeTexture
-from reference_rt.textures.texture import UvMap
+from reference_rt.textures.texture import MayBeTexture, UvMap
 
 TURNED = UvMap(scale=(1.3, 0.7), rotate=25.0, offset=(0.1, -0.2))
 
