@@ -13,8 +13,8 @@
 - Shapes: Sphere, Plane, Disk, Rectangle, Triangle, Polygon, Box, Cylinder, Cone, Torus, Quadric,
   Mesh, Instance; solids: Union, Intersection, Difference
 - Materials: Diffuse, Mirror, Dielectric, ThinDielectric, Conductor, RoughConductor,
-  RoughDielectric, Plastic, RoughPlastic, Principled, PrincipledThin, Phong, Emissive; made of
-  others: Mask, TwoSided, Blend, Bump, NormalMap
+  RoughDielectric, Plastic, RoughPlastic, Principled, PrincipledThin, GltfPbr, Phong, Emissive;
+  made of others: Mask, TwoSided, Blend, Bump, NormalMap
 - Textures: Checker, Bitmap, VertexColours, Product
 - Lights: Point, Spot, Projector, Directional, Constant, EnvironmentMap, Ambient
 - Integrators: Path, Direct, Whitted, RayCast

@@ -35,6 +35,7 @@ from .materials import Conductor as Conductor
 from .materials import Dielectric as Dielectric
 from .materials import Diffuse as Diffuse
 from .materials import Emissive as Emissive
+from .materials import GltfPbr as GltfPbr
 from .materials import Mask as Mask
 from .materials import Mirror as Mirror
 from .materials import NormalMap as NormalMap

@@ -28,6 +28,7 @@ from pydantic import Field
 from reference_rt.materials.bsdfs.conductor import Conductor
 from reference_rt.materials.bsdfs.dielectric import Dielectric
 from reference_rt.materials.bsdfs.diffuse import Diffuse
+from reference_rt.materials.bsdfs.gltf_pbr import GltfPbr
 from reference_rt.materials.bsdfs.mirror import Mirror
 from reference_rt.materials.bsdfs.phong import Phong
 from reference_rt.materials.bsdfs.plastic import Plastic
@@ -73,6 +74,7 @@ AnyMaterial = Annotated[
     | RoughPlastic
     | Principled
     | PrincipledThin
+    | GltfPbr
     | Phong
     | Emissive
     | Mask
@@ -94,6 +96,7 @@ __all__ = [
     "Dielectric",
     "Diffuse",
     "Emissive",
+    "GltfPbr",
     "Mask",
     "Material",
     "Materials",

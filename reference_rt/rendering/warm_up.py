@@ -43,6 +43,7 @@ from reference_rt.materials import (
     Dielectric,
     Diffuse,
     Emissive,
+    GltfPbr,
     Mirror,
     NormalMap,
     Phong,
@@ -212,6 +213,7 @@ _LEAVES = {
     "rough plastic": RoughPlastic(),
     "principled": Principled(),
     "principled thin": PrincipledThin(),
+    "gltf": GltfPbr(),
     "phong": Phong(diffuse=(0.1, 0.1, 0.1)),
 }
 """Every BSDF."""

@@ -16,6 +16,7 @@ from reference_rt.materials.bsdfs import (
     conductor,
     dielectric,
     diffuse,
+    gltf_pbr,
     mirror,
     phong,
     plastic,
@@ -29,6 +30,7 @@ from reference_rt.materials.bsdfs import (
 from reference_rt.materials.bsdfs.conductor import Conductor, Conductors
 from reference_rt.materials.bsdfs.dielectric import Dielectric, Transparents
 from reference_rt.materials.bsdfs.diffuse import Diffuse, Diffuses
+from reference_rt.materials.bsdfs.gltf_pbr import GltfPbr, GltfPbrs
 from reference_rt.materials.bsdfs.mirror import Mirror, Mirrors
 from reference_rt.materials.bsdfs.phong import Phong, Phongs
 from reference_rt.materials.bsdfs.plastic import Plastic, Plastics
@@ -63,7 +65,8 @@ from reference_rt.textures import At
     PRINCIPLED,
     PHONG,
     PRINCIPLED_THIN,
-) = range(12)
+    GLTF_PBR,
+) = range(13)
 CLEAR, BLACK = 100, 101
 
 
@@ -82,6 +85,7 @@ class Leaves(NamedTuple):
     principleds: Principleds | None
     phongs: Phongs | None
     thin_principleds: ThinPrincipleds | None
+    gltf_pbrs: GltfPbrs | None
 
 
 TABLES: tuple[tuple[int, str, type[Material], type, Any], ...] = (
@@ -97,6 +101,7 @@ TABLES: tuple[tuple[int, str, type[Material], type, Any], ...] = (
     (PRINCIPLED, "principleds", Principled, Principleds, principled),
     (PHONG, "phongs", Phong, Phongs, phong),
     (PRINCIPLED_THIN, "thin_principleds", PrincipledThin, ThinPrincipleds, principled_thin),
+    (GLTF_PBR, "gltf_pbrs", GltfPbr, GltfPbrs, gltf_pbr),
 )
 """(code, field of Leaves, description, table, module with its kernels)."""
 
@@ -117,7 +122,7 @@ _last = by_code.in_turn(_code)
 @kernel
 def only(leaves: Leaves) -> int:
     """The code of the only table, for scenes with one: a constant, so that branches vanish."""
-    code: int = _last(leaves, PRINCIPLED_THIN)
+    code: int = _last(leaves, GLTF_PBR)
     return code
 
 
