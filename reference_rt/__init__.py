@@ -28,7 +28,7 @@
 Other modules are internal.  A name is imported when it is first used: importing the package takes
 milliseconds, and the renderer, with Numba, a second.  Folders from the lowest to the highest, each
 of which may import those before it: util, jit, core, sampling, textures, shapes, cameras, accel,
-materials, lights, integrators, scene, rendering, textbook, cli.
+materials, lights, integrators, scene, gltf, rendering, textbook, cli.
 """
 
 import lazy_loader as _lazy_loader
