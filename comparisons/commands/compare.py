@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from comparisons.commands.options import (
-    AllowMissing,
     ClusterFile,
     Fixed,
     Fresh,
@@ -27,7 +26,7 @@ from comparisons.commands.options import (
     out_folder,
 )
 from comparisons.results.rungs import COMPARED
-from reference_rt.cli.adjusted import Defaults, by_name
+from reference_rt.cli.adjusted import AllowMissing, Defaults, by_name
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import UsageError
 
@@ -39,7 +38,9 @@ if TYPE_CHECKING:
 def compare(
     scenes: Annotated[
         list[Path],
-        typer.Argument(metavar="SCENE...", help="Scene files: .yaml, .json, or Mitsuba's .xml."),
+        typer.Argument(
+            metavar="SCENE...", help="Scene files: .yaml, .json, glTF, or Mitsuba's .xml."
+        ),
     ],
     out: Annotated[Path, out_folder("results.json and report.html")] = Path("out"),
     spp: Annotated[
@@ -258,7 +259,7 @@ def report(
 @guarded
 def convert(
     scene: Annotated[
-        Path, typer.Argument(metavar="SCENE", help="A Mitsuba .xml scene, or one of ours.")
+        Path, typer.Argument(metavar="SCENE", help="A Mitsuba .xml scene, a glTF one, or ours.")
     ],
     output: Annotated[
         Path,

@@ -12,7 +12,14 @@ from typing import Annotated
 import typer
 
 from reference_rt.cli import render_options
-from reference_rt.cli.adjusted import Defaults, SceneArgument, adjusted, by_name, without_blas
+from reference_rt.cli.adjusted import (
+    AllowMissing,
+    Defaults,
+    SceneArgument,
+    adjusted,
+    by_name,
+    without_blas,
+)
 from reference_rt.cli.guarded import guarded, is_output_lost, lost_output, say
 from reference_rt.util.errors import ImageError
 from reference_rt.util.processes import catch_signals, exit_code_of
@@ -62,6 +69,7 @@ def render(
     seed: Annotated[int | None, typer.Option(help="Seed of the random numbers.")] = None,
     threads: Threads = None,
     define: Defaults = None,
+    allow_missing: AllowMissing = False,
     time_limit: render_options.TimeLimit = None,
     target_error: render_options.TargetError = None,
     checkpoint: render_options.CheckpointFolder = None,
@@ -85,7 +93,7 @@ def render(
     from reference_rt.util.files import check_writable
 
     check_suffix(output)
-    loaded = Scene.load(scene, by_name(define))
+    loaded = Scene.load(scene, by_name(define), allow_missing)
     description = adjusted(loaded, spp, size, integrator, seed)
     check_writable(output)
     where = Where(workers, scheduler, cluster, threads)
@@ -119,13 +127,14 @@ def preview(
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Default: all cores.")] = None,
     define: Defaults = None,
+    allow_missing: AllowMissing = False,
 ) -> None:
     """Show a picture of a scene that becomes less noisy until it is closed or interrupted."""
     from reference_rt.cli import preview as previews
     from reference_rt.cli.render_options import share_of
     from reference_rt.rendering.scene import Scene
 
-    loaded = adjusted(Scene.load(scene, by_name(define)), size=size)
+    loaded = adjusted(Scene.load(scene, by_name(define), allow_missing), size=size)
     view = previews.view_of(to, loaded)
     with without_blas():
         previews.preview(loaded, view, spp, share_of(target_error, "--target-error"), threads)
@@ -136,6 +145,7 @@ def preview(
 def explain(
     scene: SceneArgument,
     define: Defaults = None,
+    allow_missing: AllowMissing = False,
     witness: Annotated[
         str | None,
         typer.Option(metavar="NAME", help="Whether a third renderer may vote on it: cycles."),
@@ -145,7 +155,7 @@ def explain(
     from reference_rt.cli.explain import print_page, print_witness
     from reference_rt.rendering.scene import Scene
 
-    loaded = Scene.load(scene, by_name(define))
+    loaded = Scene.load(scene, by_name(define), allow_missing)
     if witness is not None:
         print_witness(loaded, witness)
         return

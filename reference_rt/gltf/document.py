@@ -249,5 +249,13 @@ READ = frozenset(
 )
 """The extensions that are read."""
 
-HARMLESS = frozenset(("KHR_materials_variants", "KHR_xmp_json_ld", "KHR_animation_pointer"))
+HARMLESS = frozenset(
+    (
+        "EXT_mesh_features",
+        "EXT_structural_metadata",
+        "KHR_animation_pointer",
+        "KHR_materials_variants",
+        "KHR_xmp_json_ld",
+    )
+)
 """Extensions without which the file's own picture is the same."""

@@ -155,7 +155,7 @@ def _scene(reading: Reading, cls: type[M], options: Mapping[str, str]) -> M:
         if node.mesh is not None:
             shapes.place(node, index, m)
     shapes.finish()
-    lights += _environment(reading, options, bool(lights or shapes.lamps))
+    lights += _environment(reading, options, bool(lights) or shapes.is_lit)
     camera, film = _view(reading, options, cameras, shapes.bounds)
     return cls(
         camera=camera,
@@ -189,6 +189,7 @@ class _Shapes:
         self.groups: dict[str, tuple[AnyShape, ...]] = {}
         self.bounds = np.full((2, 3), np.nan)  # lower and upper corner
         self.lamps: set[str] = set()  # names of materials
+        self.is_lit = False
         self._copies: list[tuple[int, Affine]] = []
 
     def place(self, node: Node, index: int, m: Affine) -> None:
@@ -245,6 +246,7 @@ class _Shapes:
                 continue
             surface = self.surfaces.surface(part.material, "COLOR_0" in part.attributes)
             self.lamps |= {surface.name} if surface.emits else set()
+            self.is_lit = self.is_lit or surface.is_bright
             raw = self.reading.file.root["meshes"][index]["primitives"][k]
             found = self.reading.file.primitive(raw, surface.uv_set or 0)
             if part.targets:
@@ -340,8 +342,8 @@ def _environment(reading: Reading, options: Mapping[str, str], is_lit: bool) -> 
         return []
     if wanted is None:
         reading.note(
-            "has no lights: the environment is 1 everywhere; expected lights, or "
-            "-D environment=FILE or =RADIANCE"
+            "has no lights, or only surfaces that emit at most 1: the environment is 1 everywhere; "
+            "expected lights, or -D environment=FILE or =RADIANCE"
         )
     try:
         radiance = float(wanted or 1.0)

@@ -73,11 +73,13 @@ class Reading:
 
 class Surface(NamedTuple):
     """name: of our material;  uv_set: the number of the texture coordinates that it uses, None for
-    none;  emits: whether it is a lamp;  is_clear: whether opacity is less than 1 anywhere."""
+    none;  emits: whether it is a lamp;  is_bright: one of more than 1, which is meant to light
+    others;  is_clear: whether opacity is less than 1 anywhere."""
 
     name: str
     uv_set: int | None
     emits: bool
+    is_bright: bool
     is_clear: bool
 
 
@@ -194,7 +196,7 @@ class Surfaces:
             self.materials[inner] = made
             made = wrap(inner)
         self.materials[name] = made
-        return Surface(name, uv_set, emits, opacity != 1.0)
+        return Surface(name, uv_set, emits, max(factor) > 1.0, opacity != 1.0)
 
     # ---- textures -------------------------------------------------------------------------------
 
@@ -323,11 +325,14 @@ def _opacity(
 
 
 def _uv_map(transform: TextureTransform) -> UvMap:
-    """KHR_texture_transform, whose v counts from the top, for ours, which counts from the
-    bottom."""
+    """KHR_texture_transform, whose v counts from the top, for ours, which counts from the bottom.
+
+    It turns uv counter-clockwise as an image shows them, v down, as the extension's text and its
+    model TextureTransformTest say; its GLSL, read by columns, turns them the other way.
+    """
     (a, b), (du, dv), turn = transform.scale, transform.offset, transform.rotation
     c, s = math.cos(turn), math.sin(turn)
-    theirs = np.array([[a * c, -b * s, du], [a * s, b * c, dv], [0.0, 0.0, 1.0]])
+    theirs = np.array([[a * c, b * s, du], [-a * s, b * c, dv], [0.0, 0.0, 1.0]])
     flip = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
     ours = flip @ theirs @ flip
     if np.array_equal(ours, np.eye(3)):

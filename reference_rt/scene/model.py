@@ -245,18 +245,19 @@ class SceneModel(Description):
         defaults: Mapping[str, str] | None = None,
         allow_missing: bool = False,
     ) -> Self:
-        """Read a .yaml, .yml or .json file, or with Mitsuba an .xml file of its own.
+        """Read a .yaml, .yml, .json, .gltf or .glb file, or with Mitsuba an .xml file of its own.
 
-        defaults: values for the <default> elements of an .xml file;  allow_missing: leave out what
-        of it is not supported, with a warning for each.  Raises SceneError (file, line, key path,
-        reason), ReferenceUnavailableError where Mitsuba is needed and missing.
+        defaults: values for the <default> elements of an .xml file; of glTF `camera` (a name or a
+        number), `environment` (a file or a radiance) and `scene` (a number);  allow_missing: leave
+        out what of it is not supported, with a warning for each.  Raises SceneError (file, line,
+        key path, reason), ReferenceUnavailableError where Mitsuba is needed and missing.
         """
         path = Path(path)
         if path.suffix.lower() not in OWN:
             read_file = reader_of(path).read_file
             return read_file(path, cls, defaults or {}, allow_missing)  # type: ignore[no-any-return]
         if defaults:
-            raise SceneError("has no defaults; expected a Mitsuba scene, .xml", file=str(path))
+            raise SceneError("has no defaults; expected a scene of Mitsuba or glTF", file=str(path))
         try:
             text = read_text(path)
         except OSError as error:
@@ -352,4 +353,4 @@ def reader_of(path: Path) -> Any:
             raise ReferenceUnavailableError(f"{path}: {advice}") from None
     if suffix in _PACKAGES:
         raise ReferenceUnavailableError(f"{path}: {_PACKAGES[suffix]}")
-    raise SceneError("is not a scene file; expected .yaml or .json", file=str(path))
+    raise SceneError("is not a scene file; expected .yaml, .json, .gltf or .glb", file=str(path))
