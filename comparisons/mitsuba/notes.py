@@ -28,6 +28,7 @@ from reference_rt.integrators import Direct
 from reference_rt.materials import (
     Blend,
     Bump,
+    GltfPbr,
     Mask,
     NormalMap,
     Phong,
@@ -213,8 +214,10 @@ def _off(eta: float, distribution: str = "", alpha: float = 0.0) -> str:
 
 
 @note_of.register(Phong)
-def _(material: Phong, context: TranslationContext) -> str:
-    return "Mitsuba has no Phong material: our plugin is used instead"
+@note_of.register(GltfPbr)
+def _(material: Phong | GltfPbr, context: TranslationContext) -> str:
+    name = "Phong" if isinstance(material, Phong) else "glTF"
+    return f"Mitsuba has no {name} material: our plugin is used instead"
 
 
 @note_of.register(Blend)

@@ -235,6 +235,7 @@ materials:
   leaf:
     {type: principled_thin, base_colour: image, roughness: 0.4, spec_trans: numbers, eta: 1.3,
      sheen: 0.3, diff_trans: 0.7, anisotropic: 0.3}
+  toy: {type: gltf_pbr, base_color: image, metallic: 0.5, roughness: numbers, ior: 1.8}
   wax: {type: phong, ambient: 0.1, diffuse: 0.1, specular: 0.6, exponent: 20, mirror: 0.1}
   chalk: {type: phong, diffuse: 0.1, specular: [0.1, 0.2, 0.3], exponent: 30, half_vector: true}
 shapes:
@@ -255,6 +256,7 @@ shapes:
   - {type: sphere, center: [1.8, 0, 0], radius: 0.5, material: wax}
   - {type: sphere, center: [4.2, 0, 0], radius: 0.5, material: leaf}
   - {type: sphere, center: [3, 0, 0], radius: 0.5, material: chalk}
+  - {type: sphere, center: [4.2, 1.2, 0], radius: 0.5, material: toy}
 lights:
   - {type: point, position: [0, 4, 2], intensity: 9}
   - {type: constant, radiance: [0.2, 0.3, 0.4]}

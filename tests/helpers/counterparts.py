@@ -65,6 +65,9 @@ materials:
   petal:
     {type: principled_thin, base_colour: image, roughness: numbers, anisotropic: 0.4,
      sheen: 0.4, sheen_tint: 0.5, spec_trans: 0.4, spec_tint: 0.3, flatness: 0.2}
+  toy:
+    {type: gltf_pbr, base_color: image, metallic: checks, roughness: numbers, ior: 1.8,
+     specular: 0.9, specular_color: image}
   wax: {type: phong, diffuse: 0.1, specular: 0.3, exponent: 20, mirror: 0.1}
   leaf: {type: mask, base: grey, opacity: numbers}
   mix: {type: blend, first: brushed, second: floor, weight: numbers}

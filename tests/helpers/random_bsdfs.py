@@ -3,6 +3,7 @@
 import numpy as np
 from leaf_checks import random_direction
 
+from reference_rt.materials.bsdfs.gltf_pbr import GltfPbr
 from reference_rt.materials.bsdfs.phong import Phong
 from reference_rt.materials.bsdfs.plastic import Plastic
 from reference_rt.materials.bsdfs.principled import Principled
@@ -82,3 +83,17 @@ def random_thin(n, seed, least=0.2):
         fields["eta"] = float(rng.uniform(1.4, 2.5)) if k % 11 != 10 else 0.3
         wo = random_direction(rng, k, front=False)
         yield PrincipledThin(base_colour=rng.uniform(0, 1, 3).tolist(), **fields), wo
+
+
+GLTF_NUMBERS = ("metallic", "specular")
+
+
+def random_gltf(n, seed, least=0.1):
+    """(description, wo): a third of the numbers 0 and a sixth 1; roughness from `least`."""
+    rng = np.random.default_rng(seed)
+    for k in range(n):
+        fields = {name: float(np.clip(rng.uniform(-0.67, 1.33), 0, 1)) for name in GLTF_NUMBERS}
+        fields["roughness"] = rng.uniform(least, 1)
+        fields["ior"] = float(rng.uniform(1, 2.5))
+        colours = {f: rng.uniform(0, 1, 3).tolist() for f in ("base_color", "specular_color")}
+        yield GltfPbr(**fields, **colours), random_direction(rng, k)

@@ -36,6 +36,7 @@ MATERIALS = {
     "rough plastic": rt.RoughPlastic(alpha=0.2),
     "principled": rt.Principled(roughness=0.4, metallic=0.5, clearcoat=0.5),
     "principled thin": rt.PrincipledThin(spec_trans=0.5, diff_trans=1.0),
+    "gltf": rt.GltfPbr(base_color=(0.8, 0.5, 0.2), metallic=0.5, roughness=0.4),
     "phong": rt.Phong(diffuse=0.1, specular=0.3, exponent=20.0),
     "lamp": rt.Emissive(radiance=tuple(RADIANCE)),
     "checks": rt.Diffuse(reflectance="white and black"),

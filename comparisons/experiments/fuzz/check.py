@@ -36,6 +36,7 @@ from comparisons.rungs.limited import OF_LIGHT, limited
 from reference_rt.materials import (
     Blend,
     Bump,
+    GltfPbr,
     Mask,
     Phong,
     Plastic,
@@ -235,7 +236,7 @@ def _cause(result: RungResult) -> str:
     return without_numbers(result.reason.partition(";")[0], 80)
 
 
-SLOW = (Blend, Bump, Mask, Phong, Plastic, RoughPlastic)
+SLOW = (Blend, Bump, GltfPbr, Mask, Phong, Plastic, RoughPlastic)
 """Materials whose counterparts in Mitsuba are our plugins, in Python: some 20 microseconds for each
 evaluation, so that noisy pictures take minutes."""
 

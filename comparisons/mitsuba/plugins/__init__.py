@@ -11,6 +11,7 @@ from typing import Any
 from comparisons.mitsuba.plugins import (
     exact_coat,
     exact_coordinates,
+    gltf_pbr,
     mesh_area,
     mixtures,
     path_of_solids,
@@ -23,7 +24,7 @@ from comparisons.mitsuba.plugins import (
 def register(mi: Any) -> None:
     """Register the plugins of this folder for the current variant."""
     plugins = (
-        *(exact_coat, exact_coordinates, mixtures, phong),
+        *(exact_coat, exact_coordinates, gltf_pbr, mixtures, phong),
         *(mesh_area, path_of_solids, view_rectangle, whitted),
     )
     for plugin in plugins:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+from comparisons.mitsuba.plugins import gltf_pbr as plugin
 from comparisons.mitsuba.reading.node import Node, Reading
 from comparisons.mitsuba.reading.textures import (
     colour_or_texture,
@@ -19,6 +20,7 @@ from reference_rt.materials import (
     Conductor,
     Dielectric,
     Diffuse,
+    GltfPbr,
     Mask,
     Material,
     Mirror,
@@ -34,7 +36,7 @@ from reference_rt.materials import (
     TwoSided,
 )
 
-# ---- principled BSDFs, and Phong's of our own plugin ---------------------------------------------
+# ---- principled BSDFs, and those of our own plugins ----------------------------------------------
 
 
 _NUMBERS = (
@@ -90,6 +92,14 @@ def phong(reading: Reading, node: Node) -> Material:
     if node.has("exponent"):
         colours["exponent"] = node.number("exponent", 1.0)
     return Phong(**colours, half_vector=node.flag("half_vector"))
+
+
+def gltf_pbr(reading: Reading, node: Node) -> Material:
+    """Of our plugin, in files that we have written."""
+    values: dict[str, Any] = {"ior": node.number("ior", 1.5)}
+    values |= {name: colour_or_texture(reading, node, name, 1.0) for name in plugin.COLOURS}
+    values |= {name: number_or_texture(reading, node, name, 1.0) for name in plugin.NUMBERS}
+    return GltfPbr(**values)
 
 
 # ---- the other BSDFs -----------------------------------------------------------------------------
@@ -339,6 +349,7 @@ _READERS: dict[str, Reader] = {
     "blendbsdf": _blend,
     "mask": _mask,
     "textbook_phong": phong,
+    "gltf_pbr": gltf_pbr,
     "twosided": _two_sided,
     "null": _null,
     "bumpmap": _bump,

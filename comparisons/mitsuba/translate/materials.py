@@ -10,6 +10,7 @@ import numpy as np
 import reference_rt as rt
 from comparisons.geometry import affine
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.plugins import gltf_pbr
 from comparisons.mitsuba.plugins.exact_coat import COLOURS, SUBSTITUTE, accepted
 from comparisons.mitsuba.translate.textures import (
     TranslationContext,
@@ -205,6 +206,16 @@ def _(material: rt.Phong, context: TranslationContext) -> dict[str, Any]:
         **{name: colour(getattr(material, name), context) for name in colours},
         "exponent": material.exponent,
         "half_vector": material.half_vector,
+    }
+
+
+@translate_material.register
+def _(material: rt.GltfPbr, context: TranslationContext) -> dict[str, Any]:
+    return {
+        "type": "gltf_pbr",
+        "ior": material.ior,
+        **{name: colour(getattr(material, name), context) for name in gltf_pbr.COLOURS},
+        **{name: number(getattr(material, name), context) for name in gltf_pbr.NUMBERS},
     }
 
 

@@ -81,7 +81,7 @@ class Surfaces:
     def element(self, value: dict[str, Any], tag: str = "bsdf") -> Element:
         """A plugin's dictionary as an element, nested ones too."""
         plugin = value["type"]
-        if plugin == "textbook_phong":
+        if plugin in ("textbook_phong", "gltf_pbr"):
             self.note(OURS.format("BSDF", plugin))
         element = Element(tag, plugin)
         for key, part in value.items():

@@ -148,12 +148,13 @@ def _factors(s: _Surface, cosine: float) -> _Factors:
 
 @kernel
 def _mirroring(s: _Surface, wo: Vec3) -> float:
-    """The probability of sampling the microfacets: by the brightest channels of both lobes at the
-    cosine of wo."""
-    factors = _factors(s, wo.z)
+    """The probability of sampling the microfacets: by the brightest channels of both lobes.  The
+    microfacets that mirror most light see it at the cosine of wo.  For most light of the base V·H
+    is so large, from grazing angles too, that F is F0."""
     least = _LEAST_MIRRORED * (s.metallic + (1.0 - s.metallic) * s.specular)
-    mirrored = max(least, max_component(factors.mirrored))
-    return mirrored / (mirrored + max_component(factors.base)) if mirrored > 0.0 else 0.0
+    mirrored = max(least, max_component(_factors(s, wo.z).mirrored))
+    base = max_component(_factors(s, 1.0).base)
+    return mirrored / (mirrored + base) if mirrored > 0.0 else 0.0
 
 
 @kernel

@@ -27,6 +27,7 @@ GOLD: dict[str, Any] = {
     "reflectance": (0.9, 0.8, 0.7),
 }
 COLOURS: dict[str, Any] = {"reflectance": (0.9, 0.5, 0.1), "specular": (0.9, 1.0, 0.8)}
+SPECULAR: dict[str, Any] = {"specular": 0.7, "specular_color": (1.0, 0.6, 0.2)}
 PHONG: dict[str, Any] = {"diffuse": (0.2, 0.1, 0.05), "specular": (0.3, 1.2, 0.1)}
 
 MATERIALS: tuple[Material, ...] = (
@@ -70,6 +71,9 @@ MATERIALS: tuple[Material, ...] = (
     rt.PrincipledThin(base_colour=(0.8, 0.5, 0.2), diff_trans=1.2, spec_trans=0.3, spec_tint=0.5),
     rt.PrincipledThin(spec_trans=1.0, eta=1.7, roughness=0.6, anisotropic=0.6),
     rt.PrincipledThin(base_colour=(0.8, 0.5, 0.2), spec_trans=1.0, eta=0.6, spec_tint=1.0),
+    rt.GltfPbr(base_color=(0.8, 0.5, 0.2), roughness=0.3),
+    rt.GltfPbr(base_color=(0.8, 0.5, 0.2), metallic=0.0, roughness=0.5, ior=1.8),
+    rt.GltfPbr(base_color=(0.8, 0.5, 0.2), metallic=0.3, roughness=1.0, **SPECULAR),
     rt.Phong(**PHONG, exponent=40.0),
     rt.Phong(**PHONG, exponent=7.5, half_vector=True),
 )
@@ -108,7 +112,7 @@ def float32_bound(material: Material, wo: FloatArray, wi: FloatArray, ours: Floa
     return found + 1e-18
 
 
-@pytest.mark.cases(28)
+@pytest.mark.cases(31)
 @pytest.mark.parametrize("material", MATERIALS, ids=lambda m: m.type)
 def test_the_same_is_scattered(material: Material) -> None:
     wo, wi = pairs(material)
@@ -134,6 +138,10 @@ def test_the_same_is_scattered(material: Material) -> None:
         (rt.Principled(clearcoat=0.5), {"clearcoat_gloss": 0.01}),
         (rt.PrincipledThin(diff_trans=1.0), {"diff_trans": 1.001}),
         (rt.PrincipledThin(spec_trans=1.0), {"eta": 1.501}),
+        (rt.GltfPbr(metallic=0.5), {"roughness": 0.999}),
+        (rt.GltfPbr(metallic=0.5, roughness=0.5), {"metallic": 0.501}),
+        (rt.GltfPbr(metallic=0.0, roughness=0.5), {"ior": 1.501}),
+        (rt.GltfPbr(metallic=0.0, roughness=0.5), {"specular": 0.999}),
         (rt.Phong(**PHONG), {"exponent": 32.01}),
     ],
     ids=lambda x: x.type if isinstance(x, Material) else "",
@@ -192,6 +200,7 @@ SAMPLED: tuple[Material, ...] = (
     rt.Plastic(**COLOURS),
     rt.RoughPlastic(**COLOURS, alpha=0.3),
     rt.RoughPlastic(**COLOURS, alpha=0.3, distribution="beckmann"),
+    rt.GltfPbr(base_color=(0.8, 0.5, 0.2), metallic=0.3, roughness=0.6, **SPECULAR),
     rt.Phong(**PHONG, exponent=20.0, mirror=(0.1, 0.2, 0.3)),
     rt.Phong(**PHONG, exponent=20.0, half_vector=True),
 )

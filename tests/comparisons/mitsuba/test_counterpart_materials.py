@@ -25,8 +25,8 @@ SMOOTH = ("silver", "gold", "glass", "pane")
 """Perfectly smooth: there is nothing to evaluate."""
 
 MATERIALS = (
-    "grey", "floor", "brushed", "cast", "frosted", "coat", "dull", "car", "petal", "wax", "leaf",
-    "mix", "sheet", "dents", "tiles", "lamp",
+    "grey", "floor", "brushed", "cast", "frosted", "coat", "dull", "car", "petal", "toy", "wax",
+    "leaf", "mix", "sheet", "dents", "tiles", "lamp",
 )  # fmt: skip
 
 SAME_DENSITY = ("grey", "floor", "brushed", "frosted", "leaf", "lamp", "dents", "tiles")

@@ -5,8 +5,16 @@ import numpy as np
 import pytest
 from chi_square import sidak
 from leaf_checks import check_same_bits, check_weights, p_values
-from random_bsdfs import NUMBERS, random_phong, random_plastic, random_principled, random_thin
+from random_bsdfs import (
+    NUMBERS,
+    random_gltf,
+    random_phong,
+    random_plastic,
+    random_principled,
+    random_thin,
+)
 
+from reference_rt.materials.bsdfs.gltf_pbr import GltfPbr
 from reference_rt.materials.bsdfs.phong import Phong
 from reference_rt.materials.bsdfs.plastic import Plastic
 from reference_rt.materials.bsdfs.principled import Principled
@@ -19,6 +27,7 @@ FEW_AND_MANY = (
     (random_plastic, 41, (10, 200)),
     (random_principled, 81, (14, 300)),
     (random_thin, 91, (14, 300)),
+    (random_gltf, 105, (10, 200)),
 )
 
 
@@ -40,14 +49,15 @@ def test_samples_have_their_density_and_the_weights_their_mean(materials, seed, 
 @pytest.mark.parametrize(
     ("materials", "seed", "condition"),
     [
-        # Both are of the same direction: it is rounded once.
+        # These are of the same direction: it is rounded once.
         (list(random_phong(16, 68)), 67, 1.0),
         (list(random_plastic(16, 44)), 43, 1.0),
+        (list(random_gltf(16, 107, least=0.0)), 106, 1.0),
         # Refracted directions are as long as their half vector is exact.
         (list(random_principled(24, 84, least=0.0)), 83, 16.0),
         (list(random_thin(24, 94, least=0.0)), 93, 16.0),
     ],
-    ids=["phong", "plastic", "principled", "thin"],
+    ids=["phong", "plastic", "gltf", "principled", "thin"],
 )
 def test_weight_times_density_is_the_value(materials, seed, condition):
     rng = np.random.default_rng(seed)
@@ -84,6 +94,13 @@ EXTREMES = {
         Principled(base_colour=(0, 0, 1e-300), **ONES | {"spec_trans": 0.5, "eta": 1e-3}),
     ),
     "thin": tuple(material for material, _ in random_thin(8, 95, least=0.0)),
+    "gltf": (
+        *(material for material, _ in random_gltf(8, 108, least=0.0)),
+        GltfPbr(base_color=0.0),
+        GltfPbr(metallic=0.0, roughness=0.0, ior=0.0),
+        GltfPbr(base_color=0.0, metallic=0.0, specular=0.0),
+        GltfPbr(base_color=(0, 0, 1e-300), metallic=1e-300, specular=1e-300, ior=1e300),
+    ),
     "rough conductor": tuple(RoughConductor(eta=0.2, k=3.9, **rough) for rough in ROUGH),
     "rough dielectric": tuple(
         RoughDielectric(interior_ior=eta, **rough) for eta in (0.5, 1.00001, 1.5) for rough in ROUGH

@@ -67,6 +67,7 @@ materials = st.one_of(
     st.builds(rt.Plastic, **plastics),
     st.builds(rt.RoughPlastic, **plastics, alpha=alphas),
     st.builds(rt.Principled, base_colour=reflectances, roughness=numbers, eta=positive),
+    st.builds(rt.GltfPbr, base_color=reflectances, roughness=numbers, ior=positive),
     st.builds(rt.Phong, diffuse=reflectances, specular=colours, half_vector=st.booleans()),
 )
 wrappers = st.one_of(

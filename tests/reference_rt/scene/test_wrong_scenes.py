@@ -213,6 +213,8 @@ MATERIALS = [
     ("type: principled, base_colour: 2", ".base_colour", "expected numbers from 0 to 1"),
     ("type: principled, eta: 0", ".eta", "expected greater than 0, got 0"),
     ("type: principled, eta: 2, specular: 0", "", "specular and eta both give the index"),
+    ("type: gltf_pbr, metallic: 1.5", ".metallic", "expected a number from 0 to 1"),
+    ("type: gltf_pbr, ior: -1", ".ior", "expected greater than or equal to 0, got -1"),
     ("type: phong, diffuse: 0.1, exponent: 0", ".exponent", "expected greater than 0, got 0"),
     ("type: phong, diffuse: -1", ".diffuse", "expected numbers of at least 0"),
     (
