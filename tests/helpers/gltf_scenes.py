@@ -1,10 +1,14 @@
 """Small glTF files with everything that scenes of them use."""
 
 import io
+import warnings
 
 import numpy as np
-from mesh_writers import Gltf
+import pytest
+from mesh_writers import Gltf, written
 from PIL import Image
+
+import reference_rt as rt
 
 TEXELS = np.random.default_rng(8).integers(1, 256, (4, 3, 4), dtype=np.uint8)
 """An image with opacity, the top row first."""
@@ -91,3 +95,19 @@ def full_scene():
     file.node(camera=0, translation=[0, 0, 5], rotation=[0, 0, 0, 1])
     file.node(camera=1, name="flat")
     return file
+
+
+def load(folder, file, form="glb", **options):
+    """The scene, and what was said about it."""
+    path = written(folder, getattr(file, form)(), f"model.{form}")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        scene = rt.Scene.load(path, **options)
+    return scene, "\n".join(str(one.message) for one in said)
+
+
+def refused(folder, file, **options):
+    """The lines of the error."""
+    with pytest.raises(rt.SceneError) as error:
+        load(folder, file, **options)
+    return [str(one) for one in (error.value, *error.value.others)]
