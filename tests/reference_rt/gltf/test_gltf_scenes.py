@@ -198,6 +198,14 @@ def test_lights(tmp_path):
     assert "linearly with the angle" in said
 
 
+@pytest.mark.parametrize(("strength", "lights"), [(1.0, ["constant"]), (1.5, [])])
+def test_bright_lamps_are_lights(tmp_path, strength, lights):
+    """Of models that are meant to be lit from outside, some parts emit, too."""
+    extensions = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
+    file = GltfScene(emissiveFactor=[1, 0, 0], extensions=extensions)
+    assert [light.type for light in load(tmp_path, file)[0].lights] == lights
+
+
 def test_environments(tmp_path):
     file = GltfScene()
     scene, said = load(tmp_path, file)

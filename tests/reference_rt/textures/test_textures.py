@@ -139,13 +139,13 @@ def test_products(tmp_path):
         lit=rt.Product(of=("image", "own"), factor=(2.0, 0.5, 1.0)),
         image=raw(uv=UvMap(scale=3.0)),
         own=VertexColours(),
-        one=rt.Product(of=("image",)),
+        one=rt.Product(of=("own",)),
     )
     colour = Vec3(0.25, 0.5, 1.0)
     for u, v in np.random.default_rng(21).uniform(-1, 2, (20, 2)):
         image = ask(textures, u, v, 1)
         assert np.array_equal(ask(textures, u, v, 0, colour), image * (0.5, 0.25, 1.0))
-        assert np.array_equal(ask(textures, u, v, 3), image)
+        assert np.array_equal(ask(textures, u, v, 3, colour), colour)
 
 
 def test_the_greatest_of_a_product_counts():
