@@ -189,6 +189,8 @@ class _Shapes:
         self.groups: dict[str, tuple[AnyShape, ...]] = {}
         self.bounds = np.full((2, 3), np.nan)  # lower and upper corner
         self.lamps: set[str] = set()  # names of materials
+        self.tilts: dict[str | None, str] = {}  # the normal map of a material
+        self.mirrored: set[str] = set()  # names of normal maps
         self.is_lit = False
         self._copies: list[tuple[int, Affine]] = []
 
@@ -229,6 +231,9 @@ class _Shapes:
                 self.shapes += [p.model_copy(update={"transform": steps}) for p in made[mesh]]
             for part in made[mesh]:
                 self._bound(part, m)
+                if part.material in self.tilts and transform.flips_orientation(m):
+                    self.mirrored.add(self.tilts[part.material])
+        self.surfaces.follow_v(self.mirrored)
 
     def _bound(self, part: Mesh, m: Affine) -> None:
         assert part.vertices is not None
@@ -261,7 +266,7 @@ class _Shapes:
                 )
             colours = None if found.colours is None else np.clip(found.colours, 0.0, 1.0)
             try:
-                yield Mesh(
+                made = Mesh(
                     vertices=found.vertices,
                     faces=found.faces,
                     normals=found.normals,
@@ -271,6 +276,17 @@ class _Shapes:
                 )
             except SceneError as error:
                 raise self.reading.error(f"{where}: {error}") from None
+            if surface.tilt is not None and made.uv is not None:
+                self.tilts[surface.name] = surface.tilt
+                if _is_mirrored(made.uv[made.faces]):
+                    self.mirrored.add(surface.tilt)
+            yield made
+
+
+def _is_mirrored(uv: FloatArray) -> bool:
+    """Whether any triangle of (m, 3, 2) texture coordinates goes around clockwise."""
+    (a, b), (c, d) = (uv[:, 1] - uv[:, 0]).T, (uv[:, 2] - uv[:, 0]).T
+    return bool((a * d - b * c < 0.0).any())
 
 
 def _instances(reading: Reading, found: Instancing, index: int, m: Affine) -> list[Affine]:

@@ -74,13 +74,15 @@ class Reading:
 class Surface(NamedTuple):
     """name: of our material;  uv_set: the number of the texture coordinates that it uses, None for
     none;  emits: whether it is a lamp;  is_bright: one of more than 1, which is meant to light
-    others;  is_clear: whether opacity is less than 1 anywhere."""
+    others;  is_clear: whether opacity is less than 1 anywhere;  tilt: the name of its normal map,
+    None for none."""
 
     name: str
     uv_set: int | None
     emits: bool
     is_bright: bool
     is_clear: bool
+    tilt: str | None
 
 
 class Surfaces:
@@ -190,13 +192,22 @@ class Surfaces:
                 factor = [x * opacity for x in factor]
             radiance = self.product(parts, factor)
             wrappers.append(lambda base: Emissive(radiance=radiance, base=base))
-        made = leaf
+        made, tilted = leaf, None
         for k, wrap in enumerate(wrappers):
             inner = _unused(f"{name} ({made.type}{k or ''})", self.materials)
             self.materials[inner] = made
+            tilted = inner if isinstance(made, NormalMap) else tilted
             made = wrap(inner)
         self.materials[name] = made
-        return Surface(name, uv_set, emits, max(factor) > 1.0, opacity != 1.0)
+        tilted = name if isinstance(made, NormalMap) else tilted
+        return Surface(name, uv_set, emits, max(factor) > 1.0, opacity != 1.0, tilted)
+
+    def follow_v(self, names: Iterable[str]) -> None:
+        """Let only these normal maps follow v: without mirrored coordinates it makes no difference,
+        and other renderers have nothing like it."""
+        for name, material in self.materials.items():
+            if isinstance(material, NormalMap) and name not in names:
+                self.materials[name] = material.model_copy(update={"follow_v": False})
 
     # ---- textures -------------------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from gltf_scenes import TEXELS, GltfScene, full_scene, load, png, refused
+from gltf_scenes import TEXELS, UV, GltfScene, full_scene, load, png, refused
 from PIL import Image
 
 import reference_rt as rt
@@ -138,9 +138,21 @@ def test_both_sides_normal_maps_and_masks_nest(tmp_path):
         "normal_map",
         "two_sided",
     ]
-    assert (tilt.scale, tilt.follow_v) == (0.5, True)
+    assert (tilt.scale, tilt.follow_v) == (0.5, False)
     assert scene.materials[sides.base].type == "gltf_pbr"
     assert "it emits from its front only" in said
+
+
+@pytest.mark.parametrize("by", ["uv", "node"])
+def test_normal_maps_follow_mirrored_coordinates(tmp_path, by):
+    file = full_scene()
+    if by == "uv":
+        uv = UV * np.float32([-1, 1])
+        file.primitive["attributes"]["TEXCOORD_0"] = file.add(uv)
+    else:
+        file.root["nodes"][0]["scale"] = [1, -1, 1]
+    (tilt,) = (m for m in load(tmp_path, file)[0].materials.values() if m.type == "normal_map")
+    assert tilt.follow_v
 
 
 def test_emission_is_masked(tmp_path):
