@@ -231,7 +231,7 @@ def _value(
         return _object(root["$defs"][part["$ref"].rsplit("/", 1)[1]], draw, names, key, root)
     if "anyOf" in part:
         return _any_of(part["anyOf"], draw, names, own, key, root)
-    if known is not None and part.get("type") in ("number", "integer", "string", "boolean"):
+    if known is not None and part.get("type") in ("number", "integer", "string"):
         return known(draw)
     match part.get("type"):
         case "number":
@@ -357,8 +357,6 @@ RANGES: dict[str, Callable[[Draw], Any]] = {
     "bump.scale": lambda draw: draw.between(0.02, 0.3),
     "bitmap.scale": lambda draw: draw.pick((1.0, 0.5, 1.0)),
     "bitmap.cutoff": lambda draw: draw.between(0.1, 0.9),
-    # Mitsuba has no counterpart.
-    "normal_map.follow_v": lambda draw: draw.chance(0.1),
     "normal_map.scale": lambda draw: draw.between(0.3, 1.5),
     "vertex_colours.scale": lambda draw: draw.pick((1.0, 0.5)),
     "factor": lambda draw: draw.between(0.2, 1.0),

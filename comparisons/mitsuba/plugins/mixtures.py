@@ -154,7 +154,8 @@ def register(mi: Any) -> None:
     class TextureProduct(mi.Texture):  # type: ignore[misc]
         """The product of nested textures and of factor_0, factor_1, factor_2.
 
-        cutoff: above 0, values of at least this become 1, all others 0.
+        cutoff: above 0, values of at least this become 1, all others 0;  follow_v: of a normal map,
+        whether green is turned where uv is mirrored on the surface, as `NormalMap` describes.
         """
 
         def __init__(self, properties: Any) -> None:
@@ -162,11 +163,16 @@ def register(mi: Any) -> None:
             self.of = [part for _, part in properties.objects()]
             self.factor = mi.Color3f([float(properties[f"factor_{k}"]) for k in range(3)])
             self.cutoff = float(properties["cutoff"])
+            self.follow_v = bool(properties["follow_v"])
 
         def eval(self, si: Any, active: Any = True) -> Any:
             found = self.factor
             for part in self.of:
                 found = found * part.eval(si, active)
+            if self.follow_v:
+                mirrored = dr.dot(dr.cross(si.dp_du, si.dp_dv), si.sh_frame.n) < 0.0
+                green = dr.select(mirrored, 1.0 - found.y, found.y)
+                return mi.Color3f(found.x, green, found.z)
             if self.cutoff > 0.0:
                 return dr.select(found >= self.cutoff, mi.Color3f(1.0), mi.Color3f(0.0))
             return found

@@ -18,6 +18,7 @@ from comparisons.mitsuba.translate.textures import (
     colour,
     depends_on_uv,
     number,
+    product,
     rgb,
     translate_texture,
 )
@@ -311,15 +312,15 @@ def _(material: NormalMap, context: TranslationContext) -> dict[str, Any]:
     texture = context.textures[material.normals]
     if not isinstance(texture, Bitmap) or texture.cutoff is not None:
         raise UntranslatableError("NormalMap of a texture that is no image", "material")
-    if material.follow_v:
-        raise UntranslatableError("NormalMap with 'follow_v'", "material")
+    if context.in_file is not None and (material.follow_v or material.scale != 1.0):
+        raise UntranslatableError("NormalMap with 'scale' or 'follow_v'", "material")
     normals = colour(material.normals, context)
     if material.scale != 1.0:
-        if context.in_file is not None:
-            raise UntranslatableError("NormalMap with 'scale'", "material")
         factors = np.array([material.scale, material.scale, 1.0])
         texels = texture.read(context.folder).linear * factors + 0.5 * (1.0 - factors)
         normals["bitmap"] = mitsuba().Bitmap(np.ascontiguousarray(texels, np.float32))
+    if material.follow_v:
+        normals = product([normals], follow_v=True)
     return {"type": "normalmap", "normalmap": normals, "bsdf": base, **_tilt(material)}
 
 

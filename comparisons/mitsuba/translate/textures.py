@@ -150,23 +150,25 @@ def _(texture: Bitmap, name: str, context: TranslationContext, as_number: bool) 
         texels = described_image(*source, ours, texture.channel)
         context.images[key] = _image(texels, as_grey)
     found = _lookup(context.images[key], texture.filter, along_u, texture.uv)
-    return found if texture.cutoff is None else _product([found], cutoff=texture.cutoff)
+    return found if texture.cutoff is None else product([found], cutoff=texture.cutoff)
 
 
 @translate_texture.register
 def _(texture: Product, name: str, context: TranslationContext, as_number: bool) -> dict[str, Any]:
-    return _product([_translated(of, context, False) for of in texture.of], texture.factor)
+    return product([_translated(of, context, False) for of in texture.of], texture.factor)
 
 
-def _product(
+def product(
     of: list[dict[str, Any]],
     factor: tuple[float, float, float] = (1.0, 1.0, 1.0),
     cutoff: float = 0.0,
+    follow_v: bool = False,
 ) -> dict[str, Any]:
     """Our plugin `comparisons.mitsuba.plugins.mixtures`, of colours and of numbers."""
     nested = {f"of_{k}": part for k, part in enumerate(of)}
     factors = {f"factor_{k}": value for k, value in enumerate(factor)}
-    return {"type": "texture_product", "cutoff": cutoff, **factors, **nested}
+    options = {"cutoff": cutoff, "follow_v": follow_v}
+    return {"type": "texture_product", **options, **factors, **nested}
 
 
 @translate_texture.register
