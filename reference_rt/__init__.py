@@ -15,7 +15,7 @@
 - Materials: Diffuse, Mirror, Dielectric, ThinDielectric, Conductor, RoughConductor,
   RoughDielectric, Plastic, RoughPlastic, Principled, PrincipledThin, GltfPbr, Phong, Emissive;
   made of others: Mask, TwoSided, Blend, Bump, NormalMap
-- Textures: Checker, Bitmap, VertexColours
+- Textures: Checker, Bitmap, VertexColours, Product
 - Lights: Point, Spot, Projector, Directional, Constant, EnvironmentMap, Ambient
 - Integrators: Path, Direct, Whitted, RayCast
 - Samplers: Sobol, Independent, Grid
@@ -28,7 +28,7 @@
 Other modules are internal.  A name is imported when it is first used: importing the package takes
 milliseconds, and the renderer, with Numba, a second.  Folders from the lowest to the highest, each
 of which may import those before it: util, jit, core, sampling, textures, shapes, cameras, accel,
-materials, lights, integrators, scene, rendering, textbook, cli.
+materials, lights, integrators, scene, gltf, rendering, textbook, cli.
 """
 
 import lazy_loader as _lazy_loader

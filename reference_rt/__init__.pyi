@@ -75,6 +75,7 @@ from .shapes.csg import Union as Union
 from .shapes.instances import Instance as Instance
 from .textures import Bitmap as Bitmap
 from .textures import Checker as Checker
+from .textures import Product as Product
 from .textures import VertexColours as VertexColours
 from .util.errors import ImageError as ImageError
 from .util.errors import ReferenceRtError as ReferenceRtError

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from comparisons.commands.options import (
-    AllowMissing,
     ClusterFile,
     Fixed,
     Fresh,
@@ -28,7 +27,7 @@ from comparisons.commands.options import (
 )
 from comparisons.results.rungs import COMPARED
 from reference_rt.cli.guarded import guarded, say
-from reference_rt.cli.options import Defaults, by_name
+from reference_rt.cli.options import AllowMissing, Defaults, by_name
 from reference_rt.util.errors import UsageError
 
 if TYPE_CHECKING:
@@ -39,7 +38,9 @@ if TYPE_CHECKING:
 def compare(
     scenes: Annotated[
         list[Path],
-        typer.Argument(metavar="SCENE...", help="Scene files: .yaml, .json, or Mitsuba's .xml."),
+        typer.Argument(
+            metavar="SCENE...", help="Scene files: .yaml, .json, glTF, or Mitsuba's .xml."
+        ),
     ],
     out: Annotated[Path, out_folder("results.json and report.html")] = Path("out"),
     spp: Annotated[
@@ -266,7 +267,7 @@ def report(
 @guarded
 def convert(
     scene: Annotated[
-        Path, typer.Argument(metavar="SCENE", help="A Mitsuba .xml scene, or one of ours.")
+        Path, typer.Argument(metavar="SCENE", help="A Mitsuba .xml scene, a glTF one, or ours.")
     ],
     output: Annotated[
         Path,

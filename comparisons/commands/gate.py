@@ -22,7 +22,7 @@ from comparisons.commands.options import (
 )
 from comparisons.commands.truth import truth_gate
 from reference_rt.cli.guarded import guarded, say
-from reference_rt.cli.options import Defaults, adjusted, by_name
+from reference_rt.cli.options import AllowMissing, Defaults, adjusted, by_name
 from reference_rt.util.errors import ReferenceRtError, SceneError, UsageError, printable
 
 if TYPE_CHECKING:
@@ -153,6 +153,7 @@ def gate(
     github: GitHub = False,
     threads: Threads = None,
     define: Defaults = None,
+    allow_missing: AllowMissing = False,
 ) -> None:
     """Compare another renderer's pictures with our rendering, a reference or a baseline.
 
@@ -203,14 +204,18 @@ def gate(
             "size": size,
         }
         others |= {"baseline": baseline, "fixed": fixed, "noise-free": noise_free, "rim": rim}
-        others |= {"witness": witness, "browser": browser}
+        others |= {"witness": witness, "browser": browser, "allow-missing": allow_missing}
         for name, value in {**others, "junit": junit, "github": github, "define": define}.items():
             if value:
                 raise UsageError(f"--{name}: does not apply to --truth; expected one of them")
         numbers = {"replicates": replicates, "spp": spp, "seed": seed}
         truth_gate(truth, candidates or (), command, layer, out, suffix=suffix,
                    seconds=time_limit, **numbers)  # fmt: skip
-    described = None if scene is None else adjusted(Scene.load(scene, by_name(define)), spp, size)
+    described = (
+        None
+        if scene is None
+        else adjusted(Scene.load(scene, by_name(define), allow_missing), spp, size)
+    )
     run, rounds = None, Rounds()
     if driven:
         noiseless = noise_free or (described is not None and is_noise_free(described))

@@ -64,14 +64,6 @@ NumberOfWorkers = Annotated[
     typer.Option("--workers", "--jobs", min=1, help="Processes at a time. (default: all cores)"),
 ]
 
-AllowMissing = Annotated[
-    bool,
-    typer.Option(
-        "--allow-missing",
-        help="Leave out or replace what of an .xml scene is not supported, in both renderers.",
-    ),
-]
-
 Witness = Annotated[
     Literal["cycles"] | None,
     typer.Option(help="A third renderer, whose pictures say who stands alone: cycles."),

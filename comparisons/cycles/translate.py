@@ -36,7 +36,6 @@ from reference_rt.lights import Constant, Directional, Point
 from reference_rt.materials import Blend, Emissive, TwoSided
 from reference_rt.rendering.scene import Scene
 from reference_rt.textures import Bitmap, Checker
-from reference_rt.textures.image_file import read_image
 
 MOST_BOUNCES = 1024
 """Cycles' own limit."""
@@ -263,16 +262,18 @@ def _(texture: Checker, writing: Writing) -> Data:
 
 @texture_of.register
 def _(texture: Bitmap, writing: Writing) -> Data:
-    folder = writing.scene.folder
-    ours = read_image(folder / texture.file, texture.encoding, texture.scale, texture.layer)
-    path = folder / texture.file
-    values = described_image(path, texture.encoding, texture.scale, texture.layer, ours)
+    along_u, along_v = texture.wraps
+    if along_u != along_v or texture.cutoff is not None:
+        raise IneligibleError("a bitmap with two wraps, or with a cutoff")
+    path, ours = writing.scene.folder / texture.file, texture.read(writing.scene.folder).linear
+    source = path, texture.encoding, texture.scale, texture.layer
+    values = described_image(*source, ours, texture.channel)
     return {
         "type": "image",
         "uv": affine.of_uv(texture.uv)[:2].tolist(),
         "file": writing.save(values),
         "interpolation": {"bilinear": "Linear", "nearest": "Closest"}[texture.filter],
-        "extension": {"repeat": "REPEAT", "clamp": "EXTEND", "mirror": "MIRROR"}[texture.wrap],
+        "extension": {"repeat": "REPEAT", "clamp": "EXTEND", "mirror": "MIRROR"}[along_u],
     }
 
 

@@ -19,6 +19,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.image_files import open_image
 from reference_rt.shapes import Mesh, Triangle
 from reference_rt.shapes.meshes.topology import smooth_normals
+from reference_rt.textures.image_file import COLOURS
 
 ROUNDING = 2.0**-22
 """Of the largest number: a few roundings to float32, in which Mitsuba holds numbers."""
@@ -287,10 +288,15 @@ def _in_order(theirs: Corners, ours: Corners) -> Corners:
 # ---- images --------------------------------------------------------------------------------------
 
 
-def image(path: Path, encoding: str, layer: str) -> FloatArray | None:
-    """An image (h, w, 3) as Mitsuba reads it, in linear values, `encoding` and `layer` as of
-    `Bitmap`; None where it does not, or reads something else."""
-    if layer or encoding == "radiance" or getattr(open_image(path), "gamma", None) is not None:
+def image(path: Path, encoding: str, layer: str, channel: str = "all") -> FloatArray | None:
+    """An image (h, w, 3) as Mitsuba reads it, in linear values, `encoding`, `layer` and `channel`
+    as of `Bitmap`; None where it does not, or reads something else."""
+    if (
+        layer
+        or channel == "alpha"
+        or encoding == "radiance"
+        or getattr(open_image(path), "gamma", None) is not None
+    ):
         return None
     mi = mitsuba()
     try:
@@ -306,7 +312,10 @@ def image(path: Path, encoding: str, layer: str) -> FloatArray | None:
     is_srgb = bitmap.srgb_gamma()
     bitmap.set_srgb_gamma(False)
     values = np.array(bitmap.convert(formats.RGB, mi.Struct.Type.Float64, False), np.float64)
-    return _decoded(values) if is_srgb else values
+    values = _decoded(values) if is_srgb else values
+    if channel == "all":
+        return values
+    return np.repeat(values[..., COLOURS.index(channel), None], 3, axis=2)
 
 
 def _decoded(encoded: FloatArray) -> FloatArray:
@@ -328,11 +337,11 @@ def rounding_of(path: Path, theirs: FloatArray, scale: float) -> FloatArray:
 
 
 def described_image(
-    path: Path, encoding: str, scale: float, layer: str, ours: FloatArray
+    path: Path, encoding: str, scale: float, layer: str, ours: FloatArray, channel: str = "all"
 ) -> FloatArray:
     """An image for the counterpart, times `scale`: as Mitsuba reads it.  Ours (h, w, 3) is taken
     where Mitsuba does not read it, and where it is the same but for rounding."""
-    theirs = image(path, encoding, layer)
+    theirs = image(path, encoding, layer, channel)
     if theirs is None:
         return ours
     theirs = theirs * scale

@@ -188,7 +188,7 @@ class Writing(Losses):
                     pair = tuple(float(luminance(Vec3(*colour))) for colour in pair)
                 colours = {f"{kind} tex{k}": value for k, value in enumerate(pair, 1)}
                 return "checkerboard", {**_uv(texture, 2.0), **colours}
-            case Bitmap() if texture.wrap != "mirror":
+            case Bitmap(cutoff=None) if texture.wraps in (("repeat",) * 2, ("clamp",) * 2):
                 read = partial(texture.read, self.scene.folder)
                 texels = np.asarray(self.read(read, "textures", name).linear)
                 if kind == "float":  # pbrt takes the mean of the channels
@@ -197,11 +197,11 @@ class Writing(Losses):
                 look = {
                     "string filename": self.image("texture", texels),
                     "string filter": {"bilinear": "bilinear", "nearest": "point"}[texture.filter],
-                    "string wrap": texture.wrap,
+                    "string wrap": texture.wraps[0],
                 }
                 return "imagemap", {**_uv(texture, 1.0), **look}
             case Bitmap():
-                raise UnwritableError("a bitmap with 'wrap: mirror'")
+                raise UnwritableError("a bitmap with 'wrap: mirror', two wraps or a cutoff")
         raise UnwritableError(f"a texture '{texture.type}'")
 
     def image(self, stem: str, texels: FloatArray) -> str:

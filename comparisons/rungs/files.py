@@ -319,7 +319,7 @@ def _compare_images(
 
 def _check_bitmap(where: str, bitmap: Bitmap, folder: Path, found: Found) -> None:
     path = folder / bitmap.file
-    theirs = image(path, bitmap.encoding, bitmap.layer)
+    theirs = image(path, bitmap.encoding, bitmap.layer, bitmap.channel)
     if theirs is None:
         found.unread.append(path.suffix.lower())
         return

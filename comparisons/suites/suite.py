@@ -16,6 +16,7 @@ from reference_rt.cli.options import adjusted
 from reference_rt.core.model import Description, Positive
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene import yaml_text
+from reference_rt.scene.model import OWN
 from reference_rt.scene.yaml_text import line_of
 from reference_rt.util.errors import SceneError, SceneWarning, UsageError, printable
 from reference_rt.util.files import read_text
@@ -35,8 +36,8 @@ class Changes(BaseModel):
     allow_missing: bool = False
 
     def on(self, path: Path) -> Self:
-        """The changes that apply to a file: only Mitsuba's have defaults."""
-        if path.suffix.lower() == ".xml":
+        """The changes that apply to a file: our own scenes have no defaults."""
+        if path.suffix.lower() not in OWN:
             return self
         return self.model_copy(update={"defaults": {}, "allow_missing": False})
 
@@ -111,7 +112,7 @@ _Scenes = dict[str, tuple[Path, Scene | SceneError]]
 
 BUILT_IN = ("smoke", "standard", "full")
 
-_SUFFIXES = (".yaml", ".yml", ".json", ".xml")
+_SUFFIXES = (*OWN, ".xml", ".gltf", ".glb")
 
 
 class Entry(Budget):
@@ -262,7 +263,7 @@ def _scenes(folder: Path, changes: Changes) -> _Scenes:
             found[name] = path, read(path, changes.on(path))
     if not found:
         raise UsageError(
-            f"--scenes: '{folder}' holds no scene; expected .yaml, .json or .xml files"
+            f"--scenes: '{folder}' holds no scene; expected .yaml, .json, .xml, .gltf or .glb files"
         )
     return found
 

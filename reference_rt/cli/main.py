@@ -14,7 +14,14 @@ import typer.core
 
 from reference_rt.cli import options
 from reference_rt.cli.guarded import guarded, is_output_lost, lost_output, say
-from reference_rt.cli.options import Defaults, SceneArgument, adjusted, by_name, without_blas
+from reference_rt.cli.options import (
+    AllowMissing,
+    Defaults,
+    SceneArgument,
+    adjusted,
+    by_name,
+    without_blas,
+)
 from reference_rt.util.errors import ImageError, meant_by
 from reference_rt.util.processes import catch_signals, exit_code_of
 
@@ -79,6 +86,7 @@ def render(
     seed: Annotated[int | None, typer.Option(help="Seed of the random numbers.")] = None,
     threads: Threads = None,
     define: Defaults = None,
+    allow_missing: AllowMissing = False,
     time_limit: options.TimeLimit = None,
     target_error: options.TargetError = None,
     checkpoint: options.CheckpointFolder = None,
@@ -102,7 +110,7 @@ def render(
     from reference_rt.util.files import check_writable
 
     check_suffix(output)
-    loaded = Scene.load(scene, by_name(define))
+    loaded = Scene.load(scene, by_name(define), allow_missing)
     description = adjusted(loaded, spp, size, integrator, seed)
     check_writable(output)
     where = Where(workers, scheduler, cluster, threads)
@@ -140,6 +148,7 @@ def preview(
         typer.Option("--watch", help="Begin again whenever the scene or one of its files changes."),
     ] = False,
     define: Defaults = None,
+    allow_missing: AllowMissing = False,
 ) -> None:
     """Show a picture of a scene that becomes less noisy until it is closed or interrupted."""
     from reference_rt.cli import preview as previews
@@ -147,7 +156,7 @@ def preview(
     from reference_rt.rendering.scene import Scene
 
     def load() -> Scene:
-        return adjusted(Scene.load(scene, by_name(define)), size=size)
+        return adjusted(Scene.load(scene, by_name(define), allow_missing), size=size)
 
     loaded = load()
     view = previews.view_of(to, loaded)
@@ -179,6 +188,7 @@ def trace(
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the random numbers.")] = None,
     define: Defaults = None,
+    allow_missing: AllowMissing = False,
 ) -> None:
     """Show the rays of one sample of a pixel: what they hit, and what each adds to its value.
 
@@ -188,7 +198,8 @@ def trace(
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.files import check_writable
 
-    loaded = adjusted(Scene.load(scene, by_name(define)), spp, size, integrator, seed)
+    described = Scene.load(scene, by_name(define), allow_missing)
+    loaded = adjusted(described, spp, size, integrator, seed)
     if out is not None:
         check_writable(out)
     with without_blas():
@@ -207,6 +218,7 @@ def trace(
 def explain(
     scene: SceneArgument,
     define: Defaults = None,
+    allow_missing: AllowMissing = False,
     witness: Annotated[
         str | None,
         typer.Option(metavar="NAME", help="Whether a third renderer may vote on it: cycles."),
@@ -216,7 +228,7 @@ def explain(
     from reference_rt.cli.explain import print_page, print_witness
     from reference_rt.rendering.scene import Scene
 
-    loaded = Scene.load(scene, by_name(define))
+    loaded = Scene.load(scene, by_name(define), allow_missing)
     if witness is not None:
         print_witness(loaded, witness)
         return

@@ -23,7 +23,18 @@ if TYPE_CHECKING:
 Defaults = Annotated[
     list[str] | None,
     typer.Option(
-        "-D", metavar="NAME=VALUE", help="A value for a <default> of a Mitsuba scene; repeatable."
+        "-D",
+        metavar="NAME=VALUE",
+        help="A value for a <default> of a Mitsuba scene; of glTF: camera, scene, environment (a "
+        "file or a radiance); repeatable.",
+    ),
+]
+
+AllowMissing = Annotated[
+    bool,
+    typer.Option(
+        "--allow-missing",
+        help="Leave out or replace what of an .xml, .gltf or .glb scene is not supported.",
     ),
 ]
 
@@ -42,7 +53,10 @@ def by_name(given: Sequence[str] | None) -> dict[str, str]:
 
 
 SceneArgument = Annotated[
-    Path, typer.Argument(metavar="SCENE", help="A .yaml or .json scene, or a Mitsuba .xml one.")
+    Path,
+    typer.Argument(
+        metavar="SCENE", help="A .yaml or .json scene, a glTF one, or a Mitsuba .xml one."
+    ),
 ]
 
 _OPTIONS = (("spp",), ("size",), ("integrator",), ("seed",))

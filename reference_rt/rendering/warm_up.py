@@ -100,7 +100,7 @@ from reference_rt.shapes import (
 from reference_rt.shapes.csg import Union
 from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.meshes.files.obj_scanner import scan_call
-from reference_rt.textures import Bitmap, Checker, VertexColours
+from reference_rt.textures import Bitmap, Checker, Product, VertexColours
 from reference_rt.util.files import temporary_folder
 
 
@@ -344,7 +344,10 @@ def _scenes(folder: Path) -> Iterator[BuiltScene]:
     for method in ("median", "spatial"):
         yield scene(hierarchy=method)
     for names in _subsets(_TEXTURES):
-        yield scene(textures={name: _TEXTURES[name] for name in names}, materials=_FEW)
+        textures = {name: _TEXTURES[name] for name in names}
+        yield scene(textures=textures, materials=_FEW)
+        if names:
+            yield scene(textures=textures | {"product": Product(of=(*names,))}, materials=_FEW)
     yield scene(materials=_LEAVES)
     cycled = zip(_FILTERS, cycle(_CAMERAS), cycle(_SAMPLERS), cycle(_SKIES), strict=False)
     for of_film, camera, sampler, sky in cycled:

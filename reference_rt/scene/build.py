@@ -5,6 +5,7 @@ the same features have the same Numba types and share compiled kernels.  A featu
 lacks is None, and its branches are removed when the kernels are compiled.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -48,7 +49,7 @@ from reference_rt.scene.build_geometry import assemble
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes import TABLES as SHAPE_TABLES
 from reference_rt.textures import TABLES as TEXTURE_TABLES
-from reference_rt.textures import Colours, Palette, Textures, bitmap
+from reference_rt.textures import Colours, Palette, Product, Textures, bitmap, product
 from reference_rt.textures.parameter import join
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -283,6 +284,7 @@ def _texture_tables(scene: SceneModel) -> tuple[Textures | None, Palette]:
         room, used = bitmap.room_for(scene.textures.values(), scene.folder), 0
     except ValueError as error:
         raise scene.error(str(error), "textures") from None
+    numbers = {name: k for k, name in enumerate(scene.textures)}
     kinds, rows, maps, greatest = [], [], [], []
     for name, texture in scene.textures.items():
         code, module = next((c, m) for c, _, d, m in TEXTURE_TABLES if isinstance(texture, d))
@@ -291,6 +293,8 @@ def _texture_tables(scene: SceneModel) -> tuple[Textures | None, Palette]:
             if isinstance(texture, bitmap.Bitmap):
                 table = texture.tabulate(scene.folder, room[used:])
                 used += len(table.memory.codes8)
+            elif isinstance(texture, Product):
+                table = product.table_of(texture, numbers)
             else:
                 table = texture.tabulate(scene.folder)
         except ValueError as error:
@@ -300,11 +304,13 @@ def _texture_tables(scene: SceneModel) -> tuple[Textures | None, Palette]:
         rows.append(len(parts[code]) - 1)
         maps.append(texture.uv.coefficients())
         greatest.append(module.greatest(table))
+    for name, texture in scene.textures.items():
+        if isinstance(texture, Product):
+            greatest[numbers[name]] *= math.prod(greatest[numbers[of]] for of in texture.of)
     tables = {
         field: _joined(module, parts[code]) if code in parts else None
         for code, field, _, module in TEXTURE_TABLES
     }
-    numbers = {name: k for k, name in enumerate(scene.textures)}
     textures = Textures(np.array(kinds), np.array(rows), np.array(maps), **tables)
     return textures, Palette(numbers, greatest)
 

@@ -35,7 +35,7 @@ from reference_rt.scene.yaml_text import line_of
 from reference_rt.shapes import Shape
 from reference_rt.shapes.csg import AnyShape, Solid
 from reference_rt.shapes.instances import Instance
-from reference_rt.textures import AnyTexture, texture_names
+from reference_rt.textures import AnyTexture, Product, texture_names
 from reference_rt.util.errors import (
     ReferenceUnavailableError,
     SceneError,
@@ -108,6 +108,12 @@ class SceneModel(Description):
         for name, shapes in self.groups.items():
             for k, shape in enumerate(shapes):
                 self._check_shape(shape, "groups", name, k)
+        for name, texture in self.textures.items():
+            self._check_textures(texture, "textures", name)
+            for k, of in enumerate(texture.of if isinstance(texture, Product) else ()):
+                if isinstance(self.textures[of], Product):
+                    message = f"'{of}' is a product itself; expected textures of other types"
+                    raise SceneError(message, ("textures", name, "of", k))
         for name, material in self.materials.items():
             self._check_parts(name, material)
         for name, material in self.materials.items():
@@ -153,7 +159,7 @@ class SceneModel(Description):
             )
 
     def _check_textures(self, part: Description, *path: str | int) -> None:
-        """Check that the textures that a material or a light names exist."""
+        """Check that the textures that a material, a light or a texture names exist."""
         for field, texture in texture_names(part).items():
             if texture not in self.textures:
                 only_names = type(part).__pydantic_fields__[str(field[0])].annotation in _NAMES
@@ -283,18 +289,19 @@ class SceneModel(Description):
         defaults: Mapping[str, str] | None = None,
         allow_missing: bool = False,
     ) -> Self:
-        """Read a .yaml, .yml or .json file, or with Mitsuba an .xml file of its own.
+        """Read a .yaml, .yml, .json, .gltf or .glb file, or with Mitsuba an .xml file of its own.
 
-        defaults: values for the <default> elements of an .xml file;  allow_missing: leave out what
-        of it is not supported, with a warning for each.  Raises SceneError (file, line, key path,
-        reason), ReferenceUnavailableError where Mitsuba is needed and missing.
+        defaults: values for the <default> elements of an .xml file; of glTF `camera` (a name or a
+        number), `environment` (a file or a radiance) and `scene` (a number);  allow_missing: leave
+        out what of it is not supported, with a warning for each.  Raises SceneError (file, line,
+        key path, reason), ReferenceUnavailableError where Mitsuba is needed and missing.
         """
         path = Path(path)
         if path.suffix.lower() not in OWN:
             read_file = reader_of(path).read_file
             return read_file(path, cls, defaults or {}, allow_missing)  # type: ignore[no-any-return]
         if defaults:
-            raise SceneError("has no defaults; expected a Mitsuba scene, .xml", file=str(path))
+            raise SceneError("has no defaults; expected a scene of Mitsuba or glTF", file=str(path))
         try:
             text = read_text(path)
         except OSError as error:
@@ -396,4 +403,4 @@ def reader_of(path: Path) -> Any:
             raise ReferenceUnavailableError(f"{path}: {advice}") from None
     if suffix in _PACKAGES:
         raise ReferenceUnavailableError(f"{path}: {_PACKAGES[suffix]}")
-    raise SceneError("is not a scene file; expected .yaml or .json", file=str(path))
+    raise SceneError("is not a scene file; expected .yaml, .json, .gltf or .glb", file=str(path))

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from reference_rt.textures import bitmap, checker, vertex_colours
+from reference_rt.textures import bitmap, checker, product, vertex_colours
 from reference_rt.textures.bitmap import Bitmap
 from reference_rt.textures.checker import Checker
 from reference_rt.textures.lookup import At, Textures
@@ -31,15 +31,17 @@ from reference_rt.textures.parameter import (
     number_at,
     texture_names,
 )
-from reference_rt.textures.texture import BITMAP, CHECKER, VERTEX_COLOURS, Texture
+from reference_rt.textures.product import Product
+from reference_rt.textures.texture import BITMAP, CHECKER, PRODUCT, VERTEX_COLOURS, Texture
 from reference_rt.textures.vertex_colours import VertexColours
 
-AnyTexture = Annotated[Checker | Bitmap | VertexColours, Field(discriminator="type")]
+AnyTexture = Annotated[Checker | Bitmap | VertexColours | Product, Field(discriminator="type")]
 
 TABLES: tuple[tuple[int, str, type[Texture], Any], ...] = (
     (CHECKER, "checkers", Checker, checker),
     (BITMAP, "bitmaps", Bitmap, bitmap),
     (VERTEX_COLOURS, "vertex_colours", VertexColours, vertex_colours),
+    (PRODUCT, "products", Product, product),
 )
 """(code, field of Textures, description, module)."""
 
@@ -54,6 +56,7 @@ __all__ = [
     "Colours",
     "Numbers",
     "Palette",
+    "Product",
     "ReflectanceParameter",
     "Texture",
     "TextureName",

@@ -4,10 +4,11 @@ import math
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import BeforeValidator
 
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.model import Positive
@@ -15,6 +16,7 @@ from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.jit.kernel import kernel
 from reference_rt.textures.image_file import (
     Bytes,
+    Channel,
     Encoding,
     Texels,
     joined,
@@ -30,6 +32,14 @@ _WRAPS = ("repeat", "clamp", "mirror")
 _NEAREST = 1
 _CLAMP, _MIRROR = 1, 2
 
+Wrap = Literal["repeat", "clamp", "mirror"]
+
+Wraps = Annotated[
+    Wrap | tuple[Wrap, Wrap],
+    BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value),
+]
+"""One for both axes, or those along u and v."""
+
 
 class Bitmap(Texture):
     """An image: (u, v) = (0, 0) is its lower left corner, (1, 1) its upper right one."""
@@ -40,8 +50,9 @@ class Bitmap(Texture):
     .tga, .ppm or .gif."""
     filter: Literal["bilinear", "nearest"] = "bilinear"
     """The colour between texel centres: interpolated, or that of the nearest texel."""
-    wrap: Literal["repeat", "clamp", "mirror"] = "repeat"
-    """The colour outside of [0, 1]: the image repeated, its rim, or the image mirrored."""
+    wrap: Wraps = "repeat"
+    """The colour outside of [0, 1]: the image repeated, its rim, or the image mirrored; or two of
+    these, `[along u, along v]`."""
     encoding: Encoding = "auto"
     """`srgb`: values are decoded to linear ones.  `raw`: values are used as they are.  `auto`:
     `srgb` for files of integers, `raw` for files of floats.  `radiance`: .hdr as Radiance itself
@@ -50,18 +61,32 @@ class Bitmap(Texture):
     layer: str = ""
     """Of an .exr file with several pictures: the one whose channels begin so, such as `diffuse` for
     diffuse.R.  Default: R, G, B, or the file's only picture."""
+    channel: Channel = "all"
+    """The channel that is used, as grey: `red`, `green`, `blue`, or `alpha`, which is never decoded
+    and is 1 in images without one.  Default: all colours."""
     scale: Positive = 1.0
     """A factor of the linear values: radiance and heights may need values above 1."""
+    cutoff: Positive | None = None
+    """Values of at least this, between texels and after `scale`, become 1, all others 0: the sharp
+    edge of a mask.  Default: none."""
+
+    @property
+    def wraps(self) -> tuple[Wrap, Wrap]:
+        """`wrap` along u and along v."""
+        return self.wrap if isinstance(self.wrap, tuple) else (self.wrap, self.wrap)
 
     def tabulate(self, folder: Path, out: Bytes | None = None) -> "Bitmaps":
         """One row of the table.  out (n,): as in `read_texels`.  Raises ValueError (what is wrong,
         what was expected)."""
         texels = self.read(folder, out)
-        return table_of(texels, _FILTERS.index(self.filter), _WRAPS.index(self.wrap))
+        along_u, along_v = map(_WRAPS.index, self.wraps)
+        wrap = along_u + len(_WRAPS) * along_v
+        return table_of(texels, _FILTERS.index(self.filter), wrap, self.cutoff)
 
     def read(self, folder: Path, out: Bytes | None = None) -> Texels:
         """The image.  Raises ValueError (what is wrong, what was expected)."""
-        return read_texels(folder / self.file, self.encoding, self.scale, out, self.layer)
+        path = folder / self.file
+        return read_texels(path, self.encoding, self.scale, out, self.layer, self.channel)
 
 
 class Memory(NamedTuple):
@@ -81,7 +106,8 @@ class Bitmaps(NamedTuple):
     images;  for each image (n,): the bytes of a value (of 1 and 2 they are codes), its channels (3,
     of a grey image 1), the index of its first value in the memory of its type, and of code 0 in
     `decoded`, a factor of floats, the largest linear value, width, height, filter (0 bilinear, 1
-    nearest), wrap (0 repeat, 1 clamp, 2 mirror).
+    nearest), wrap (0 repeat, 1 clamp, 2 mirror: along u, and three times that along v), cutoff (0
+    for none).
     """
 
     memory: Memory
@@ -96,9 +122,10 @@ class Bitmaps(NamedTuple):
     height: IntArray
     filter: IntArray
     wrap: IntArray
+    cutoff: FloatArray
 
 
-def table_of(texels: Texels, filter_code: int, wrap: int) -> Bitmaps:
+def table_of(texels: Texels, filter_code: int, wrap: int, cutoff: float | None = None) -> Bitmaps:
     """The table of one image."""
     height, width, channels = texels.values.shape
     return Bitmaps(
@@ -109,11 +136,12 @@ def table_of(texels: Texels, filter_code: int, wrap: int) -> Bitmaps:
         first=np.array([0]),
         first_code=np.array([0]),
         scale=np.array([texels.scale]),
-        greatest=np.array([texels.greatest]),
+        greatest=np.array([texels.greatest if cutoff is None else 1.0]),
         width=np.array([width]),
         height=np.array([height]),
         filter=np.array([filter_code]),
         wrap=np.array([wrap]),
+        cutoff=np.array([cutoff or 0.0]),
     )
 
 
@@ -181,7 +209,7 @@ def _value(bitmaps: Bitmaps, i: int, k: int) -> float:
 def texel(bitmaps: Bitmaps, i: int, x: int, y: int) -> Vec3:
     """The texel at column x, row y (from the top) of image i; beyond its edges by its `wrap`."""
     width, height, wrap = bitmaps.width[i], bitmaps.height[i], bitmaps.wrap[i]
-    k = _wrapped(y, height, wrap) * width + _wrapped(x, width, wrap)
+    k = _wrapped(y, height, wrap // 3) * width + _wrapped(x, width, wrap % 3)
     if bitmaps.channels[i] == 1:
         grey = _value(bitmaps, i, k)
         return Vec3(grey, grey, grey)
@@ -220,6 +248,19 @@ def _patch(bitmaps: Bitmaps, i: int, u: float, v: float) -> Patch:
 @kernel
 def lookup(bitmaps: Bitmaps, i: int, u: float, v: float) -> Vec3:
     """The colour at texture coordinates (u, v)."""
+    found = _filtered(bitmaps, i, u, v)
+    cutoff = bitmaps.cutoff[i]
+    if cutoff > 0.0:
+        return Vec3(
+            1.0 if found.x >= cutoff else 0.0,
+            1.0 if found.y >= cutoff else 0.0,
+            1.0 if found.z >= cutoff else 0.0,
+        )
+    return found
+
+
+@kernel
+def _filtered(bitmaps: Bitmaps, i: int, u: float, v: float) -> Vec3:
     if bitmaps.filter[i] == _NEAREST:
         return texel(
             bitmaps, i, math.floor(u * bitmaps.width[i]), math.floor((1.0 - v) * bitmaps.height[i])
@@ -233,8 +274,8 @@ def lookup(bitmaps: Bitmaps, i: int, u: float, v: float) -> Vec3:
 @kernel
 def gradient(bitmaps: Bitmaps, i: int, u: float, v: float) -> tuple[float, float]:
     """The partial derivatives of the luminance with respect to u and v at texture coordinates
-    (u, v), of the bilinear patch there; (0, 0) for the filter `nearest`."""
-    if bitmaps.filter[i] == _NEAREST:
+    (u, v), of the bilinear patch there; (0, 0) for the filter `nearest` and with a cutoff."""
+    if bitmaps.filter[i] == _NEAREST or bitmaps.cutoff[i] > 0.0:
         return 0.0, 0.0
     patch = _patch(bitmaps, i, u, v)
     left, right = luminance(patch.upper_left), luminance(patch.upper_right)

@@ -11,11 +11,16 @@ import numpy as np
 import numpy.typing as npt
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.image_files.image_file import Curve, ImageFile
+from reference_rt.core.image_files.image_file import Curve, ImageFile, StoredStrip
 from reference_rt.util.memory import check_memory
 
 Encoding = Literal["auto", "srgb", "raw", "radiance"]
 """How the values of a file become linear ones: see `Bitmap.encoding`."""
+
+Channel = Literal["all", "red", "green", "blue", "alpha"]
+"""Which values of a file are used: see `Bitmap.channel`."""
+
+COLOURS = ("red", "green", "blue")
 
 READER = 8
 """The most bytes per pixel that reading an image takes beside its values."""
@@ -140,7 +145,12 @@ def most_bytes(path: Path, encoding: Encoding, layer: str = "") -> int:
 
 
 def read_texels(
-    path: Path, encoding: Encoding, scale: float, out: Bytes | None = None, layer: str = ""
+    path: Path,
+    encoding: Encoding,
+    scale: float,
+    out: Bytes | None = None,
+    layer: str = "",
+    channel: Channel = "all",
 ) -> Texels:
     """out (n,), aligned: if it is large enough, the texels are written to its beginning.  Raises
     ValueError (what is wrong, what was expected)."""
@@ -148,8 +158,8 @@ def read_texels(
 
     most_bytes(path, encoding, layer)
     with reading(path, encoding, layer) as image, np.errstate(over="ignore", invalid="ignore"):
-        curve = curve_of(image, encoding)
-        strips = image.stored()
+        curve = None if channel == "alpha" else curve_of(image, encoding)
+        strips = (_only(channel, strip) for strip in image.stored(channel == "alpha"))
         first = next(strips)
         kind = first.values.dtype.name
         decoded = np.zeros(0)
@@ -177,6 +187,19 @@ def read_texels(
         if not np.isfinite(greatest):
             raise ValueError("a colour times the scale overflows; expected a smaller scale")
     return Texels(data, texels, decoded, 1.0 if len(decoded) else scale, greatest)
+
+
+def _only(channel: Channel, strip: StoredStrip) -> StoredStrip:
+    """The strip with one channel as its values."""
+    if channel == "alpha":
+        kind = strip.values.dtype
+        opaque = np.iinfo(kind).max if kind.kind == "u" else 1.0
+        shape = strip.values.shape[:2]
+        opacity = np.full(shape, opaque, kind) if strip.opacity is None else strip.opacity
+        return strip._replace(values=opacity[..., None])
+    if channel == "all" or strip.values.shape[2] == 1:
+        return strip
+    return strip._replace(values=strip.values[..., COLOURS.index(channel), None])
 
 
 def joined(parts: Sequence[Bytes]) -> Bytes:

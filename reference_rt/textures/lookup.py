@@ -3,14 +3,15 @@
 from typing import Any, NamedTuple
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.vec3 import Vec3
+from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass, kernel
 from reference_rt.jit.links import LINK, Link, Linkable, declare, type_of
 from reference_rt.textures import bitmap, checker, vertex_colours
 from reference_rt.textures.bitmap import Bitmaps
 from reference_rt.textures.checker import Checkers
-from reference_rt.textures.texture import BITMAP, CHECKER, VERTEX_COLOURS, map_uv
+from reference_rt.textures.product import Products
+from reference_rt.textures.texture import BITMAP, CHECKER, PRODUCT, VERTEX_COLOURS, map_uv
 from reference_rt.textures.vertex_colours import VertexColourTable
 
 
@@ -24,6 +25,7 @@ class Textures(NamedTuple):
     checkers: Checkers | None
     bitmaps: Bitmaps | None
     vertex_colours: VertexColourTable | None
+    products: Products | None = None
 
 
 class CachedLookups(NamedTuple):
@@ -98,6 +100,28 @@ def _looked(looked: CachedLookups, k: int, at: At) -> Vec3:
 @_textures.operation
 def evaluate(textures: Textures, k: int, u: float, v: float, colour: Vec3) -> Vec3:
     """The colour of texture k at surface coordinates u, v."""
+    return _evaluate(textures.products, textures, k, u, v, colour)
+
+
+@kernel
+def _evaluate(
+    products: Products | None, textures: Textures, k: int, u: float, v: float, colour: Vec3
+) -> Vec3:
+    if products is None:
+        return _of_one(textures, k, u, v, colour)
+    if textures.kind[k] != PRODUCT:
+        return _of_one(textures, k, u, v, colour)
+    i = textures.row[k]
+    found = row(products.factor, i)
+    first = products.first[i]
+    for j in range(first, first + products.number[i]):
+        found = found * _of_one(textures, products.texture[j], u, v, colour)
+    return found
+
+
+@kernel
+def _of_one(textures: Textures, k: int, u: float, v: float, colour: Vec3) -> Vec3:
+    """The colour of a texture that is no product."""
     kind, i = textures.kind[k], textures.row[k]
     u, v = map_uv(textures.uv, k, u, v)
     return _lookup_in_table(textures, kind, i, u, v, colour)

@@ -11,10 +11,7 @@ from reference_rt.core.model import Description, colour, colour_schema, reflecta
 from reference_rt.core.vec3 import Vec3, luminance, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.textures.lookup import At, lookup
-
-
-class MayBeTexture:
-    """Marks the fields of a description that may name a texture."""
+from reference_rt.textures.texture import MayBeTexture
 
 
 def _or_name(value_of: Callable[[Any], Any]) -> BeforeValidator:

@@ -11,7 +11,7 @@ from reference_rt.core.model import Description
 from reference_rt.jit.kernel import kernel
 
 # Codes of `Textures.kind`.
-CHECKER, BITMAP, VERTEX_COLOURS = 0, 1, 2
+CHECKER, BITMAP, VERTEX_COLOURS, PRODUCT = 0, 1, 2, 3
 
 
 def _pair(value: Any) -> Any:
@@ -70,6 +70,10 @@ class UvMap(Description):
         )
         (a, b), (du, dv) = self.scale, self.offset
         return np.array([c * a, -s * b, du, s * a, c * b, dv], dtype=np.float64)
+
+
+class MayBeTexture:
+    """Marks the fields of a description that may name a texture."""
 
 
 class Texture(Description):

@@ -13,7 +13,8 @@ ROOT = Path(__file__).parents[2]
 FLOORS = {
     "reference_rt": (
         *("util", "jit", "core", "sampling", "textures", "shapes", "cameras", "accel"),
-        *("materials", "lights", "integrators", "scene", "rendering", "textbook", "cli"),
+        *("materials", "lights", "integrators", "scene", "gltf", "rendering"),
+        *("textbook", "cli"),
     ),
     "comparisons": (
         *("results", "geometry", "statistics", "renderers", "mitsuba", "pbrt", "gltf", "runs"),

@@ -48,7 +48,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "lamps": ("emissive",),
     "meshes": ("mesh", "triangle"),
     "groups": ("instance",),
-    "textures": ("bitmap", "checker", "vertex_colours"),
+    "textures": ("bitmap", "checker", "vertex_colours", "product"),
     "nested": ("mask", "two_sided", "blend", "bump", "normal_map"),
     "sky": ("constant", "environment_map"),
 }
@@ -147,9 +147,10 @@ DIGITS = 3
 
 @dataclass
 class Names:
-    """What fields may name.  textures: for colours and numbers;  images: for slopes;  normals: for
-    normals;  files: by type, such as "bitmap"."""
+    """What fields may name.  textures: for colours and numbers;  factors: for products;  images:
+    for slopes;  normals: for normals;  files: by type, such as "bitmap"."""
 
+    factors: list[str] = field(default_factory=list)
     textures: list[str] = field(default_factory=list)
     images: list[str] = field(default_factory=list)
     normals: list[str] = field(default_factory=list)
@@ -289,6 +290,8 @@ def _array(
 ) -> Any:
     known = RANGES.get(f"{own}.{key}") or RANGES.get(key)
     count = part.get("maxItems", int(draw.rng.integers(1, 4)))
+    if key == "of":
+        return [draw.pick(names.factors) for _ in range(count)]
     if part.get("minItems") != part.get("maxItems") or "items" not in part:
         return None
     if known is not None:
@@ -353,7 +356,10 @@ RANGES: dict[str, Callable[[Draw], Any]] = {
     "uv.scale": lambda draw: draw.pick((0.5, 1.0, 2.0, 5.0, -1.0)),
     "bump.scale": lambda draw: draw.between(0.02, 0.3),
     "bitmap.scale": lambda draw: draw.pick((1.0, 0.5, 1.0)),
+    "bitmap.cutoff": lambda draw: draw.between(0.1, 0.9),
+    "normal_map.scale": lambda draw: draw.between(0.3, 1.5),
     "vertex_colours.scale": lambda draw: draw.pick((1.0, 0.5)),
+    "factor": lambda draw: draw.between(0.2, 1.0),
     "environment_map.scale": lambda draw: draw.log(0.3, 2.0),
     "first": lambda draw: draw.between(0.05, 0.95),
     "second": lambda draw: draw.between(0.05, 0.95),

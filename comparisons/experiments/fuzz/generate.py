@@ -104,6 +104,9 @@ class Assembly:
         pool = [*self.wanted.get("texture", ())]
         if draw.chance(0.5):
             pool += self._some("texture", 0, 3)
+        pool.sort(key=lambda kind: kind == "product")
+        if pool[:1] == ["product"]:
+            pool.insert(0, "checker")
         for k, kind in enumerate(pool):
             self._add_texture(f"t{k}", kind)
 
@@ -111,6 +114,8 @@ class Assembly:
         cls = types("texture")[kind]
         self.textures[name] = values(cls, self.draw, self.names)
         self.names.textures.append(name)
+        if kind != "product":
+            self.names.factors.append(name)
         if "file" in cls.model_fields:
             self.names.images.append(name)
 

@@ -137,6 +137,9 @@ def renamed(original: Original) -> str | Finding:
         for at, key in [*named_in(part)]:
             if f"z{at[key]}" in names:
                 at[key] = f"z{at[key]}"
+    for texture in data["textures"].values():
+        if "of" in texture:
+            texture["of"] = [f"z{name}" for name in texture["of"]]
     for shape in shapes_of(data):
         for field in ("material", "group"):
             if shape.get(field) is not None:

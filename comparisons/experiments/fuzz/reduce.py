@@ -33,6 +33,8 @@ def without_unused(scene: Data) -> Data:
         for name, material in found.get("materials", {}).items():
             used |= {v for k, v in material.items() if isinstance(v, str) and k != "type"}
             used |= {name} if name in used else set()
+        for name, texture in found.get("textures", {}).items():
+            used |= {*texture.get("of", ())} if name in used else set()
         for section in ("materials", "textures", "groups"):
             table = {k: v for k, v in found.get(section, {}).items() if k in used}
             found.pop(section, None)

@@ -164,7 +164,7 @@ OF_IMAGES = (
     ),
     SourceFault(
         "wrap of images ignored", TILES, "textures/bitmap.py",
-        "_WRAPS.index(self.wrap)", "0",
+        "map(_WRAPS.index, self.wraps)", "0, 0",
     ),
 )  # fmt: skip
 

@@ -1,5 +1,5 @@
 """Blends, masks and two-sided materials whose components can be evaluated one by one, and that
-handle perfect mirrors.
+handle perfect mirrors; and products of textures.
 
 Errors of Mitsuba 3.9.1 that these correct: a blend adds the probability of a mirrored direction and
 the other material's density there, so that a mirror with weight w reflects
@@ -151,6 +151,49 @@ def register(mi: Any) -> None:
         def eval(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
             return self.nested.eval(context, si, wo, active)
 
+    class TextureProduct(mi.Texture):  # type: ignore[misc]
+        """The product of nested textures and of factor_0, factor_1, factor_2.
+
+        cutoff: above 0, values of at least this become 1, all others 0;  follow_v: of a normal map,
+        whether green is turned where uv is mirrored on the surface, as `NormalMap` describes.
+        """
+
+        def __init__(self, properties: Any) -> None:
+            super().__init__(properties)
+            self.of = [part for _, part in properties.objects()]
+            self.factor = mi.Color3f([float(properties[f"factor_{k}"]) for k in range(3)])
+            self.cutoff = float(properties["cutoff"])
+            self.follow_v = bool(properties["follow_v"])
+
+        def eval(self, si: Any, active: Any = True) -> Any:
+            found = self.factor
+            for part in self.of:
+                found = found * part.eval(si, active)
+            if self.follow_v:
+                mirrored = dr.dot(dr.cross(si.dp_du, si.dp_dv), si.sh_frame.n) < 0.0
+                green = dr.select(mirrored, 1.0 - found.y, found.y)
+                return mi.Color3f(found.x, green, found.z)
+            if self.cutoff > 0.0:
+                return dr.select(found >= self.cutoff, mi.Color3f(1.0), mi.Color3f(0.0))
+            return found
+
+        def eval_3(self, si: Any, active: Any = True) -> Any:
+            return self.eval(si, active)
+
+        def eval_1(self, si: Any, active: Any = True) -> Any:
+            rgb = self.eval(si, active)
+            return 0.2126 * rgb.x + 0.7152 * rgb.y + 0.0722 * rgb.z
+
+        def mean(self) -> Any:
+            return mi.Float(0.5)  # of use to sampling alone
+
+        def is_spatially_varying(self) -> bool:
+            return True
+
+        def to_string(self) -> str:
+            return f"TextureProduct[{', '.join(map(str, self.of))}]"
+
+    mi.register_texture("texture_product", TextureProduct)
     mi.register_bsdf("mixture_blend", MixtureBlend)
     mi.register_bsdf("mixture_mask", MixtureMask)
     mi.register_bsdf("mixture_sides", MixtureSides)

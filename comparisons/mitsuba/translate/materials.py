@@ -5,8 +5,11 @@ from dataclasses import replace
 from functools import singledispatch
 from typing import Any
 
+import numpy as np
+
 import reference_rt as rt
 from comparisons.geometry import affine
+from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.plugins import gltf_pbr
 from comparisons.mitsuba.plugins.exact_coat import COLOURS, SUBSTITUTE, accepted
 from comparisons.mitsuba.translate.textures import (
@@ -15,6 +18,7 @@ from comparisons.mitsuba.translate.textures import (
     colour,
     depends_on_uv,
     number,
+    product,
     rgb,
     translate_texture,
 )
@@ -284,7 +288,7 @@ def _tilt(material: Bump | NormalMap) -> dict[str, Any]:
 def _(material: Bump, context: TranslationContext) -> dict[str, Any]:
     base = _named(material.base, context)
     texture = context.textures[material.height]
-    if not isinstance(texture, Bitmap) or texture.filter != "bilinear":
+    if not isinstance(texture, Bitmap) or texture.filter != "bilinear" or texture.cutoff:
         return base  # no slopes
     if context.native:
         height = number(material.height, context)
@@ -306,9 +310,17 @@ def _(material: Bump, context: TranslationContext) -> dict[str, Any]:
 def _(material: NormalMap, context: TranslationContext) -> dict[str, Any]:
     base = _named(material.base, context)
     texture = context.textures[material.normals]
-    if not isinstance(texture, Bitmap):
+    if not isinstance(texture, Bitmap) or texture.cutoff is not None:
         raise UntranslatableError("NormalMap of a texture that is no image", "material")
+    if context.in_file is not None and (material.follow_v or material.scale != 1.0):
+        raise UntranslatableError("NormalMap with 'scale' or 'follow_v'", "material")
     normals = colour(material.normals, context)
+    if material.scale != 1.0:
+        factors = np.array([material.scale, material.scale, 1.0])
+        texels = texture.read(context.folder).linear * factors + 0.5 * (1.0 - factors)
+        normals["bitmap"] = mitsuba().Bitmap(np.ascontiguousarray(texels, np.float32))
+    if material.follow_v:
+        normals = product([normals], follow_v=True)
     return {"type": "normalmap", "normalmap": normals, "bsdf": base, **_tilt(material)}
 
 

@@ -17,7 +17,7 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.materials.material import Material
 from reference_rt.rendering.scene import Scene
-from reference_rt.textures import Bitmap, Checker, Texture, VertexColours
+from reference_rt.textures import Bitmap, Checker, Product, Texture, VertexColours
 from reference_rt.textures.texture import UvMap
 
 
@@ -134,12 +134,36 @@ def _(texture: Checker, name: str, context: TranslationContext, as_number: bool)
 
 @translate_texture.register
 def _(texture: Bitmap, name: str, context: TranslationContext, as_number: bool) -> dict[str, Any]:
-    key = (name, as_number)
+    along_u, along_v = texture.wraps
+    if along_u != along_v:
+        raise UntranslatableError("Bitmap that is continued otherwise along u than v", "texture")
+    as_grey = as_number and texture.cutoff is None
+    key = (name, as_grey)
     if key not in context.images:
         path, ours = context.folder / texture.file, texture.read(context.folder).linear
-        texels = described_image(path, texture.encoding, texture.scale, texture.layer, ours)
-        context.images[key] = _image(texels, as_number)
-    return _lookup(context.images[key], texture.filter, texture.wrap, texture.uv)
+        source = path, texture.encoding, texture.scale, texture.layer
+        texels = described_image(*source, ours, texture.channel)
+        context.images[key] = _image(texels, as_grey)
+    found = _lookup(context.images[key], texture.filter, along_u, texture.uv)
+    return found if texture.cutoff is None else product([found], cutoff=texture.cutoff)
+
+
+@translate_texture.register
+def _(texture: Product, name: str, context: TranslationContext, as_number: bool) -> dict[str, Any]:
+    return product([_translated(of, context, False) for of in texture.of], texture.factor)
+
+
+def product(
+    of: list[dict[str, Any]],
+    factor: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    cutoff: float = 0.0,
+    follow_v: bool = False,
+) -> dict[str, Any]:
+    """Our plugin `comparisons.mitsuba.plugins.mixtures`, of colours and of numbers."""
+    nested = {f"of_{k}": part for k, part in enumerate(of)}
+    factors = {f"factor_{k}": value for k, value in enumerate(factor)}
+    options = {"cutoff": cutoff, "follow_v": follow_v}
+    return {"type": "texture_product", **options, **factors, **nested}
 
 
 @translate_texture.register

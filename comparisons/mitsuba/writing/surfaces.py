@@ -148,17 +148,20 @@ class Surfaces:
         return {"type": "checkerboard", **values, **({"to_uv": steps} if steps else {})}
 
     def _bitmap(self, texture: Bitmap, name: str, first: tuple[Step, ...]) -> dict[str, Any]:
+        along_u, along_v = texture.wraps
+        if along_u != along_v or texture.cutoff is not None:
+            raise UntranslatableError("Bitmap with two wraps or a cutoff", "texture")
         path = self.scene.folder / texture.file
         suffix = path.suffix.lower()
         is_integer = suffix in (".png", ".jpg", ".jpeg", ".bmp", ".tga")
-        is_plain = suffix in IMAGES and texture.scale == 1.0
+        is_plain = suffix in IMAGES and (texture.scale, texture.channel) == (1.0, "all")
         if is_plain and (is_integer or texture.encoding not in ("srgb", "radiance")):
             file = self.files.copy(texture.file, "textures", name, "file")
             raw = texture.encoding == "raw" or not is_integer
         else:
             file, raw = self.written(path.stem, texture.read(self.scene.folder).linear), True
             self.note(f"the image {texture.file} is written as linear float32 values")
-        return self._image(file, texture.filter, texture.wrap, first, texture, raw)
+        return self._image(file, texture.filter, along_u, first, texture, raw)
 
     def written(self, stem: str, texels: FloatArray) -> str:
         """The name of an image file of linear radiance."""

@@ -25,7 +25,7 @@ from reference_rt.materials import Diffuse, Wrapper
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
-from reference_rt.textures import VertexColours
+from reference_rt.textures import Product, VertexColours
 
 __all__ = ["Centres", "FilmPoints", "Seen", "centres", "sensor_rays"]
 
@@ -129,11 +129,17 @@ class Seen:
         value = self._shown(looked.leaf.material)
         if not isinstance(value, str):
             return np.tile(np.array(value, dtype=np.float64), (len(looked.rows), 1))
-        texture = self._scene.textures[value]
+        return self._texture(value, looked)
+
+    def _texture(self, name: str, looked: _Looked) -> FloatArray:
+        texture = self._scene.textures[name]
+        if isinstance(texture, Product):
+            factors = [self._texture(of, looked) for of in texture.of]
+            return np.asarray(np.prod(factors, axis=0) * texture.factor)
         if isinstance(texture, VertexColours):
             mixed = _vertex_colours(looked)
             return np.where(mixed[:, :1] >= 0.0, texture.scale * mixed, texture.without)
-        return self._looked_up(value, looked.uv)
+        return self._looked_up(name, looked.uv)
 
     def _shown(self, name: str | None) -> tuple[float, float, float] | str:
         """The colour of a material; of a nested one, that of its first base."""

@@ -25,7 +25,7 @@ from reference_rt.jit.kernel import kernel
 from reference_rt.materials.microfacet.fresnel import Refraction, fresnel
 from reference_rt.sampling.warp import about_normal, on_circle
 from reference_rt.textures import At, Numbers, Palette, number_at
-from reference_rt.textures.parameter import MayBeTexture
+from reference_rt.textures.texture import MayBeTexture
 
 # ---- sampling the visible normals of Beckmann's distribution of slopes ---------------------------
 

@@ -150,6 +150,11 @@ class NormalMap(Wrapper):
     """Name of the material whose normals are replaced."""
     normals: TextureName
     """Name of the texture of normals.  An image file of integers needs `encoding: raw`."""
+    scale: float = 1.0
+    """A factor of the normals' components along the surface."""
+    follow_v: bool = False
+    """Whether green is on the side of dp/dv, also where (u, v) is mirrored on the surface, as in
+    glTF.  Default: to the left of dp/du, seen from the front (Mitsuba's)."""
     flip_invalid_normals: bool = False
     """Whether a tilted normal that faces away from the viewer is turned about the surface's own
     normal until it does not (Mitsuba's default)."""
@@ -164,16 +169,20 @@ class NormalMap(Wrapper):
     def tabulate(self, palette: Palette) -> "NormalMaps":
         return NormalMaps(
             np.array([palette.number(self.normals, math.inf)]),
+            np.array([self.scale], dtype=np.float64),
+            np.array([int(self.follow_v)]),
             np.array([int(self.flip_invalid_normals)]),
             np.array([int(self.use_shadowing_function)]),
         )
 
 
 class NormalMaps(NamedTuple):
-    """texture (n,): its number;  flips (n,), shadows (n,): 1 for `flip_invalid_normals`,
-    `use_shadowing_function`, else 0."""
+    """texture (n,): its number;  scale (n,);  follows (n,), flips (n,), shadows (n,): 1 for
+    `follow_v`, `flip_invalid_normals`, `use_shadowing_function`, else 0."""
 
     texture: IntArray
+    scale: FloatArray
+    follows: IntArray
     flips: IntArray
     shadows: IntArray
 
@@ -185,7 +194,10 @@ def map_basis(maps: NormalMaps, i: int, at: At, tangents: Tangents, wo: Vec3) ->
     it is."""
     surface = frame_along(Vec3(0.0, 0.0, 1.0), tangents.dpdu)
     rgb = lookup(maps.texture[i], at)
-    n = Vec3(2.0 * rgb.x - 1.0, 2.0 * rgb.y - 1.0, 2.0 * rgb.z - 1.0)
+    scale = maps.scale[i]
+    n = Vec3((2.0 * rgb.x - 1.0) * scale, (2.0 * rgb.y - 1.0) * scale, 2.0 * rgb.z - 1.0)
+    if maps.follows[i] != 0 and cross(tangents.dpdu, tangents.dpdv).z < 0.0:
+        n = Vec3(n.x, -n.y, n.z)
     size = max_abs(n)
     if size == 0.0:
         return surface

@@ -62,6 +62,8 @@ def results_of_suite(path: Path) -> None:
 READERS = {
     "scene.yaml": rt.Scene.load,
     "scene.json": rt.Scene.load,
+    "scene.gltf": rt.Scene.load,
+    "scene.glb": rt.Scene.load,
     **{f"mesh{suffix}": mesh for suffix in (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")},
     **{f"mesh{suffix}": mesh for suffix in other.suffixes()},
     "buffer.bin": buffer_of_mesh,

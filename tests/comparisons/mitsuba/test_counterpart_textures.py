@@ -11,6 +11,7 @@ from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from comparisons.mitsuba.translate import load
 from comparisons.mitsuba.translate.lights import translate_light
+from comparisons.mitsuba.translate.materials import translate_material
 from comparisons.mitsuba.translate.textures import (
     TranslationContext,
     UntranslatableError,
@@ -19,14 +20,13 @@ from comparisons.mitsuba.translate.textures import (
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.lights import EnvironmentMap
 from reference_rt.lights.emitters import environment_map
-from reference_rt.materials import AnyMaterial
+from reference_rt.materials import AnyMaterial, Diffuse, NormalMap
 from reference_rt.materials.material import Material
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
-from reference_rt.textures import At, Bitmap, Checker, Texture, VertexColours
+from reference_rt.textures import At, Bitmap, Checker, Product, Texture, VertexColours
 from reference_rt.textures.lookup import lookup, lookup_gradient
-from reference_rt.textures.parameter import MayBeTexture
-from reference_rt.textures.texture import UvMap
+from reference_rt.textures.texture import MayBeTexture, UvMap
 
 TURNED = UvMap(scale=(1.3, 0.7), rotate=25.0, offset=(0.1, -0.2))
 
@@ -39,6 +39,9 @@ TEXTURES: tuple[Texture, ...] = (
         for wrap in ("repeat", "clamp", "mirror")
     ),
     Bitmap(file="colours.png", encoding="raw"),
+    Bitmap(file="colours.png", channel="green"),
+    Bitmap(file="colours.png", cutoff=0.3, uv=TURNED),
+    Product(of=("image", "checks"), factor=(0.5, 2.0, 1.0)),
 )
 
 
@@ -53,7 +56,8 @@ def interaction(u: Any, v: Any) -> Any:
 
 @pytest.mark.parametrize("texture", TEXTURES)
 def test_textures(texture: Texture, image_folder: Path) -> None:
-    scene = Scene(textures={"t": texture})
+    others = {"image": Bitmap(file="colours.png"), "checks": Checker(uv=TURNED)}
+    scene = Scene(textures={"t": texture, **others})
     scene._folder = image_folder
     textures = build_tables(scene).textures
     context = TranslationContext.of(scene)
@@ -83,7 +87,7 @@ def test_textures(texture: Texture, image_folder: Path) -> None:
 
 MESH = """
 film: {width: 4, height: 4}
-textures: {t: TEXTURE}
+textures: {t: TEXTURE, image: {type: bitmap, file: colours.png}, own: {type: vertex_colours}}
 materials: {base: {type: diffuse}, m: MATERIAL}
 shapes:
   - {type: mesh, vertices: [[-1, -1, 0], [1, -1, 0], [0, 1, 0]], faces: [[0, 1, 2]],
@@ -93,6 +97,7 @@ KINDS = {
     "bitmap": "{type: bitmap, file: colours.png}",
     "checker": "{type: checker}",
     "vertex_colours": "{type: vertex_colours}",
+    "product": "{type: product, of: [image, own], factor: [0.5, 0.4, 1]}",
 }
 REQUIRED = {
     "conductor": {"eta": 1, "k": 2},
@@ -101,7 +106,7 @@ REQUIRED = {
 }
 """Other fields that a material must have, by type."""
 
-REFUSED = {("normal_map", "vertex_colours"), ("normal_map", "checker")}
+REFUSED = {("normal_map", "vertex_colours"), ("normal_map", "checker"), ("normal_map", "product")}
 """What Mitsuba lacks (docs/verdict.md)."""
 
 
@@ -133,6 +138,35 @@ def test_every_texture_in_every_material(
                 load(scene)
         else:
             assert load(scene).mi_shapes
+
+
+def test_the_scale_of_a_normal_map(image_folder: Path) -> None:
+    """It is in the image that Mitsuba gets."""
+    image = Bitmap(file="colours.png", encoding="raw")
+    context = TranslationContext({"m": Diffuse()}, {"t": image}, image_folder)
+    found = translate_material(NormalMap(base="m", normals="t", scale=3.0), context)
+    texels = np.array(found["normalmap"]["bitmap"])
+    expected = (2.0 * image.read(image_folder).linear - 1.0) * (3.0, 3.0, 1.0)
+    np.testing.assert_allclose(2.0 * texels - 1.0, expected, rtol=0.0, atol=8 * 2.0**-24)
+
+
+def test_normal_maps_that_follow_v(image_folder: Path) -> None:
+    """Mitsuba gets the image with the other green where uv is mirrored."""
+    image = Bitmap(file="colours.png", encoding="raw")
+    context = TranslationContext({"m": Diffuse()}, {"t": image}, image_folder)
+    found = translate_material(NormalMap(base="m", normals="t", follow_v=True), context)
+    mi, texture = mitsuba(), mitsuba().load_dict(found["normalmap"])
+
+    def look(u: Any, v: Any, side: float) -> tuple[Any, ...]:
+        si = interaction(u, v)
+        si.dp_du, si.dp_dv = mi.Vector3f(1.0, 0.0, 0.0), mi.Vector3f(0.2, side, 0.0)
+        si.sh_frame = mi.Frame3f(mi.Normal3f(0.0, 0.0, 1.0))
+        return (texture.eval_3(si),)
+
+    u, v = np.random.default_rng(1).uniform(0.0, 1.0, (2, 50))
+    plain, mirrored = (for_rays(lambda a, b, s=s: look(a, b, s), u, v)[0] for s in (1.0, -1.0))
+    np.testing.assert_array_equal(plain[:, [0, 2]], mirrored[:, [0, 2]])
+    np.testing.assert_allclose(plain[:, 1], 1.0 - mirrored[:, 1], rtol=0.0, atol=2.0**-23)
 
 
 def test_vertex_colours_where_there_are_none() -> None:

@@ -1,5 +1,6 @@
 """Files of Mitsuba scenes: meshes, `Scene.load`, and `reference-rt convert`."""
 
+import shutil
 import struct
 import zlib
 from contextlib import suppress
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import typer
+from gltf_scenes import full_scene
 from mitsuba_dicts import hits_of, rays_at
 from PIL import Image
 from typer.testing import CliRunner, Result
@@ -19,7 +21,7 @@ from comparisons.mitsuba.reading import meshes, read_file
 from comparisons.mitsuba.writing.files import write_scene
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
-from reference_rt.util.errors import ImageError, SceneError, UsageError
+from reference_rt.util.errors import ImageError, SceneError, SceneWarning, UsageError
 
 SCENE = """<scene version="3.0.0">
   <default name="spp" value="4"/>
@@ -143,6 +145,32 @@ def test_a_converted_scene_is_the_same(folder):
     again = run(folder / "scene.xml", "-o", out)  # replaces the older one
     assert again.exit_code == 0
     assert Scene.load(out).resolved_sampler.spp == 4
+
+
+def arrays_of(table: Any) -> list[Any]:
+    return [a for part in table for a in arrays_of(part)] if isinstance(table, tuple) else [table]
+
+
+def test_a_glb_file_is_converted(tmp_path, monkeypatch):
+    """The scene that is written has the same tables, and needs neither the file nor the cache."""
+    monkeypatch.setenv("REFERENCE_RT_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "model.glb").write_bytes(full_scene().glb())
+    out = tmp_path / "out" / "scene.yaml"
+    result = run(tmp_path / "model.glb", "-o", out, "-D", "camera=flat")
+    assert result.exit_code == 0, result.output
+    with pytest.warns(SceneWarning):
+        scene = Scene.load(tmp_path / "model.glb", {"camera": "flat"})
+    built = arrays_of(scene.tables)
+    shutil.rmtree(tmp_path / "cache")
+    (tmp_path / "model.glb").unlink()
+    written = Scene.load(out)
+    assert (written.camera, written.film, written.lights) == (
+        scene.camera,
+        scene.film,
+        scene.lights,
+    )
+    for ours, theirs in zip(arrays_of(written.tables), built, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
 
 
 def test_nothing_is_written_for_a_broken_scene(folder):

@@ -31,7 +31,7 @@ def texture(texels, uv=PLAIN, nearest=0, wrap=0):
     """One bitmap with these texels (height, width, 3), the top row first."""
     values = np.array(texels, dtype=float)
     stored = Texels(values.reshape(-1).view(np.uint8), values, np.zeros(0), 1.0, values.max())
-    bitmaps = table_of(stored, nearest, wrap)
+    bitmaps = table_of(stored, nearest, 4 * wrap)
     return Textures(np.array([BITMAP]), np.array([0]), uv.coefficients()[None], None, bitmaps, None)
 
 
@@ -50,8 +50,8 @@ def bumped(textures, tangents, u=0.5, v=0.4, scale=1.0):
     return tilted.bump_basis(table, 0, at(textures, u, v), tangents, UP)
 
 
-def mapped(textures, tangents, u=0.5, v=0.4):
-    table = NormalMap(base="b", normals="t").tabulate(PALETTE)
+def mapped(textures, tangents, u=0.5, v=0.4, **fields):
+    table = NormalMap(base="b", normals="t", **fields).tabulate(PALETTE)
     return tilted.map_basis(table, 0, at(textures, u, v), tangents, UP)
 
 
@@ -184,6 +184,24 @@ def test_constant_normal_map():
         c, s = math.cos(turn), math.sin(turn)
         tangents = Tangents(Vec3(2 * c, 2 * s, 0.0), Vec3(-s, c, 0.0))
         assert_basis(mapped(textures, tangents), [c * n[0] - s * n[1], s * n[0] + c * n[1], n[2]])
+
+
+@pytest.mark.parametrize("scale", [0.5, 3.0, -1.0])
+def test_the_scale_of_a_normal_map(scale):
+    """It makes what lies along the surface longer, not what is along the normal."""
+    n = np.array([0.3, -0.2, 0.8])
+    expected = n * (scale, scale, 1.0)
+    found = mapped(texture(np.full((2, 2, 3), (n + 1.0) / 2.0)), FLAT, scale=scale)
+    assert_basis(found, expected / np.linalg.norm(expected))
+
+
+def test_green_follows_v_where_uv_is_mirrored():
+    green = texture(np.full((2, 2, 3), (0.5, 0.9, 0.9)))
+    up = np.array([0.0, 1.0, 1.0]) * math.sqrt(0.5)
+    mirrored = Tangents(Vec3(2.0, 0.0, 0.0), Vec3(0.1, -3.0, 0.0))
+    assert_basis(mapped(green, FLAT, follow_v=True), up)
+    assert_basis(mapped(green, mirrored, follow_v=True), up * (1.0, -1.0, 1.0))
+    assert_basis(mapped(green, mirrored), up)
 
 
 def test_normal_maps_that_change_nothing():

@@ -21,6 +21,7 @@ from reference_rt.textures import (
     colour_at,
     number_at,
 )
+from reference_rt.textures.image_file import linear
 from reference_rt.textures.lookup import lookup, lookup_gradient
 from reference_rt.textures.texture import UvMap
 
@@ -96,6 +97,76 @@ def test_wraps_written_out(tmp_path):
         for x, column in zip(range(-8, 15), wanted, strict=True):
             found = ask(textures, (x + 0.5) / WIDTH, 1 - 1.5 / HEIGHT, k)
             assert np.array_equal(found, IMAGE[1, column] / 255), (k, x)
+
+
+def test_each_axis_has_its_own_wrap(tmp_path):
+    """Along u as with `repeat`, along v as with `mirror`."""
+    textures = tables_of(
+        tmp_path, both=raw("nearest", ("repeat", "mirror")), mirrored=raw("nearest", "mirror")
+    )
+    for u, v in ((-0.3, 1.3), (1.6, -0.2), (2.1, 2.7)):
+        assert np.array_equal(ask(textures, u, v, 0), ask(textures, u % 1.0, v, 1))
+
+
+def test_channels(tmp_path):
+    """Of colours, which are decoded, and of opacity, which is not, and is 1 where there is none."""
+    tables_of(tmp_path)  # writes image.png
+    alpha = IMAGE[..., 0] ^ 77
+    Image.fromarray(np.dstack([IMAGE, alpha])).save(tmp_path / "rgba.png")
+    Image.fromarray(np.dstack([IMAGE[..., 1], alpha])).save(tmp_path / "grey.png")
+    expected = [*np.moveaxis(IMAGE, -1, 0), alpha]
+    for k, channel in enumerate(("red", "green", "blue", "alpha")):
+        rgba = Bitmap(file="rgba.png", channel=channel).read(tmp_path).linear
+        plain = Bitmap(file="rgba.png", encoding="raw", channel=channel).read(tmp_path).linear
+        assert np.array_equal(plain, np.repeat(expected[k][..., None] / 255, 3, axis=2))
+        assert np.array_equal(rgba, plain if channel == "alpha" else linear(plain))
+        grey = Bitmap(file="grey.png", encoding="raw", channel=channel).read(tmp_path).linear
+        own = alpha if channel == "alpha" else IMAGE[..., 1]
+        assert np.array_equal(grey[..., 2], own / 255)
+    assert np.all(Bitmap(file="image.png", channel="alpha", scale=0.5).read(tmp_path).linear == 0.5)
+
+
+def test_a_cutoff_is_after_the_filter(tmp_path):
+    textures = tables_of(tmp_path, smooth=raw(scale=2.0), sharp=raw(scale=2.0, cutoff=0.9))
+    for u, v in np.random.default_rng(20).uniform(0, 1, (50, 2)):
+        assert np.array_equal(ask(textures, u, v, 1), ask(textures, u, v, 0) >= 0.9)
+    assert lookup_gradient(1, At(textures, 0.3, 0.3, NO_COLOUR)) == (0.0, 0.0)
+
+
+def test_products(tmp_path):
+    textures = tables_of(
+        tmp_path,
+        lit=rt.Product(of=("image", "own"), factor=(2.0, 0.5, 1.0)),
+        image=raw(uv=UvMap(scale=3.0)),
+        own=VertexColours(),
+        one=rt.Product(of=("own",)),
+    )
+    colour = Vec3(0.25, 0.5, 1.0)
+    for u, v in np.random.default_rng(21).uniform(-1, 2, (20, 2)):
+        image = ask(textures, u, v, 1)
+        assert np.array_equal(ask(textures, u, v, 0, colour), image * (0.5, 0.25, 1.0))
+        assert np.array_equal(ask(textures, u, v, 3, colour), colour)
+
+
+def test_the_greatest_of_a_product_counts():
+    checks = Checker(first=0.8, second=0.1)
+
+    def scene(factor):
+        bright = rt.Product(of=("a", "b"), factor=factor)
+        textures = {"c": bright, "a": checks, "b": checks}
+        return rt.Scene(textures=textures, materials={"m": rt.Diffuse(reflectance="c")})
+
+    assert build_tables(scene(1.5))  # 1.5 * 0.8 * 0.8 = 0.96
+    with pytest.raises(rt.SceneError, match=r"'c' has values up to 1\.024; expected at"):
+        build_tables(scene(1.6))
+
+
+def test_what_a_product_may_name():
+    one = rt.Product(of=("a",))
+    with pytest.raises(rt.SceneError, match=r"textures.b.of\[0\]: 'c' is a product itself"):
+        rt.Scene(textures={"a": Checker(), "c": one, "b": rt.Product(of=("c",))})
+    with pytest.raises(rt.SceneError, match=r"textures.c.of\[0\]: there is no texture 'a'"):
+        rt.Scene(textures={"c": one})
 
 
 def test_the_top_row_is_at_v_one(tmp_path):
@@ -283,7 +354,9 @@ def test_compiled_and_plain_give_the_same_bits(tmp_path):
         c=raw(wrap="clamp"),
         d=Checker(uv=uv),
         e=VertexColours(),
-        f=raw(wrap="mirror", uv=uv),
+        f=raw(wrap=("mirror", "repeat"), uv=uv),
+        g=raw(cutoff=0.5),
+        h=rt.Product(of=("a", "d"), factor=(0.3, 0.2, 0.1)),
     )
     rng = np.random.default_rng(18)
     u, v = rng.uniform(-1, 2, (2, 600)) * 10.0 ** rng.uniform(-3, 3, (2, 600))
@@ -293,5 +366,5 @@ def test_compiled_and_plain_give_the_same_bits(tmp_path):
     _look_up(textures, colour, u, v, out)
     for i in range(600):
         at = At(textures, float(u[i]), float(v[i]), NO_COLOUR)
-        plain = (*lookup(i % 6, at), *lookup_gradient(i % 6, at))
+        plain = (*lookup(i % 8, at), *lookup_gradient(i % 8, at))
         assert np.array_equal(out[i], plain), i

@@ -3,6 +3,8 @@
 It reads POSITION, NORMAL, TEXCOORD_0 and COLOR_0 (linear, as the format says), without animations,
 skins and morphing.  It ignores points, lines, materials, images and everything else, and names
 them.  A buffer may be a file, in the mesh's folder or below it.
+
+`GltfFile` is for `reference_rt.gltf`, too, which reads such files as whole scenes.
 """
 
 import base64
@@ -41,10 +43,15 @@ Rows = npt.NDArray[Any]
 
 
 def read_gltf(content: bytes, folder: Path) -> RawMesh:
-    return _joined(_File(content, None, folder))
+    return _joined(GltfFile(content, None, folder))
 
 
 def read_glb(content: bytes, folder: Path) -> RawMesh:
+    return _joined(open_glb(content, folder))
+
+
+def open_glb(content: bytes, folder: Path) -> "GltfFile":
+    """The JSON and the binary chunk of a .glb file.  Raises ValueError."""
     if len(content) < 12 or content[:4] != b"glTF":
         raise ValueError("it does not begin with 'glTF' and a header")
     version, length = struct.unpack_from("<II", content, 4)
@@ -64,16 +71,23 @@ def read_glb(content: bytes, folder: Path) -> RawMesh:
         chunks.setdefault(kind, content[position - size : position])
     if _JSON not in chunks:
         raise ValueError("it has no JSON chunk")
-    return _joined(_File(chunks[_JSON], chunks.get(_BIN), folder))
+    return GltfFile(chunks[_JSON], chunks.get(_BIN), folder)
 
 
-def _joined(file: "_File") -> RawMesh:
+def _joined(file: "GltfFile") -> RawMesh:
+    for name in file.root.get("extensionsRequired", []):
+        if not str(name).startswith(_HARMLESS):
+            raise ValueError(f"it requires the extension {str(name)[:60]!r}, which is unknown")
     found = joined(file.parts())
     return found._replace(ignored=(*found.ignored, *file.ignored()))
 
 
-class _File:
-    """The JSON of a file, its binary chunk if it has one, and its folder."""
+class GltfFile:
+    """The JSON of a file, its binary chunk if it has one, and its folder.
+
+    Everything raises ValueError for a malformed file, or another exception where the JSON has other
+    types than expected.
+    """
 
     def __init__(self, text: bytes, binary: bytes | None, folder: Path) -> None:
         self.root, self.binary, self.folder = json.loads(text), binary, folder
@@ -82,9 +96,6 @@ class _File:
         self.has_lines = False
         if not isinstance(self.root, dict):
             raise ValueError("its JSON is no object")
-        for name in self.root.get("extensionsRequired", []):
-            if not str(name).startswith(_HARMLESS):
-                raise ValueError(f"it requires the extension {str(name)[:60]!r}, which is unknown")
 
     def item(self, kind: str, index: Any) -> dict[str, Any]:
         items = self.root.get(kind)
@@ -97,8 +108,20 @@ class _File:
 
     def parts(self) -> Iterator[tuple[RawMesh, transform.Affine]]:
         """The primitives of all nodes of the scene, with the nodes' maps to the world."""
+        for index, m in self.placed_nodes():
+            node = self.item("nodes", index)
+            if "mesh" in node:
+                for primitive in self.item("meshes", node["mesh"])["primitives"]:
+                    if primitive.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP, _FAN):
+                        yield self.primitive(primitive), m
+                    else:
+                        self.has_lines = True
+
+    def placed_nodes(self, scene: int | None = None) -> Iterator[tuple[int, transform.Affine]]:
+        """All nodes of a scene, by default the file's own, with their maps to the world."""
         if "scenes" in self.root:
-            roots = self.item("scenes", self.root.get("scene", 0)).get("nodes", [])
+            number = self.root.get("scene", 0) if scene is None else scene
+            roots = self.item("scenes", number).get("nodes", [])
         else:  # a library of nodes: all of them, where their trees begin
             nodes = self.root.get("nodes", [])
             children = {child for node in nodes for child in node.get("children", [])}
@@ -111,28 +134,24 @@ class _File:
             if index in seen:
                 raise ValueError(f"nodes[{index}] has two parents; expected a tree")
             seen.add(index)
-            m = transform.compose(_local(node), to_world)
+            m = transform.compose(local_map(node), to_world)
             waiting += [(child, m) for child in reversed(node.get("children", []))]
-            if "mesh" in node:
-                for primitive in self.item("meshes", node["mesh"])["primitives"]:
-                    if primitive.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP, _FAN):
-                        yield self.primitive(primitive), m
-                    else:
-                        self.has_lines = True
+            yield index, m
 
     def ignored(self) -> tuple[str, ...]:
         """Ignored parts of the file that would change the image."""
         names = [key for key in ("materials", "animations", "skins") if self.root.get(key)]
         return (*names, *(["points or lines"] if self.has_lines else []))
 
-    def primitive(self, primitive: dict[str, Any]) -> RawMesh:
+    def primitive(self, primitive: dict[str, Any], uv_set: int = 0) -> RawMesh:
+        """The triangles of a primitive.  uv_set: the number of its texture coordinates."""
         attributes = primitive["attributes"]
         points = self.accessor(attributes.get("POSITION"), (3,))
         normals, uv, colours = (
             self.accessor(attributes[name], widths, fraction) if name in attributes else None
             for name, widths, fraction in (
                 ("NORMAL", (3,), False),
-                ("TEXCOORD_0", (2,), True),
+                (f"TEXCOORD_{uv_set}", (2,), True),
                 ("COLOR_0", (3, 4), True),
             )
         )
@@ -210,25 +229,44 @@ class _File:
             raise ValueError(f"buffers[{index}] has only {len(self.buffers[index])} bytes")
         return self.buffers[index]
 
+    def view(self, index: Any) -> bytes:
+        """All bytes of a view."""
+        name, view = f"bufferViews[{index}]", self.item("bufferViews", index)
+        size = _natural(view, "byteLength")
+        return self.rows({"bufferView": index}, name, 1, size, np.dtype("u1")).tobytes()
+
     def load(self, uri: Any, index: int) -> bytes:
         if uri is None and index == 0 and self.binary is not None:
             return self.binary
+        name = f"buffers[{index}]"
         if not isinstance(uri, str):
-            raise ValueError(f"buffers[{index}] has no data")
-        head, _, payload = uri.partition(",")
-        if head.startswith("data:") and head.endswith(";base64"):
-            return base64.b64decode(payload, validate=True)
+            raise ValueError(f"{name} has no data")
+        if (data := inline(uri)) is not None:
+            return data
         try:
-            path = (self.folder / unquote(uri)).resolve()
-            if not path.is_relative_to(self.folder.resolve()):
-                raise ValueError(f"buffers[{index}] is {uri[:60]!r}; expected a file in its folder")
+            path = self.located(uri, name)
             if path not in self.files:  # many buffers may be the same file
                 self.files[path] = read_input(path)
             return self.files[path]
         except OSError as error:
             raise ValueError(
-                f"buffers[{index}], {uri[:60]!r}: {error.strerror}; expected a file in its folder"
+                f"{name}, {uri[:60]!r}: {error.strerror}; expected a file in its folder"
             ) from None
+
+    def located(self, uri: str, name: str) -> Path:
+        """The file that `name` refers to, which is in the folder of this one or below it."""
+        path, folder = (self.folder / unquote(uri)).resolve(), self.folder.resolve()
+        if not path.is_relative_to(folder):
+            raise ValueError(f"{name} is {uri[:60]!r}; expected a file in its folder")
+        return path
+
+
+def inline(uri: str) -> bytes | None:
+    """The bytes in a data: URI; None for a name of a file."""
+    head, _, payload = uri.partition(",")
+    if not (head.startswith("data:") and head.endswith(";base64")):
+        return None
+    return base64.b64decode(payload, validate=True)
 
 
 def _natural(values: dict[str, Any], key: str, default: int | None = None) -> int:
@@ -250,7 +288,7 @@ def _faces(corners: npt.NDArray[np.int64], mode: int) -> npt.NDArray[Any]:
     return np.stack([corners[i], corners[i + 1 + odd], corners[i + 2 - odd]], axis=1)
 
 
-def _local(node: dict[str, Any]) -> transform.Affine:
+def local_map(node: dict[str, Any]) -> transform.Affine:
     """A node's map to its parent: a matrix, by columns; or a scale, a rotation, a translation."""
 
     def vector(key: str, default: list[float]) -> npt.NDArray[np.float64]:
