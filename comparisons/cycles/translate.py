@@ -264,7 +264,7 @@ def _(texture: Checker, writing: Writing) -> Data:
 def _(texture: Bitmap, writing: Writing) -> Data:
     along_u, along_v = texture.wraps
     if along_u != along_v or texture.cutoff is not None:
-        raise IneligibleError("a bitmap with two wraps, or with a cutoff")
+        raise NoCounterpartError("a bitmap with two wraps, or with a cutoff")
     path, ours = writing.scene.folder / texture.file, texture.read(writing.scene.folder).linear
     source = path, texture.encoding, texture.scale, texture.layer
     values = described_image(*source, ours, texture.channel)
