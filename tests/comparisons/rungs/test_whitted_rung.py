@@ -20,7 +20,7 @@ from reference_rt.scene.build import build_tables
 
 MATERIALS = (
     "silver", "gold", "glass", "pane", "grey", "floor", "brushed", "cast", "frosted", "coat",
-    "dull", "car", "petal", "wax", "leaf", "mix", "sheet", "dents", "tiles",
+    "dull", "car", "petal", "toy", "wax", "leaf", "mix", "sheet", "dents", "tiles",
 )  # fmt: skip
 
 SHAPES = """

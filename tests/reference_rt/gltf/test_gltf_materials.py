@@ -2,6 +2,7 @@
 
 import base64
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -227,7 +228,7 @@ def test_images_in_views_and_uris_are_the_same(tmp_path):
         files.add(one.file)
     (name,) = files
     assert name.startswith(str(tmp_path / "cache"))
-    assert np.array_equal(np.array(Image.open(name)), TEXELS)
+    assert Path(name).read_bytes() == png()
 
 
 @pytest.mark.parametrize("uri", ["../out.png", "/etc/passwd", "a/../../out.png", "%2e%2e/out.png"])
