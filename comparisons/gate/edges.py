@@ -89,7 +89,7 @@ SNAP, is within what each rule permits already."""
 
 STANDARD_ERRORS = 6.0
 """Of a mode's mean, where pixels of equal coverage and direction count as one: an edge along an
-axis is sampled alike in all its pixels.  The most of 2,000 right pictures was 5.1 (`test_edges`)."""
+axis is sampled alike in all its pixels.  Of 2,000 right pictures the most was 5.1."""
 
 MODES = ("shift in x", "shift in y", "growth of what is near", "brightness")
 
