@@ -16,7 +16,10 @@ pytestmark = [
     ),
 ]
 
-SCENES = sorted(path.stem for path in (THREE / "scenes").glob("*.yaml"))
+SCENES = [
+    pytest.param(path.stem, marks=[] if path.stem == "orthographic" else pytest.mark.slow)
+    for path in sorted((THREE / "scenes").glob("*.yaml"))
+]
 
 
 def judged(scene: str, page: str = str(THREE / "page.html")) -> dict:
@@ -28,7 +31,6 @@ def judged(scene: str, page: str = str(THREE / "page.html")) -> dict:
     return case
 
 
-@pytest.mark.cases(1)
 @pytest.mark.parametrize("scene", SCENES)
 def test_right_pictures_agree(scene: str) -> None:
     case = judged(scene)
@@ -116,7 +118,7 @@ FAULTS = {
 }
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_planted_faults_are_named(fault: str, tmp_path: Path) -> None:
     scene, change, name = FAULTS[fault]
