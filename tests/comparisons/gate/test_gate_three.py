@@ -22,9 +22,10 @@ SCENES = [
 ]
 
 
-def judged(scene: str, page: str = str(THREE / "page.html")) -> dict:
+def judged(scene: str, page: str = str(THREE / "page.html"), folder: str = "scenes") -> dict:
     result, found = run(
-        "--browser", f"{page}?standard=textbook", "--scene", str(THREE / "scenes" / f"{scene}.yaml")
+        *("--browser", f"{page}?standard=textbook"),
+        *("--scene", str(THREE / folder / f"{scene}.yaml")),
     )
     (case,) = found["cases"]
     assert result.exit_code == {"agree": 0, "invalid": 3}.get(case["verdict"], 1), result.output
@@ -35,6 +36,11 @@ def judged(scene: str, page: str = str(THREE / "page.html")) -> dict:
 def test_right_pictures_agree(scene: str) -> None:
     case = judged(scene)
     assert case["verdict"] == "agree", case["reason"]
+
+
+@pytest.mark.slow
+def test_shadows_that_are_switched_off_are_named() -> None:
+    assert judged("shadow", folder="others")["cause"]["name"] == "without shadows"
 
 
 FAULTS = {
