@@ -5,7 +5,7 @@ value that its footprint sees. Each pixel that differs, and each that an edge cr
 with NODES x NODES rays. Their spacing is SNAP: a surface may be a node away from its place.
 
 - *Inside* pixels, whose radiance has no step, are exact: the candidate has the reference's value,
-  one that is seen within SNAP of the centre, or the footprint's mean.
+  or one that samples of RULES have which are each within SNAP of their places.
 - *Edge* pixels have a step: from one node to the next the radiance changes by STEP of its range. It
   may be a silhouette, a crease, the border of a texel or a shadow, or one of these in a mirror; a
   step that no radiance shows needs no forgiveness. The candidate is within the range of what the
@@ -307,28 +307,20 @@ def _range(radiance: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _reduced(radiance: FloatArray, distance: FloatArray, law: _Law, values: FloatArray) -> _Seen:
     """radiance (n, NODES, NODES, 3), distance (n, NODES, NODES), values (n, 3) of the candidate."""
-    own = slice(1, -1)  # the nodes of the pixel itself
-    weight = np.ones(NODES - 2)
-    weight[[0, -1]] = 0.5
-    mean = np.einsum("nyxc,y,x->nc", radiance[:, own, own], weight, weight) / weight.sum() ** 2
-    near = radiance[:, REACH - 1 : REACH + 2, REACH - 1 : REACH + 2]
-    inside = np.stack([
-        np.minimum(near.min(axis=(1, 2)), mean), np.maximum(near.max(axis=(1, 2)), mean)
-    ])  # fmt: skip
     low, high, step = _range(radiance)
 
     channel = np.argmax((high - low) / (high + law.floor + np.finfo(float).tiny), axis=-1)
     one = np.arange(len(radiance)), channel
-    contrast = np.maximum((high - low)[one], np.finfo(float).tiny)
-    left = []
+    contrast = np.where((high > low)[one], (high - low)[one], np.inf)
+    nodes = [(at + REACH).T for at in RULES.values()]
     least, most = (
         f(f(radiance, 3, axis=1), 3, axis=2) for f in (minimum_filter1d, maximum_filter1d)
     )
-    for at in RULES.values():
-        x, y = (at + REACH).T
-        left.append(law.beyond(values, *(f[:, y, x].mean(axis=1) for f in (least, most)))[one])
+    rules = [[f[:, y, x].mean(axis=1) for x, y in nodes] for f in (least, most)]
+    left = [law.beyond(values, *bounds)[one] for bounds in zip(*rules, strict=True)]
+    mean = 0.5 * (rules[0][-1] + rules[1][-1])[one]
     seen = radiance[one[0], :, :, channel]
-    inner = seen[:, own, own]
+    inner = seen[:, 1:-1, 1:-1]  # the nodes of the pixel itself
     shift = [inner[:, :, -1] - inner[:, :, 0], inner[:, -1] - inner[:, 0]]
     nearest = distance.min(axis=(1, 2), keepdims=True)
     # Beyond twice the distance all is equally far: what is missed is infinitely far.
@@ -339,15 +331,15 @@ def _reduced(radiance: FloatArray, distance: FloatArray, law: _Law, values: Floa
         for part in (front, ~front)
     )
     growth = np.where(front.any(axis=(1, 2)), of_front - of_back, 0.0)
-    modes = np.stack([*(x.mean(axis=1) for x in shift), growth, contrast], axis=-1)
-    coverage = np.floor(32.0 * np.clip((mean[one] - low[one]) / contrast, 0.0, 1.0))
+    modes = np.stack([*(x.mean(axis=1) for x in shift), growth], axis=-1) / contrast[:, None]
+    coverage = np.floor(32.0 * np.clip((mean - low[one]) / contrast, 0.0, 1.0))
     turn = np.floor(16.0 * (np.arctan2(modes[:, 1], modes[:, 0]) / (2.0 * np.pi) + 0.5))
     return _Seen(
-        inside,
+        np.stack([np.min(rules[0], axis=0), np.max(rules[1], axis=0)]),
         np.stack([low, high]),
         _is_step(law, low, high, step, STEP),
         np.stack(left, axis=-1) / contrast[:, None],
-        modes / contrast[:, None],
+        np.column_stack([modes, np.ones(len(modes))]),
         (64 * turn + coverage).astype(np.int64),
     )
 

@@ -257,7 +257,7 @@ materials:
 shapes:
   - {type: sphere, radius: 0.8, material: red}
   - {type: rectangle, material: grey, transform: [{scale: 1.5}, {translate: [0.3, 0.1, -1]}]}
-lights: [{type: point, position: [0.3, 0.4, 4], intensity: 30}]
+lights: [{type: point, position: [3, 2, 2], intensity: 30}]
 """  # fmt: skip
 
 
@@ -269,6 +269,10 @@ def test_a_scene_through_the_gate() -> None:
     reference = of_scene(scene, 0.005)
     at = np.stack([x, y], axis=-1)
     np.testing.assert_array_equal(look(at)[0], reference.pictures[0])
+
+    several = np.mean([look(at + s / 16.0)[0] for s in RULES["2 x 2 samples"]], axis=0)
+    case = gate_pictures([Picture(several)], reference, edges=Edges(look))
+    assert case.verdict == "agree", case.reason  # shading is no plane in a pixel
 
     def gated(shift: float, rim: int = 0):  # type: ignore[no-untyped-def]
         moved = look(at + np.array([shift, 0.0]))[0].astype(np.float32).astype(np.float64)
