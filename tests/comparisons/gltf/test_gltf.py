@@ -275,6 +275,45 @@ def test_the_file_is_read_as_our_scene(scene: rt.Scene, tmp_path: Path) -> None:
     assert error <= 2e-6 * expected.max()  # as above
 
 
+@pytest.mark.skipif("follow_v" not in NORMALS, reason="scenes of glTF are not read")
+def test_its_own_material_is_read_as_it_was(tmp_path: Path) -> None:
+    """Colours with a factor, a mask with a cutoff, and numbers from two channels of one image."""
+    rng = np.random.default_rng(1)
+    Image.fromarray(rng.integers(0, 256, (8, 8, 4), np.uint8)).save(tmp_path / "a.png")
+    uv = {"uv": {"scale": 1.7, "offset": -0.3}, "wrap": ["clamp", "mirror"]}
+    image = {"type": "bitmap", "file": "a.png", **uv}
+    numbers = {"base_color": "product", "roughness": "green", "metallic": "blue"}
+    data = {
+        "film": {"width": 24, "height": 16},
+        "camera": {"type": "perspective", "eye": [0, 0, 4], "target": [0, 0, 0]},
+        "textures": {
+            "colours": image,
+            "alpha": {**image, "channel": "alpha", "cutoff": 0.6},
+            "green": {**image, "channel": "green", "encoding": "raw"},
+            "blue": {**image, "channel": "blue", "encoding": "raw"},
+            "product": {"type": "product", "of": ["colours"], "factor": [0.5, 1, 0.25]},
+        },
+        "materials": {
+            "b": {"type": "gltf_pbr", **numbers},
+            "t": {"type": "two_sided", "base": "b"},
+            "m": {"type": "mask", "base": "t", "opacity": "alpha"},
+        },
+        "shapes": [
+            {"type": "rectangle", "material": "m"},
+            {"type": "rectangle", "material": "b", "transform": [{"translate": [0.2, 0.1, -1]}]},
+        ],
+        "lights": [{"type": "point", "position": [1, 2, 3], "intensity": [20, 30, 40]}],
+    }
+    (tmp_path / "scene.json").write_text(json.dumps(data))
+    scene = rt.Scene.load(tmp_path / "scene.json")
+    write_gltf(scene, tmp_path / "out.glb")
+    read = rt.Scene.load(tmp_path / "out.glb")
+    fixed = {"film": scene.film, "integrator": rt.Direct(), "sampler": rt.Grid()}
+    found, expected = (rt.render(one.changed(**fixed)).colour for one in (read, scene))
+    assert expected.any(axis=2).mean() > 0.1
+    assert np.abs(found - expected).max() <= 2e-6 * expected.max()  # as above
+
+
 def test_trimesh_reads_the_same_triangles(scene: rt.Scene, tmp_path: Path) -> None:
     """From both kinds of files, the second one written over itself."""
     areas = []
@@ -433,3 +472,11 @@ def test_command(arguments: list[str], tmp_path: Path, monkeypatch: pytest.Monke
     else:
         assert "note: numbers are float32" in result.output
         assert File(Path("s.glb").read_bytes()).json["asset"]["version"] == "2.0"
+
+
+def test_float32_is_of_json(tmp_path: Path) -> None:
+    arguments = [str(SCENES / "cornell_box.yaml"), "--float32", "-o", f"{tmp_path}/s.glb"]
+    result = CliRunner().invoke(APP, arguments)
+    assert result.exit_code == 2
+    assert "--float32: is of --to json" in result.output
+    assert not (tmp_path / "s.glb").exists()
