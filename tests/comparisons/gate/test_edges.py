@@ -15,6 +15,7 @@ from comparisons.results.case import RungResult
 from comparisons.results.headline import numbers_rows
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.image import srgb
+from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.textures.image_file import linear
 
@@ -310,3 +311,23 @@ def test_scenes_without_footprints() -> None:
         ("height: 30", "height: 30, filter: {type: tent}"),
     ):
         assert look_at(Scene.parse(SCENE.replace(old, new))) is None
+
+
+def test_direct_light_is_seen_without_noise() -> None:
+    """A ray that is no pixel of a grid draws one of two lights at random: each is seen alone."""
+    scene = Scene.parse("""
+film: {width: 6, height: 5}
+camera: {type: perspective, eye: [0, 0, 4], target: [0, 0, 0], fov: 40}
+integrator: {type: direct}
+sampler: {type: grid}
+materials: {grey: {type: diffuse, reflectance: 0.5}}
+shapes: [{type: sphere, material: grey}]
+lights:
+  - {type: point, position: [1, 2, 4], intensity: 30}
+  - {type: directional, direction: [1, 0, -1], irradiance: 2}
+""")
+    look = look_at(scene)
+    assert look is not None
+    across, down = np.meshgrid(np.arange(6) + 0.5, np.arange(5) + 0.5)
+    seen, _ = look(np.stack([across, down], axis=-1))
+    np.testing.assert_allclose(seen, render(scene).colour, rtol=1e-12, atol=1e-15)

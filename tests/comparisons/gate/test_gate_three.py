@@ -16,23 +16,31 @@ pytestmark = [
     ),
 ]
 
-SCENES = sorted(path.stem for path in (THREE / "scenes").glob("*.yaml"))
+SCENES = [
+    pytest.param(path.stem, marks=[] if path.stem == "orthographic" else pytest.mark.slow)
+    for path in sorted((THREE / "scenes").glob("*.yaml"))
+]
 
 
-def judged(scene: str, page: str = str(THREE / "page.html")) -> dict:
+def judged(scene: str, page: str = str(THREE / "page.html"), folder: str = "scenes") -> dict:
     result, found = run(
-        "--browser", f"{page}?standard=textbook", "--scene", str(THREE / "scenes" / f"{scene}.yaml")
+        *("--browser", f"{page}?standard=textbook"),
+        *("--scene", str(THREE / folder / f"{scene}.yaml")),
     )
     (case,) = found["cases"]
     assert result.exit_code == {"agree": 0, "invalid": 3}.get(case["verdict"], 1), result.output
     return case
 
 
-@pytest.mark.cases(1)
 @pytest.mark.parametrize("scene", SCENES)
 def test_right_pictures_agree(scene: str) -> None:
     case = judged(scene)
     assert case["verdict"] == "agree", case["reason"]
+
+
+@pytest.mark.slow
+def test_shadows_that_are_switched_off_are_named() -> None:
+    assert judged("shadow", folder="others")["cause"]["name"] == "without shadows"
 
 
 FAULTS = {
@@ -116,7 +124,7 @@ FAULTS = {
 }
 
 
-@pytest.mark.cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_planted_faults_are_named(fault: str, tmp_path: Path) -> None:
     scene, change, name = FAULTS[fault]
