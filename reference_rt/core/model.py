@@ -46,7 +46,7 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 
 from reference_rt.core.diagnosis import scene_error
-from reference_rt.util.errors import SceneError
+from reference_rt.util.errors import SceneError, is_help
 
 AS_DIGEST = {"arrays": "digest"}
 """The context of `model_dump_json` that writes an array as a digest of its content: descriptions
@@ -254,8 +254,7 @@ class _Helped(ModelMetaclass):
         """Pydantic sets one."""
 
     def __dir__(self) -> Any:
-        is_help = sys._getframe(1).f_code is inspect.classify_class_attrs.__code__
-        return [] if is_help else super().__dir__()
+        return [] if is_help() else super().__dir__()
 
 
 class Description(BaseModel, metaclass=_Helped):

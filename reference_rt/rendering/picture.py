@@ -13,6 +13,7 @@ import numpy as np
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.rendering.image import check_suffix, display, eight_bits, write
 from reference_rt.scene.model import SceneModel
+from reference_rt.util.errors import Brief
 
 BRIGHT = 99.0
 """The percentile of the brightest channel that a notebook shows as white: lamps may be brighter."""
@@ -38,15 +39,16 @@ class Taken(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Picture:
+class Picture(metaclass=Brief):
     """A rendered scene.
 
     layers: float64 arrays by name.  "colour" (height, width, 3) is linear radiance; the others are
-    those of `Film.layers`: albedo, normal, position and variance (height, width, 3), depth and id
-    (height, width).  Ray casting always has colour and normal (height, width, 3), distance and id
-    (height, width), uv (height, width, 2).  shown: the layer that is the picture.  seconds:
-    wall-clock time of "tables" (files, arrays, hierarchy), "compile" (or loading cached kernels)
-    and "render".  scene: what was rendered, and taken: with which samples; None if that is unknown.
+    those of `Film.layers`: albedo, normal, position and variance (height, width, 3), depth, id,
+    bvh_steps and intersections (height, width).  Ray casting always has colour and normal (height,
+    width, 3), distance and id (height, width), uv (height, width, 2).  shown: the layer that is the
+    picture.  seconds: wall-clock time of "tables" (files, arrays, hierarchy), "compile" (or loading
+    cached kernels) and "render".  scene: what was rendered, and taken: with which samples; None if
+    that is unknown.
     """
 
     layers: dict[str, FloatArray]

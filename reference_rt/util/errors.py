@@ -1,6 +1,8 @@
 """The errors that a user can cause, each with its exit code on the command line."""
 
 import difflib
+import inspect
+import sys
 from collections.abc import Iterable, Sequence
 
 
@@ -71,7 +73,20 @@ def meant_by(name: str, known: Iterable[str]) -> list[str]:
     return same[0] if same else difflib.get_close_matches(name, known, n=1)
 
 
-class ReferenceRtError(Exception):
+class Brief(type):
+    """Of its classes `help` shows no names that begin with an underscore."""
+
+    def __dir__(cls) -> list[str]:
+        names = [*super().__dir__()]
+        return [name for name in names if name[0] != "_"] if is_help() else names
+
+
+def is_help() -> bool:
+    """Whether the caller was called by `help`, for the names of a class."""
+    return sys._getframe(2).f_code is inspect.classify_class_attrs.__code__
+
+
+class ReferenceRtError(Exception, metaclass=Brief):
     """An error whose message is one line for users; `exit_code` is what `reference-rt` returns."""
 
     exit_code = 5
@@ -117,7 +132,7 @@ class SceneError(ReferenceRtError):
         return ": ".join(part for part in (where, keys, self.message) if part)
 
 
-class SceneWarning(UserWarning):
+class SceneWarning(UserWarning, metaclass=Brief):
     """A scene is valid, but probably not what its author meant.
 
     The message has the form of a `SceneError`: file, line, keys, what was found, what was expected.

@@ -30,11 +30,11 @@ from reference_rt.scene.model import no_such
 from reference_rt.shapes import Sphere
 from reference_rt.shapes.shape import Tangents
 from reference_rt.textures import At, Textures
-from reference_rt.util.errors import SceneError
+from reference_rt.util.errors import Brief, SceneError
 
 
 @dataclass(frozen=True)
-class BsdfSamples:
+class BsdfSamples(metaclass=Brief):
     """Directions that BSDF sampling draws for `wo`.
 
     wi (..., 3): unit directions;  weight (..., 3): f(wo, wi) |cos wi| / pdf;  pdf (...): density
@@ -110,7 +110,7 @@ NOTHING = np.empty((0, 3))
 """In place of wi or u."""
 
 
-class Bsdf:
+class Bsdf(metaclass=Brief):
     """The BSDF of one material of a scene, leaf or nested.
 
     Directions are in the shading frame (z along the shading normal, x along dp/du) and point away

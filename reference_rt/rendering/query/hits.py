@@ -34,6 +34,7 @@ from reference_rt.rendering.query.tracing import (
     rows_of,
     trace_in_ray_order,
 )
+from reference_rt.util.errors import Brief
 
 BoolArray = npt.NDArray[np.bool_]
 
@@ -42,7 +43,7 @@ OCCLUDED, OCCLUDED_BY_BLOCKS = ("occluded",), ("any_hits",)
 
 
 @dataclass(frozen=True)
-class Hits:
+class Hits(metaclass=Brief):
     """The surfaces that n rays hit.
 
     t (n,): inf for a miss;  shape (n,): index in the scene's shapes, -1 for a miss;  primitive
@@ -177,7 +178,7 @@ def occluded(
 
 
 @dataclass(frozen=True)
-class Closest:
+class Closest(metaclass=Brief):
     """First hits of n rays as rows of internal tables: for tests of traversal.
 
     t (n,): inf for a miss;  kind, row (n,): code in `reference_rt.shapes` of the table in

@@ -45,10 +45,11 @@ from reference_rt.scene.build import BuiltScene
 from reference_rt.shapes import TABLES as SHAPE_TABLES
 from reference_rt.shapes import Shapes
 from reference_rt.textures import Textures
+from reference_rt.util.errors import Brief
 
 
 @dataclass(frozen=True)
-class LightSamples:
+class LightSamples(metaclass=Brief):
     """Light samples at n points, without visibility.
 
     light (n,): number of the selected light, see `light_sources`, -1 for none;  wi (n, 3): unit
@@ -70,7 +71,7 @@ class LightSamples:
 
 
 @dataclass(frozen=True)
-class DirectLight:
+class DirectLight(metaclass=Brief):
     """Direct light of one light at the first hits of n rays.
 
     target (n, 3): the point on the light, or the direction towards an environment;  pdf (n,): its
@@ -155,7 +156,7 @@ def direct_kernel(
 
 
 @dataclass(frozen=True)
-class LightSources:
+class LightSources(metaclass=Brief):
     """The shape or light of the scene that each light number stands for.
 
     shape (m,): index of an area light in the scene's shapes (a mesh has a light for each triangle);

@@ -1,11 +1,13 @@
 """Every field of every description says what it means, at run time and in the JSON Schema."""
 
 import importlib
+import inspect
 import pkgutil
 import pydoc
 import re
 
 import reference_rt as rt
+from reference_rt import query
 from reference_rt.core.model import Description, field_texts
 
 MOST_WORDS = 30
@@ -78,6 +80,10 @@ def test_help_says_in_forty_lines_what_the_fields_mean():
         words = " ".join(said.replace("|", " ").split())
         for name, text in field_texts(cls).items():
             assert name == "type" or f"{name}: {' '.join(text.replace('|', ' ').split())}" in words
+    public = {getattr(module, name) for module in (rt, query) for name in module.__all__}
+    for cls in filter(inspect.isclass, public - {rt.Picture}):  # has its methods, too
+        said = pydoc.render_doc(cls, renderer=pydoc.plaintext)
+        assert said.count("\n") <= 40 or issubclass(cls, tuple), cls
     assert " load, " in pydoc.render_doc(rt.Scene, renderer=pydoc.plaintext)
     assert "model_validate" not in pydoc.render_doc(rt.Scene, renderer=pydoc.plaintext)
     assert "model_validate" in dir(rt.Scene)
