@@ -58,6 +58,7 @@ from reference_rt.rendering import tiles
 from reference_rt.rendering.accumulation import jobs_of
 from reference_rt.rendering.executor import build_and_check
 from reference_rt.scene.build import BuiltScene
+from reference_rt.util.processes import tied
 
 RayRecord = dict[str, Any]
 
@@ -79,6 +80,7 @@ def ray_trees(scene: BuiltScene, places: Sequence[tuple[int, int, int]]) -> list
         env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(sys.path)},
         stdout=subprocess.PIPE,
         check=True,
+        **tied(),
     )
     found: list[dict[str, Any]] = pickle.loads(done.stdout)
     return found
