@@ -19,6 +19,7 @@ from comparisons.runs.processes import Children
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceUnavailableError
 from reference_rt.util.files import temporary_folder
+from reference_rt.util.processes import tied
 
 PYTHON = "REFERENCE_RT_CYCLES"
 """The environment variable that names the Python which has Blender.  It is not ours, since Blender
@@ -48,7 +49,9 @@ def interpreter() -> str:
 def _version(python: str) -> str:
     """Blender's version there.  Raises ReferenceUnavailableError."""
     asked = "import importlib.metadata as m; print(m.version('bpy'))"
-    run = subprocess.run([python, "-c", asked], capture_output=True, text=True, check=False)
+    run = subprocess.run(
+        [python, "-c", asked], capture_output=True, text=True, check=False, **tied()
+    )
     if run.returncode != 0:
         told = (run.stderr.strip().splitlines() or ["no Blender"])[-1]
         raise ReferenceUnavailableError(f"{PYTHON}={python}: {told}; expected: {HOW}")

@@ -329,7 +329,9 @@ class Description(BaseModel, metaclass=_Helped):
     ) -> dict[str, Any]:
         """The JSON Schema, with the docstrings below the fields as their descriptions."""
         schema = handler(core_schema)
-        handler.resolve_ref_schema(schema)["description"] = inspect.cleandoc(vars(cls)["__doc__"])
+        handler.resolve_ref_schema(schema)["description"] = inspect.cleandoc(
+            vars(cls).get("__doc__") or ""
+        )
         properties = handler.resolve_ref_schema(schema).get("properties", {})
         for field, text in field_texts(cls).items():
             if field in properties:

@@ -20,6 +20,7 @@ from comparisons.mitsuba.translate.textures import (
     number,
     product,
     rgb,
+    texels_of,
     translate_texture,
 )
 from reference_rt.materials import (
@@ -317,7 +318,7 @@ def _(material: NormalMap, context: TranslationContext) -> dict[str, Any]:
     normals = colour(material.normals, context)
     if material.scale != 1.0:
         factors = np.array([material.scale, material.scale, 1.0])
-        texels = texture.read(context.folder).linear * factors + 0.5 * (1.0 - factors)
+        texels = texels_of(texture, context) * factors + 0.5 * (1.0 - factors)
         normals["bitmap"] = mitsuba().Bitmap(np.ascontiguousarray(texels, np.float32))
     if material.follow_v:
         normals = product([normals], follow_v=True)

@@ -140,12 +140,16 @@ def _(texture: Bitmap, name: str, context: TranslationContext, as_number: bool) 
     as_grey = as_number and texture.cutoff is None
     key = (name, as_grey)
     if key not in context.images:
-        path, ours = context.folder / texture.file, texture.read(context.folder).linear
-        source = path, texture.encoding, texture.scale, texture.layer
-        texels = described_image(*source, ours, texture.channel)
-        context.images[key] = _image(texels, as_grey)
+        context.images[key] = _image(texels_of(texture, context), as_grey)
     found = _lookup(context.images[key], texture.filter, along_u, texture.uv)
     return found if texture.cutoff is None else product([found], cutoff=texture.cutoff)
+
+
+def texels_of(texture: Bitmap, context: TranslationContext) -> FloatArray:
+    """The image (height, width, 3) as the second reader has it."""
+    path, ours = context.folder / texture.file, texture.read(context.folder).linear
+    source = path, texture.encoding, texture.scale, texture.layer
+    return described_image(*source, ours, texture.channel)
 
 
 @translate_texture.register

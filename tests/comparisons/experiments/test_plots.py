@@ -118,7 +118,8 @@ def test_colours_are_distinct_for_everybody(sight):
 def test_colours_are_visible_on_both_pages():
     """The contrast of WCAG 1.4.11 for graphics: 3."""
     css = (Path(report.__file__).parent / "page.css").read_text(encoding="utf-8")
-    papers = re.findall(r"--paper: (#[0-9a-f]{6});", css.replace("#fff;", "#ffffff;"))
+    (both,) = re.findall(r"--paper: light-dark\((.*?)\);", css)
+    papers = [colour.ljust(7, colour[-1]) for colour in both.split(", ")]  # #fff is #ffffff
     assert len(set(papers)) == 2
     weights = [0.2126, 0.7152, 0.0722]
     curves, pages = linear(PALETTE) @ weights + 0.05, linear(papers) @ weights + 0.05

@@ -284,10 +284,8 @@ def test_a_scene_through_the_gate() -> None:
         numbers = next(r.numbers for r in case.rungs if r.name == "statistics")
         assert numbers["inside"] + numbers["edge"] == (30 - 2 * rim) * (40 - 2 * rim)
         assert numbers["edge"] > 50
-        assert [row[0].partition(" ")[2] for row in numbers_rows(case)[:2]] == [
-            "pixels inside surfaces",
-            "pixels on edges",
-        ]
+        head = [title.partition(" ")[2] for title in numbers_rows(case)[0]]
+        assert head[1:3] == ["pixels inside surfaces", "pixels on edges"]
         assert gated(0.5, rim).verdict == "differ"
 
 

@@ -103,8 +103,11 @@ def test_wrong_usage(right: FloatArray) -> None:
     candidate = write("c.exr", right[0])
     for arguments, message in (
         ([candidate], "expected a scene, reference or baseline"),
-        (["--scene", "ball.yaml"], "expected either candidates or --command"),
-        ([candidate, "--command", "x {output}"], "expected either candidates or --command"),
+        (["--scene", "ball.yaml"], "expected either candidates, --command or --browser"),
+        (
+            [candidate, "--command", "x {output}"],
+            "expected either candidates, --command or --browser",
+        ),
         ([candidate, "--scene", "ball.yaml", "--seed", "3"], "--seed: only applies to --command"),
         ([candidate, "--scene", "ball.yaml", "--fixed"], "--fixed: only applies to --command"),
         ([candidate, "--reference", candidate, "--size", "8x8"], "--size: only applies to --s"),

@@ -30,7 +30,7 @@ EXCEPTIONS = {
     "moved.py": {"tabulate", "core.transform"},  # our side's vertices; the types of steps
     "lights.py": {"read_image"},  # digits beyond float32's, where Mitsuba's reader says the same
     "textures.py": {"read"},  # the same
-    "translate.py": {"read_image"},  # the same
+    "translate.py": {"read"},  # the same
     "sizes.py": {"tabulate"},  # sizes, of which bounds of errors are made
 }
 

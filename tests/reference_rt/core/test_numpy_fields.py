@@ -64,6 +64,7 @@ REQUIRED = {
     },
     "Triangle": {"v0": [0.0, 0.0, 0.0], "v1": [1.0, 0.0, 0.0], "v2": [0.0, 1.0, 0.0]},
     "Bitmap": {"file": "a.png"},
+    "Product": {"of": ["t", "u"]},
     "Matrix": {"matrix": np.eye(3, 4).tolist()},
     "Rotate": {"rotate": {"axis": [0.0, 1.0, 0.0], "degrees": 30.0}},
     "Translate": {"translate": [1.0, 2.0, 3.0]},

