@@ -55,7 +55,7 @@ def _version(python: str) -> str:
     if run.returncode != 0:
         told = (run.stderr.strip().splitlines() or ["no Blender"])[-1]
         raise ReferenceUnavailableError(f"{PYTHON}={python}: {told}; expected: {HOW}")
-    return run.stdout.strip()
+    return str(run.stdout.strip())
 
 
 @dataclass(frozen=True)
