@@ -204,11 +204,14 @@ def _list(scene: Scene, tree: Tree, parent: int | None) -> str:
 
 
 def _views(scene: Scene, tree: Tree) -> Iterator[str]:
-    """The scene in a cube around all ends of rays, with the rays, along each axis."""
+    """The scene in a cube around what the camera sees and all ends of rays, with the rays, along
+    each axis."""
     rays = tree["rays"]
     # Without the eye, which is often far away.
     ends = [ray["end"] for ray in rays if ray["end"] is not None] or [scene.camera.target]
-    low, high = np.min(ends, axis=0), np.max(ends, axis=0)
+    seen = _seen(scene)
+    low = np.min([*ends, *np.quantile(seen, 0.02, axis=0, keepdims=True)], axis=0)
+    high = np.max([*ends, *np.quantile(seen, 0.98, axis=0, keepdims=True)], axis=0)
     distance = float(np.linalg.norm(np.subtract(ends[0], rays[0]["o"])))
     center, half = 0.5 * (low + high), max(0.6 * float((high - low).max()), 0.1 * distance)
     for name, axes in _AXES.items():
@@ -233,6 +236,16 @@ def _views(scene: Scene, tree: Tree) -> Iterator[str]:
             lines.append(f'<line {data} stroke="{_COLOURS[ray["kind"]]}"{dashes} {span}/>')
         view = Picture({"colour": _translucent(scene, center, half, right, up)}, "colour")
         yield _figure(view.png(exposure=1.0), _SIDE, _SIDE, "".join(boxes + lines), name)
+
+
+def _seen(scene: Scene) -> FloatArray:
+    """(n, 3): points that the camera sees, but for the farthest; the target if it sees none."""
+    x, y = (np.mgrid[0:16, 0:16] + 0.5) / 16.0
+    rays = scene.camera_rays(np.stack([x * scene.film.width, y * scene.film.height], axis=-1))
+    hits = scene.intersect(rays.origins, rays.directions)
+    near = hits.t <= 4.0 * np.median(hits.t)
+    points = hits.p[near & np.isfinite(hits.t)]
+    return points if len(points) else np.array([scene.camera.target], dtype=np.float64)
 
 
 def _figure(image: bytes, width: int, height: int, drawn: str, caption: str) -> str:
