@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from suite_runs import processes, run_in, scenes, signal_in_the_next_case
@@ -81,6 +82,18 @@ def test_where_no_case_can_run_nothing_is_said_of_any(tmp_path):
     worker = ("comparisons.suites.worker", "--runner", "no_such_module:f")
     with pytest.raises(ReferenceUnavailableError, match="no_such_module"):
         list(children.run([request], Threads(1), 60.0, lambda *_: None, worker))
+
+
+def test_one_thread_reads_images(tmp_path):
+    """With one thread of Dr.Jit Mitsuba would wait for ever for the decoding of an .exr file."""
+    scene = Path(__file__).parents[3] / "scenes" / "environment.yaml"
+    request = Request(
+        name="a", scene=scene, budget=Budget(pixels=16), rungs=("geometry",), folder=tmp_path
+    )
+    worker = ("comparisons.suites.worker", "--threads", "1")
+    (outcome,) = children.run([request], Threads(1), 60.0, lambda *_: None, worker)
+    assert outcome.failure is None
+    assert read_stored_case(tmp_path).verdict == "agree"
 
 
 INTERRUPTED = """
