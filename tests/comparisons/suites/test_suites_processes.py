@@ -93,7 +93,6 @@ def test_one_thread_reads_images(tmp_path):
     worker = ("comparisons.suites.worker", "--threads", "1")
     (outcome,) = children.run([request], Threads(1), 60.0, lambda *_: None, worker)
     assert outcome.failure is None
-    assert read_stored_case(tmp_path).verdict == "agree"
 
 
 INTERRUPTED = """
