@@ -16,7 +16,7 @@ from comparisons.compare.path_length import Lengths
 from reference_rt.cameras import Orthographic
 from reference_rt.cameras.view_rectangle import CentralCamera
 from reference_rt.lights import Directional
-from reference_rt.materials import NormalMap
+from reference_rt.materials import GltfPbr, NormalMap
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
@@ -53,7 +53,7 @@ def _f0(factor: float) -> _OfField:
     """The index of refraction that has so many times the reflectance head-on."""
 
     def update(part: Any) -> _Update:
-        if getattr(part, "type", "") != "gltf_pbr":
+        if not isinstance(part, GltfPbr):
             return {}
         root = min(factor**0.5 * abs((1.0 - part.ior) / (1.0 + part.ior)), 0.999)
         return {"ior": (1.0 + root) / (1.0 - root)}
@@ -142,14 +142,14 @@ def _changes(scene: Scene, place: Path) -> Iterator[tuple[str, _Update]]:
         }
         yield "normal maps are ignored", {"materials": plain}
     turned = dict(scene.textures)
-    for k in maps:
+    for number, k in enumerate(sorted(maps)):  # a name is not always that of a file
         if isinstance(texture := turned[k], Bitmap):
             values = texture.read(scene.folder).linear.copy()
             values[..., 1] = 1.0 - values[..., 1]
-            np.save(place / f"{k}.npy", values)
-            turned[k] = texture.model_copy(
-                update={"file": str(place / f"{k}.npy"), "encoding": "raw", "scale": 1.0}
-            )
+            file = place / f"{number}.npy"
+            np.save(file, values)
+            update = {"file": str(file), "encoding": "raw", "scale": 1.0}
+            turned[k] = texture.model_copy(update=update)
     if turned != scene.textures:
         yield "green of normal maps is flipped", {"textures": turned}
 

@@ -17,6 +17,7 @@ from comparisons.results.case import Case, Cause, FloatArray
 from reference_rt.integrators import Direct, Path
 from reference_rt.materials import (
     Conductor,
+    GltfPbr,
     Mirror,
     Phong,
     Plastic,
@@ -104,7 +105,7 @@ def _matte(material: Any) -> Any:
     elif isinstance(material, Principled) and material.spec_trans == 0.0:
         changes = {"specular": 0.0, "eta": None, "clearcoat": 0.0}
         changes |= _without_metal(material.base_colour, material.metallic, "base_colour")
-    elif material.type == "gltf_pbr":
+    elif isinstance(material, GltfPbr):
         changes = {"specular": 0.0}
         changes |= _without_metal(material.base_color, material.metallic, "base_color")
     return material.model_copy(update=changes)

@@ -32,6 +32,7 @@ def witness_of(
     None for all cores.  Raises ReferenceUnavailableError where it is not installed."""
     witness = other(name)
     version = witness.version()
+    whose = witness.title + ("'" if witness.title.endswith("s") else "'s")
 
     def hear(
         replicates: tuple[FloatArray, FloatArray], sides: tuple[str, str]
@@ -46,7 +47,7 @@ def witness_of(
         except ReferenceUnavailableError as error:  # of this scene: others of a suite go on
             return RungResult("witness", "not-comparable", str(error)), None
         say(f"witness: {count} pictures by {witness.title} ({found.seconds.sum():.1f} s)")
-        rung = vote((*replicates, found.pictures), (*sides, f"{witness.title}'"), limit)
+        rung = vote((*replicates, found.pictures), (*sides, whose), limit)
         rung.numbers["version"] = version
         rung.numbers["seconds"] = float(np.median(found.seconds))
         return rung, found.pictures.mean(axis=0)

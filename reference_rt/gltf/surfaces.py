@@ -300,7 +300,7 @@ def _cached(data: bytes) -> Path:
     root = os.environ.get("REFERENCE_RT_CACHE") or platformdirs.user_cache_dir("reference_rt")
     suffix = next((suffix for start, suffix in _SUFFIXES if data.startswith(start)), "")
     path = Path(root) / "images" / f"{hashlib.sha256(data).hexdigest()[:32]}{suffix}"
-    if not path.is_file():
+    if not (path.is_file() and path.read_bytes() == data):  # a cache is not trusted
         with replacing(path) as temporary:
             temporary.write_bytes(data)
     return path.resolve()

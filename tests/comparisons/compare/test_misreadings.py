@@ -65,5 +65,12 @@ def test_a_misreading_is_named(right: str, wrong: str, name: str) -> None:
     assert name in cause.name
 
 
+def test_names_of_textures_are_no_paths() -> None:
+    scene, reference = picture(SCENE.replace("dents", "../../dents"))
+    found = misreadings(scene)
+    assert found is not None
+    assert "green of normal maps is flipped" in [h.name for h in found(reference)]
+
+
 def test_noise_has_no_misreadings() -> None:
     assert misreadings(Scene.parse(SCENE.replace("whitted", "path"), folder=TEXTURES)) is None

@@ -139,10 +139,10 @@ def test_the_gate_judges_what_a_page_makes_of_a_scene(
     """Neither the page nor the outputs are named from the working folder down."""
     page.write_text(PAGE.replace("{ width, height, pixels", f"{{ {size}, pixels"))
     Path("square.yaml").write_text(SCENE)
-    Path("work").mkdir()
-    monkeypatch.chdir("work")
+    Path("here").mkdir()
+    monkeypatch.chdir("here")
     result, found = run(
-        *("--browser", "../page.html", "--scene", "../square.yaml", "--out", "../work/out")
+        *("--browser", "../page.html", "--scene", "../square.yaml", "--out", "../here/out")
     )
     assert result.exit_code == exit_code, result.output
     assert found["cases"][0]["verdict"] == verdict

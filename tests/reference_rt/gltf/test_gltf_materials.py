@@ -229,6 +229,9 @@ def test_images_in_views_and_uris_are_the_same(tmp_path):
     (name,) = files
     assert name.startswith(str(tmp_path / "cache"))
     assert Path(name).read_bytes() == png()
+    Path(name).write_bytes(b"another image")  # a cache is not trusted
+    load(tmp_path, file)
+    assert Path(name).read_bytes() == png()
 
 
 @pytest.mark.parametrize("uri", ["../out.png", "/etc/passwd", "a/../../out.png", "%2e%2e/out.png"])
