@@ -55,7 +55,6 @@ def reached(scene: Scene, target: float, seconds: float) -> "dict[str, Target]":
         size=size_within(scene.film, NARROW),
         targets=(target,),
         only=METHODS,
-        starts=False,
         crops=False,
     )
     found = converge(scene, settings).findings

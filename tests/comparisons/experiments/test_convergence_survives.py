@@ -18,7 +18,7 @@ PROGRAM = (
 
 
 def command(out):
-    options = ["--only", "ours", "--no-starts", "--size", "16x16", "--max-spp", "64"]
+    options = ["--only", "ours", "--size", "16x16", "--max-spp", "64"]
     options += ["--replicates", "64", "--time-limit", "3600"]
     scene = str(SCENES / "cornell_box.yaml")
     return [sys.executable, "-c", PROGRAM, "converge", scene, "-o", str(out), *options]

@@ -9,7 +9,7 @@ from comparisons.experiments.stability import contact as contact
 from comparisons.experiments.stability import leaving as leaving
 from comparisons.experiments.stability.contact import fresnel, plates, shadow_scene
 from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw
-from comparisons.experiments.stability.harness.leaving import bound, lit
+from comparisons.experiments.stability.harness.steps import bound, lit
 from comparisons.experiments.stability.leaving.judge import Judge, Tally, row_of
 from comparisons.experiments.stability.leaving.shapes import (
     KINDS,
