@@ -88,8 +88,7 @@ def methods(
     """Time the textbook's intersection methods, in nanoseconds per ray."""
     with compare_extra("measuring"):
         from comparisons.experiments.methods.outputs import table, write, write_page
-        from comparisons.experiments.methods.run import FULL, QUICK, run
-        from comparisons.experiments.methods.trials import FAMILIES
+        from comparisons.experiments.methods.run import FAMILIES, FULL, QUICK, run
         from comparisons.runs.provenance import ours
 
         import_module("matplotlib")  # before minutes of measuring that the page then cannot show
@@ -151,9 +150,6 @@ def converge(
             metavar="METHOD", help="Only this method: ours, mitsuba_llvm, ...; repeatable."
         ),
     ] = None,
-    starts: Annotated[
-        bool, typer.Option(help="Time process start-up, with empty and with full kernel caches.")
-    ] = True,
     fresh: Fresh = False,
     workers: Annotated[
         int | None,
@@ -202,7 +198,6 @@ def converge(
         replicates=replicates,
         targets=_targets(targets),
         only=tuple(only or ()),
-        starts=starts,
     )
     chosen(settings.only)
     changes = Changes(defaults=by_name(define))

@@ -102,14 +102,14 @@ def truth_gate(
 ) -> None:
     """`gate --truth NAME`: pictures, or those that `command` makes, against the formula.
 
-    driving: fields of `comparisons.truth.gate.Driven`, None for its own.
+    driving: fields of `comparisons.truth.renderers.Driven`, None for its own.
     """
     with compare_extra("truth"):
         from comparisons.gate.pictures_in import read_candidates
         from comparisons.report import terminal
         from comparisons.runs.provenance import ours
         from comparisons.truth import outputs
-        from comparisons.truth.gate import Driven, judged
+        from comparisons.truth.renderers import Driven, judged
 
     picked = _chosen([name], "--truth: ")
     if command is None and len(picked) > 1:

@@ -23,7 +23,7 @@ from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.notes import notes_of
 from comparisons.mitsuba.reading.reference import changes_to, file_of, own_scene
 from comparisons.mitsuba.translate import MOST_INSTANCES, UntranslatableError, load
-from comparisons.mitsuba.translate.integrators import in_place_of
+from comparisons.mitsuba.translate.lights import in_place_of
 from comparisons.mitsuba.translate.moved import with_float32_vertices
 from comparisons.results.case import Case, Images, RungResult
 from comparisons.rungs.layers.rung import applies

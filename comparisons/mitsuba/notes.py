@@ -16,7 +16,7 @@ from comparisons.mitsuba.plugins.exact_coat import (
     rough_coat,
     smooth_reflectance,
 )
-from comparisons.mitsuba.translate.integrators import (
+from comparisons.mitsuba.translate.lights import (
     counts_lights_often,
     drops_light,
     misplaces,

@@ -14,8 +14,7 @@ from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.plugins.whitted import MOST_COMPONENTS
 from comparisons.mitsuba.scene import for_rays
-from comparisons.mitsuba.translate.integrators import translate_integrator
-from comparisons.mitsuba.translate.lights import SAMPLED, ambient_of
+from comparisons.mitsuba.translate.lights import SAMPLED, ambient_of, translate_integrator
 from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.arbiter import NEIGHBOURS, RADII, BoolArray, directions

@@ -109,7 +109,7 @@ def _shapes(linker: Linker, tables: SceneTables, integrator: str) -> Link:
     if geometry.parts is not None:
         wanted |= {"owner"}
     if geometry.solids is not None:
-        wanted |= {"spans", "enters", "intersect"}
+        wanted |= {"spans", "enters", "intersect", "surface"}
     if tables.textures is not None or integrator == "ray_cast":
         wanted |= {"uv", "colour"}
     if integrator == "ray_cast":

@@ -6,8 +6,9 @@ also has.  `intersect(name, parameters, origins, directions)` intersects one sha
 
 Contract of a method: a kernel of a ray and the prepared parameters that returns the smallest t > 0
 in units of |d|, inf for a miss; its docstring states "Cost:" (operations) and "Fails:" (known
-failures), which `reference-rt methods` prints and the tests check.  In both, u = 2^-53.  To add a
-family: a file with its parameters (a NamedTuple), kernels and `METHODS`, named in `METHODS` below.
+failures, which the tests check); `reference-rt methods` prints both.  In both, u = 2^-53.  To add
+a family: a file with its parameters (a NamedTuple), kernels and `METHODS`, named in `METHODS`
+below.
 """
 
 from typing import Any

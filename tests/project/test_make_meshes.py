@@ -3,8 +3,6 @@
 import runpy
 from pathlib import Path
 
-import numpy as np
-
 from reference_rt.shapes.meshes.files import read_mesh
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -24,16 +22,3 @@ def test_petal_is_what_the_script_writes() -> None:
     assert mesh.colours is not None
     assert mesh.normals is None
     assert len(mesh.faces) == 2 * 24 * 24
-
-
-def test_knot_is_closed_and_outward() -> None:
-    mesh = read_mesh(SCENES / "meshes" / "knot.obj")
-    assert len(mesh.faces) >= 20_000
-    edges = np.concatenate([mesh.faces[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
-    # Closed and oriented: each edge is met once each way.
-    assert len(np.unique(edges, axis=0)) == len(edges)
-    assert set(map(tuple, edges.tolist())) == set(map(tuple, edges[:, ::-1].tolist()))
-    corners = mesh.vertices[mesh.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    assert mesh.normals is not None
-    assert np.all(np.sum(normals * mesh.normals[mesh.faces[:, 0]], axis=1) > 0.0)

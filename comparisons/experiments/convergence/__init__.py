@@ -25,12 +25,6 @@ NARROW = 64
 """Width in pixels of pictures for a quick answer."""
 
 
-def time_to_error(scene: Scene, target: float, seconds: float) -> dict[str, float]:
-    """Render seconds to the relative error `target`, by method; see `reached`."""
-    found = reached(scene, target, seconds)
-    return {name: one.seconds.value for name, one in found.items()}
-
-
 def reached(scene: Scene, target: float, seconds: float) -> "dict[str, Target]":
     """The time to the relative error `target` (the square root of relMSE), by method.
 
@@ -55,12 +49,8 @@ def reached(scene: Scene, target: float, seconds: float) -> "dict[str, Target]":
         size=size_within(scene.film, NARROW),
         targets=(target,),
         only=METHODS,
-        starts=False,
         crops=False,
     )
     found = converge(scene, settings).findings
     times = {name: found[name].targets[0] for name in METHODS if name in found}
     return {name: one for name, one in times.items() if one.how != "unknown"}
-
-
-__all__ = ["reached", "time_to_error"]

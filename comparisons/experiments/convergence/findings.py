@@ -352,10 +352,6 @@ def worst_part(
 # ---- a scene's curves ---------------------------------------------------------------------------
 
 
-Starts = Mapping[str, Mapping[str, Mapping[str, float]]]
-"""Seconds by side, "cold" or "warm", and stage: see `starts`."""
-
-
 class GridStep(NamedTuple):
     """Our picture of a deterministic scene on a grid of spp samples per pixel: its seconds, NaN
     where they are `disturbed`, and its errors against the finest grid."""
@@ -396,7 +392,7 @@ class Curves:
 
     scene: its name;  size: width and height in pixels;  methods, findings: by name;  absent: why
     other methods have no findings, by name;  grids: for a deterministic scene, which has no
-    reference and no findings;  starts: process start-up times;  crops: pictures at equal time and
+    reference and no findings;  crops: pictures at equal time and
     at equal error;  left_out: what else was not measured, and why;  notes: for the reader;  again:
     the command that repeats the scene;  problem: why there are no results: the scene is invalid, or
     the run was interrupted before it.
@@ -408,7 +404,6 @@ class Curves:
     findings: Mapping[str, Findings] = field(default_factory=dict)
     reference: Reference | None = None
     grids: Grids | None = None
-    starts: Starts = field(default_factory=dict)
     crops: tuple[Crops, ...] = ()
     left_out: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()

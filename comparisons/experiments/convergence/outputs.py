@@ -84,7 +84,7 @@ def again(path: Path, out: Path, settings: Settings) -> str:
         command += ["--size", "x".join(map(str, settings.size))]
     for name in settings.only:
         command += ["--only", name]
-    return shlex.join(command if settings.starts else [*command, "--no-starts"])
+    return shlex.join(command)
 
 
 # ---- results.json and results.csv ---------------------------------------------------------------
@@ -128,7 +128,6 @@ def write_results(
                                         "at least" or "neither" where times of first rungs are
                                         upper bounds, else ""} or null]},
                      "grids": {"finest_spp", "steps": [...], "mitsuba": [...]} or null,
-                     "starts": {side: {"cold" and "warm": {stage: seconds}}},
                      "crops": [{"kind", "level", "corner", "size",
                                 "shown": {name: {"spp", "seconds", "error"}}}],
                      "left_out": [...], "notes": [...],
@@ -181,7 +180,6 @@ def _scene(one: Curves) -> dict[str, Any]:
             "steps": [step._asdict() for step in one.grids.steps],
             "mitsuba": [point._asdict() for point in one.grids.points],
         },
-        "starts": one.starts,
         "crops": [
             {
                 "kind": crops.kind,

@@ -10,7 +10,6 @@ from markupsafe import Markup
 
 from comparisons.experiments.convergence.estimates import Bias, Line
 from comparisons.experiments.convergence.findings import Crops, Curves, Ratio, Target
-from comparisons.experiments.convergence.starts import STAGES
 from comparisons.experiments.convergence.store import Settings
 from comparisons.report.plots import Curve, log_log, source_of
 from comparisons.report.templates import template, write
@@ -212,17 +211,6 @@ def _tables(one: Curves, targets: Sequence[str]) -> list[Table]:
         ]
         head = ["Renderer", "samples per pixel", "seconds", "MSE", "relMSE", "against"]
         tables.append(("Grids", head, rows, ""))
-    if one.starts:
-        rows = []
-        for side, states in one.starts.items():
-            for state, stages in states.items():
-                spent = [*(stages[stage] for stage in STAGES), sum(stages.values())]
-                cache = "empty" if state == "cold" else "full"
-                rows.append([side, cache, *(f"{seconds:.3f}" for seconds in spent)])
-            if not states:
-                rows.append([side, Cell("a process failed", look="bad")])
-        head = ["Renderer", "kernel caches", *STAGES, "total"]
-        tables.append(("Seconds from the start of a process to its first picture", head, rows, ""))
     return tables
 
 

@@ -40,7 +40,6 @@ from comparisons.experiments.convergence.methods import (
     why_left_out,
     with_sampler,
 )
-from comparisons.experiments.convergence.starts import starts_of
 from comparisons.experiments.convergence.store import (
     COUNT,
     FIRST,
@@ -305,8 +304,6 @@ class _Run:
         left_out += [f"{title}: {why}" for title, why in stopped.items() if why]
         climbed = {name: climbs[name].rungs for name in by_name}
         renderers = {name: climbs[name].renderer for name in climbed}
-        starts = starts_of(scene, by_name.values(), self.store, self.say) if settings.starts else {}
-        left_out += [f"starts of {side}: a process failed" for side, t in starts.items() if not t]
         if any(c.side != "ours" for c in by_name.values()):
             notes += tuple(remarks(scene))
         notes += tuple(_sampler_note(side, found) for side, found in plan.merits.items())
@@ -319,7 +316,6 @@ class _Run:
                 for name, rungs in climbed.items()
             },
             reference,
-            starts=starts,
             crops=crops_of(climbed, renderers, reference, self.store) if settings.crops else (),
             left_out=tuple(left_out),
             notes=notes,

@@ -46,12 +46,11 @@ class Settings:
     """The settings of a run.
 
     time_limit: seconds for the ladder and the reference of one scene, shared equally by the methods
-    and the reference; process starts, compilation and trials (of costs, of Mitsuba's samplers) come
-    in addition;  size: width and height, None: the scene's, at most WIDEST wide;  max_spp: largest
+    and the reference; compilation and trials (of costs, of Mitsuba's samplers) come in addition;
+     size: width and height, None: the scene's, at most WIDEST wide;  max_spp: largest
     number of samples per pixel;  replicates: independent pictures at each rung;  targets: relative
-    errors to which the time is determined;  only: names of methods, empty: all;  starts: whether to
-    time process start-up with empty and with full kernel caches;  crops: whether to render pictures
-    to show.
+    errors to which the time is determined;  only: names of methods, empty: all;  crops: whether to
+    render pictures to show.
     """
 
     time_limit: float = 60.0
@@ -60,7 +59,6 @@ class Settings:
     replicates: int = 8
     targets: tuple[float, ...] = (0.1, 0.03, 0.01, 0.003)
     only: tuple[str, ...] = ()
-    starts: bool = True
     crops: bool = True
 
 

@@ -11,8 +11,7 @@ from typing import Any
 from markupsafe import Markup
 from rich.console import RenderableType
 
-from comparisons.experiments.methods.run import Effort, Row
-from comparisons.experiments.methods.trials import SERIES, methods
+from comparisons.experiments.methods.run import SERIES, Effort, Row, methods
 from comparisons.report.plots import Curve, log_log
 from comparisons.report.templates import template
 from comparisons.report.templates import write as write_text

@@ -1,6 +1,6 @@
 """Where renderers fail as scenes become extreme, decided by exact arithmetic and closed forms.
 
-`reference-rt stability` runs 14 families, F1 to F14, a module or a folder each: its docstring
+`reference-rt stability` runs 13 families, F1 to F13, a module or a folder each: its docstring
 states the law (what must hold), the range, the counts of cases and what passes; it defines
 `FAMILY`.  A family has series; a series is a sweep (`Sweep`: the points x, from ordinary to
 extreme) and a `measure(draw, x)` that returns an `Outcome` for each contestant: ours, Mitsuba,

@@ -40,8 +40,14 @@ from comparisons.experiments.stability.harness.core import (
     outcome,
     together,
 )
-from comparisons.experiments.stability.harness.leaving import CONTACT, PIXELS, bound, lit, picture
-from comparisons.experiments.stability.harness.steps import matrix
+from comparisons.experiments.stability.harness.steps import (
+    CONTACT,
+    PIXELS,
+    bound,
+    light_picture,
+    lit,
+    matrix,
+)
 from comparisons.geometry import frame
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.mitsuba import translate
@@ -292,7 +298,7 @@ def shoot(contestant: str, x: float) -> Shot:
         f"{contestant}: the floor at a cube's edge (in the middle), {gap:.0e} under it; "
         f"light comes in by one gap in twelve: 58 % are lit, here {100.0 * share:.0f} %"
     )
-    return Shot(picture(found), caption)
+    return Shot(light_picture(found), caption)
 
 
 # ---- the series ----------------------------------------------------------------------------------

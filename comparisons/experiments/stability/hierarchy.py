@@ -42,8 +42,8 @@ from comparisons.experiments.stability.harness.core import (
 )
 from comparisons.experiments.stability.harness.meshes import cube, write
 from comparisons.experiments.stability.harness.steps import any_turn, at, scaled
+from comparisons.geometry.affine import unit_vectors
 from comparisons.geometry.exact.dyadic import BoolArray
-from comparisons.geometry.vectors import unit_vectors
 from reference_rt import shapes as any_shape
 from reference_rt.core import transform
 from reference_rt.core.arrays import IntArray

@@ -41,9 +41,9 @@ from comparisons.experiments.stability.harness.core import (
     outcome,
 )
 from comparisons.experiments.stability.harness.steps import Rays
+from comparisons.geometry.affine import across, unit_vectors
 from comparisons.geometry.exact.crossings import torus_quartic
 from comparisons.geometry.exact.dyadic import CERTAIN, BoolArray, Dyadic
-from comparisons.geometry.vectors import across, unit_vectors
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import entry_kernel

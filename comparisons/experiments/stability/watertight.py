@@ -52,8 +52,8 @@ from comparisons.experiments.stability.harness.meshes import (
     write,
 )
 from comparisons.experiments.stability.harness.steps import any_turn, at, traced
+from comparisons.geometry.affine import unit_vectors
 from comparisons.geometry.exact.dyadic import BoolArray
-from comparisons.geometry.vectors import unit_vectors
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from reference_rt import textbook

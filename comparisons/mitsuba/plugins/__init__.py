@@ -11,11 +11,9 @@ from typing import Any
 from comparisons.mitsuba.plugins import (
     exact_coat,
     exact_coordinates,
-    gltf_pbr,
+    materials,
     mesh_area,
-    mixtures,
     path_of_solids,
-    phong,
     view_rectangle,
     whitted,
 )
@@ -24,7 +22,7 @@ from comparisons.mitsuba.plugins import (
 def register(mi: Any) -> None:
     """Register the plugins of this folder for the current variant."""
     plugins = (
-        *(exact_coat, exact_coordinates, gltf_pbr, mixtures, phong),
+        *(exact_coat, exact_coordinates, materials),
         *(mesh_area, path_of_solids, view_rectangle, whitted),
     )
     for plugin in plugins:

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.mitsuba.plugins import base, phong
+from comparisons.mitsuba.plugins import base, materials
 from comparisons.mitsuba.plugins.base import PlainScene
 from reference_rt.core.arrays import FloatArray
 
@@ -340,11 +340,11 @@ def register(mi: Any) -> None:
             )
 
         def ambient_light(self, si: Any, active: Any) -> Any:
-            """The ambient light that Phong materials reflect: see `phong`."""
+            """The ambient light that Phong materials reflect: see `materials`."""
             context, up = mi.BSDFContext(), mi.Vector3f(0.0, 0.0, 1.0)
-            context.type_mask = phong.AMBIENT
+            context.type_mask = materials.AMBIENT
             found = si.bsdf().eval(context, si, up, active)
-            context.type_mask = phong.BLANK
+            context.type_mask = materials.BLANK
             rest = si.bsdf().eval(context, si, up, active)
             return dr.select(active, (found - rest) * mi.Color3f(self.ambient), 0.0)
 

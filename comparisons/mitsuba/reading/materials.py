@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from comparisons.mitsuba.plugins import gltf_pbr as plugin
+from comparisons.mitsuba.plugins.materials import GLTF_COLOURS, GLTF_NUMBERS
 from comparisons.mitsuba.reading.node import Node, Reading
 from comparisons.mitsuba.reading.textures import (
     colour_or_texture,
@@ -97,8 +97,8 @@ def phong(reading: Reading, node: Node) -> Material:
 def gltf_pbr(reading: Reading, node: Node) -> Material:
     """Of our plugin, in files that we have written."""
     values: dict[str, Any] = {"ior": node.number("ior", 1.5)}
-    values |= {name: colour_or_texture(reading, node, name, 1.0) for name in plugin.COLOURS}
-    values |= {name: number_or_texture(reading, node, name, 1.0) for name in plugin.NUMBERS}
+    values |= {name: colour_or_texture(reading, node, name, 1.0) for name in GLTF_COLOURS}
+    values |= {name: number_or_texture(reading, node, name, 1.0) for name in GLTF_NUMBERS}
     return GltfPbr(**values)
 
 

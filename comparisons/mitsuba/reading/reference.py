@@ -14,7 +14,7 @@ from comparisons.mitsuba.reading import read_supported
 from comparisons.mitsuba.reading.node import Node
 from comparisons.mitsuba.reading.parse import Parsed, parse_file
 from comparisons.mitsuba.reading.textures import index_of_refraction, to_uv
-from comparisons.mitsuba.translate.integrators import (
+from comparisons.mitsuba.translate.lights import (
     BLACK,
     counts_lights_often,
     drops_light,

@@ -27,14 +27,15 @@ from comparisons.mitsuba.translate.cameras import (
     translate_film,
     translate_sampler,
 )
-from comparisons.mitsuba.translate.integrators import (
+from comparisons.mitsuba.translate.lights import (
     BLACK,
     counts_lights_often,
     drops_light,
     in_place_of,
+    never_samples,
     translate_integrator,
+    translate_light,
 )
-from comparisons.mitsuba.translate.lights import never_samples, translate_light
 from comparisons.mitsuba.translate.materials import (
     coloured_parts_of,
     is_oriented,

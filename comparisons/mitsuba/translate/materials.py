@@ -10,8 +10,8 @@ import numpy as np
 import reference_rt as rt
 from comparisons.geometry import affine
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.plugins import gltf_pbr
 from comparisons.mitsuba.plugins.exact_coat import COLOURS, SUBSTITUTE, accepted
+from comparisons.mitsuba.plugins.materials import GLTF_COLOURS, GLTF_NUMBERS
 from comparisons.mitsuba.translate.textures import (
     TranslationContext,
     UntranslatableError,
@@ -201,7 +201,7 @@ def _(material: rt.PrincipledThin, context: TranslationContext) -> dict[str, Any
 
 @translate_material.register
 def _(material: rt.Phong, context: TranslationContext) -> dict[str, Any]:
-    """Our plugin `comparisons.mitsuba.plugins.phong`."""
+    """Our plugin `comparisons.mitsuba.plugins.materials`."""
     colours = ("ambient", "diffuse", "specular", "mirror")
     return {
         "type": "textbook_phong",
@@ -216,8 +216,8 @@ def _(material: rt.GltfPbr, context: TranslationContext) -> dict[str, Any]:
     return {
         "type": "gltf_pbr",
         "ior": material.ior,
-        **{name: colour(getattr(material, name), context) for name in gltf_pbr.COLOURS},
-        **{name: number(getattr(material, name), context) for name in gltf_pbr.NUMBERS},
+        **{name: colour(getattr(material, name), context) for name in GLTF_COLOURS},
+        **{name: number(getattr(material, name), context) for name in GLTF_NUMBERS},
     }
 
 

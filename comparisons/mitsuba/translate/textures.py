@@ -163,7 +163,7 @@ def product(
     cutoff: float = 0.0,
     follow_v: bool = False,
 ) -> dict[str, Any]:
-    """Our plugin `comparisons.mitsuba.plugins.mixtures`, of colours and of numbers."""
+    """Our plugin `comparisons.mitsuba.plugins.materials`, of colours and of numbers."""
     nested = {f"of_{k}": part for k, part in enumerate(of)}
     factors = {f"factor_{k}": value for k, value in enumerate(factor)}
     options = {"cutoff": cutoff, "follow_v": follow_v}

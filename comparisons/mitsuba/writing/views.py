@@ -10,8 +10,7 @@ import numpy as np
 from comparisons.mitsuba.plugins.whitted import MOST_COMPONENTS
 from comparisons.mitsuba.reading.parse import LookAt, Step
 from comparisons.mitsuba.translate.cameras import clipping, translate_camera, translate_film
-from comparisons.mitsuba.translate.integrators import translate_integrator
-from comparisons.mitsuba.translate.lights import ambient_of
+from comparisons.mitsuba.translate.lights import ambient_of, translate_integrator
 from comparisons.mitsuba.translate.textures import UntranslatableError
 from comparisons.mitsuba.writing.files import Element, Rgb, Vector, matrix_step
 from comparisons.mitsuba.writing.surfaces import OURS, Surfaces

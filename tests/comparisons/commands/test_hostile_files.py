@@ -4,7 +4,6 @@ a name that a terminal obeys: one line, soon, and never an internal error."""
 import os
 import signal
 import socket
-import subprocess
 import sys
 import zipfile
 from pathlib import Path
@@ -235,30 +234,6 @@ def test_every_command_and_every_name(tmp_path, monkeypatch, command, name):
     for told in (result.stdout, result.stderr):
         assert all(c.isprintable() or c in "\n" for c in told), told
     assert "internal error" not in result.stderr
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["not UTF-8", "a terminal's code"])
-def test_a_picture_of_any_name(tmp_path, name):
-    """It is written, and says which scene it is of."""
-    scene = tmp_path / f"{NAMES[name]}.yaml"
-    scene.write_text("film: {width: 2, height: 2}\nintegrator: {type: ray_cast}\n")
-    for suffix in (".exr", ".png"):
-        out = tmp_path / f"{NAMES[name]}{suffix}"
-        done = subprocess.run(
-            [sys.executable, "-m", "reference_rt", "render", str(scene), "-o", str(out)],
-            capture_output=True,
-            env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-        assert all(c.isprintable() or c == "\n" for c in done.stderr.decode("utf-8"))
-        assert out.is_file()
-        assert read_candidate(out).radiance.shape == (2, 2, 3)
-        if suffix == ".exr":
-            written = read_exr(out)[1]["scene"]
-            assert written == rt.Scene.load(scene).name
-            assert written.isprintable()
 
 
 # ---- archives -----------------------------------------------------------------------------------

@@ -337,7 +337,7 @@ def test_a_method_without_enough_time_is_absent(monkeypatch):
     monkeypatch.setattr(run, "Stable", Stable)
     monkeypatch.setattr(run, "reference_of", lambda *_: EXACT)
     settings = Settings(
-        time_limit=9.0, size=(16, 12), max_spp=16, starts=False, crops=False,
+        time_limit=9.0, size=(16, 12), max_spp=16, crops=False,
         only=("ours", "mitsuba_llvm", "mitsuba_scalar"),
     )  # fmt: skip
     found = run.converge(scene, settings)

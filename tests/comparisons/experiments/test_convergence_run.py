@@ -25,7 +25,7 @@ from comparisons.experiments.convergence.methods import (
 )
 from comparisons.experiments.convergence.outputs import COLUMNS, write_results, write_table
 from comparisons.experiments.convergence.page import write_page
-from comparisons.experiments.convergence.run import converge, prepared
+from comparisons.experiments.convergence.run import prepared
 from comparisons.experiments.convergence.store import (
     COUNT,
     Settings,
@@ -77,7 +77,7 @@ def program(*arguments: object):
     return CliRunner().invoke(app, ["converge", *map(str, arguments)])
 
 
-FAST = ("--size", "16x12", "--time-limit", "3600", "--no-starts", "--max-spp", "16")
+FAST = ("--size", "16x12", "--time-limit", "3600", "--max-spp", "16")
 
 
 @pytest.mark.slow
@@ -196,10 +196,8 @@ def test_times_to_an_error(own_cache, counted_time):
     for one in found.values():
         # Between two rungs, the line through logarithms lies above the seconds of the samples.
         assert one.seconds.value == pytest.approx(START + PER_SAMPLE * one.spp, rel=0.1)
-    times = convergence.time_to_error(scene, 0.3, 1.0)
-    assert times == {name: one.seconds.value for name, one in found.items()}
     with pytest.raises(ValueError, match="deterministic"):
-        convergence.time_to_error(Scene.load(SCENES / "whitted_classic.yaml"), 0.1, 1.0)
+        convergence.reached(Scene.load(SCENES / "whitted_classic.yaml"), 0.1, 1.0)
 
 
 # ---- parts --------------------------------------------------------------------------------------
@@ -256,16 +254,6 @@ def test_page_escapes_what_comes_from_outside(tmp_path):
     write_table(tmp_path / "results.csv", [curves])
     assert json.loads((tmp_path / "results.json").read_text())["scenes"][0]["left_out"] == ["a & b"]
     assert EXACT.relmse == pytest.approx((weights(TRUE) * 1e-8).mean())
-
-
-@pytest.mark.slow
-def test_starts_are_timed(own_cache):
-    """Two processes: the first compiles, the second finds the kernels."""
-    settings = Settings(time_limit=0.5, size=(12, 12), max_spp=8, only=("ours",), crops=False)
-    found = converge(Scene.load(SCENES / "cornell_box.yaml"), settings).starts
-    cold, warm = found["ours"]["cold"], found["ours"]["warm"]
-    assert cold["compile"] > 3.0 * warm["compile"] > 0.0
-    assert warm["start"] > 0.1
 
 
 def test_other_commands_do_not_wait_for_it():

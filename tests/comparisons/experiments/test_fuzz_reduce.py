@@ -3,7 +3,6 @@
 import pytest
 
 from comparisons.experiments.fuzz import assets
-from comparisons.experiments.fuzz.check import without_textures
 from comparisons.experiments.fuzz.fields import types_in
 from comparisons.experiments.fuzz.finding import Grammar, shapes_of, text_of
 from comparisons.experiments.fuzz.generate import generate, parse
@@ -104,14 +103,3 @@ def test_unused_parts_go():
     assert [*found["textures"]] == ["t"]
     assert "groups" not in found
     assert "lights" not in found
-
-
-@pytest.mark.slow
-def test_plain_scenes_have_no_textures(files):
-    for number in range(8):
-        scene = generate(4, number, Grammar(("textures", "bump", "principled")), files)
-        plain = without_textures(scene)
-        parse(plain, number, files)
-        names = {name for _, name in types_in(plain)}
-        assert not names & {"bitmap", "checker", "vertex_colours", "bump", "normal_map"}
-        assert len(plain.get("shapes", ())) == len(scene["shapes"])

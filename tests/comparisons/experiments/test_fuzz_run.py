@@ -191,14 +191,6 @@ def test_another_renderer_is_compared_with_ours(tmp_path, wrong):
         assert finding.rung == "statistics"
 
 
-@pytest.mark.slow
-def test_a_run_of_two_minutes_finds_nothing(tmp_path):
-    """Two minutes of a core, for the same scenes on any machine."""
-    found = run(Plan(tmp_path, seed=20260101, count=60, workers=Threads(2), shrink=0.0), quiet)
-    assert found.findings == []
-    assert sorted(found.scenes) == [*range(60)]
-
-
 REGRESSIONS = sorted((SCENES / "regressions").glob("*.yaml"))
 
 

@@ -9,8 +9,7 @@ from typer.testing import CliRunner
 
 from comparisons.commands import register
 from comparisons.experiments.methods import outputs, run
-from comparisons.experiments.methods.run import Effort
-from comparisons.experiments.methods.trials import FAMILIES, SERIES, Draw, methods
+from comparisons.experiments.methods.run import FAMILIES, SERIES, Draw, Effort, methods
 from reference_rt import textbook
 
 TINY = Effort(rays=256, runs=3)

@@ -10,7 +10,6 @@ from comparisons.experiments.selftest.fault import PACKAGE, run_worker
 from comparisons.experiments.selftest.mutation import (
     FEW_RAYS,
     PLAIN,
-    SCENES,
     WORKER,
     Fate,
     by_few_rays,
@@ -48,14 +47,6 @@ def test_mutants_are_one_change_each_and_python() -> None:
         a, b = ast.unparse(right).splitlines(), ast.unparse(tree).splitlines()
         assert len(a) == len(b)
         assert sum(x != y for x, y in zip(a, b, strict=True)) == 1, mutant
-
-
-@pytest.mark.slow
-def test_the_seed_decides() -> None:
-    places = functions_of(PACKAGE)
-    one, same, other = (mutants(PACKAGE, places, 5, seed) for seed in (1, 1, 2))
-    assert one == same
-    assert one != other
 
 
 @pytest.mark.parametrize(
@@ -114,8 +105,3 @@ def test_few_rays_catch_mutants_of_spheres_and_a_copy_without_a_change_is_the_sa
     assert "caught" in {by_few_rays(mutant, before).outcome for mutant in found}
     same = found[0]._replace(text=(PACKAGE / found[0].file).read_text(encoding="utf-8"))
     assert by_few_rays(same, before).outcome == "same"
-
-
-def test_the_scenes_exist() -> None:
-    assert all((ROOT / "scenes" / f"{name}.yaml").is_file() for name in SCENES)
-    assert len(set(SCENES)) == len(SCENES)

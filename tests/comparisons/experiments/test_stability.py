@@ -4,9 +4,7 @@ import csv
 import json
 import math
 import os
-import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -24,11 +22,9 @@ from comparisons.experiments.stability.harness.core import (
     Outcome,
     Series,
     Sweep,
-    generator,
     outcome,
 )
 from comparisons.experiments.stability.harness.outputs import summarise
-from comparisons.runs.engine import store
 
 
 @pytest.fixture
@@ -81,24 +77,6 @@ def test_the_page_can_be_read_by_everybody(fakes, tmp_path, check_page):
     check_page(tmp_path / "stability.html")
 
 
-@pytest.mark.slow
-def test_what_was_found_is_kept_and_the_same_again(fakes, tmp_path):
-    stability(tmp_path, "--family", "T1")
-    first = json.loads((tmp_path / "results.json").read_text())
-    _, told = stability(tmp_path, "--family", "T1")
-    assert told.count("measured before") == 4
-    assert json.loads((tmp_path / "results.json").read_text())["families"] == first["families"]
-    # The command of a setting draws what the whole run drew.
-    setting = first["families"][0]["series"][0]["settings"][1]
-    words = setting["again"].split()[2:]
-    assert stability(tmp_path / "again", *words)[0] == 0
-    again = json.loads((tmp_path / "again" / "results.json").read_text())
-    alone = again["families"][0]["series"][0]["settings"]
-    assert [one["outcomes"] for one in alone] == [setting["outcomes"]]
-    _, told = stability(tmp_path, "--family", "T1", "--seed", "2")
-    assert "measured before" not in told
-
-
 def test_failures_of_ours_fail_and_are_told(fakes, tmp_path):
     code, told = stability(tmp_path, "--family", "T3")
     assert code == 1
@@ -139,31 +117,6 @@ def test_usage(fakes, tmp_path, options, said):
     assert said in told
 
 
-@pytest.mark.slow
-def test_an_end_of_the_run_keeps_what_was_found(fakes, tmp_path):
-    """SIGTERM in the midst: the first setting is kept, and no process stays behind."""
-    script = (
-        "import stability_fakes, signal, sys; stability_fakes.install();"
-        "from comparisons.experiments.stability.harness import run;"
-        "run.WORKER = ('stability_fakes',);"
-        "signal.signal(signal.SIGTERM, lambda *_: sys.exit(3));"
-        "from reference_rt.cli.main import main; main()"
-    )
-    command = [sys.executable, "-c", script, "stability", "-o", str(tmp_path), "--family", "T4"]
-    process = subprocess.Popen([*command, "--no-mitsuba"], stderr=subprocess.DEVNULL)
-    kept = tmp_path / "settings" / "T4" / "slow" / "0.25.json"
-    while not kept.exists():
-        assert process.poll() is None
-        time.sleep(0.05)
-    process.terminate()
-    assert process.wait() == 3
-    code, told = stability(
-        tmp_path, "--family", "T4", "--no-mitsuba", "--series", "slow", "--at", "0.25"
-    )
-    assert code == 0
-    assert "measured before" in told
-
-
 def test_outcomes_add_up_and_refuse_nonsense():
     both = Outcome(3, 1, 2.0, 1, ({"a": 1},)) + Outcome(4, 0, None, 2)
     assert both == Outcome(7, 1, 2.0, 3, ({"a": 1},))
@@ -194,12 +147,6 @@ def test_rows_of_the_first_failures_are_shown():
     assert [example["number"] for example in found.examples] == [1, 3, 4]
 
 
-def test_settings_are_drawn_apart():
-    draws = [generator(1, "F1", "far", x).random() for x in (1.0, 10.0)]
-    draws += [generator(2, "F1", "far", 1.0).random(), generator(1, "F1", "rim", 1.0).random()]
-    assert len(set(draws)) == 4
-
-
 def test_a_lead_that_is_too_small_must_be_explained():
     """Ours twice as far as Mitsuba is less than 29 bits allow."""
     found = [
@@ -216,13 +163,3 @@ def test_a_lead_that_is_too_small_must_be_explained():
         assert one.unexplained == (not explained)
         assert outputs.where(one, OURS) == "holds to float64's end, 4"
         assert outputs.where(one, "mitsuba") == "fails from 4 on"
-
-
-def test_found_is_read_with_its_key_alone(tmp_path):
-    found = Found("T", "far", 0.1, {OURS: Outcome(2, 1, math.inf, 0, ({"t": "inf"},))}, 1.5)
-    store(tmp_path / "x.json", "key", found)
-    assert Found.read(tmp_path / "x.json", "key") == found
-    assert Found.read(tmp_path / "x.json", "other") is None
-    assert Found.read(tmp_path / "y.json", "key") is None
-    (tmp_path / "x.json").write_text("{")
-    assert Found.read(tmp_path / "x.json", "key") is None

@@ -1,7 +1,5 @@
 """All families say what they measure and hold; why Mitsuba's float32 holds as far as it does."""
 
-import importlib
-
 import pytest
 from stability_runs import measured
 
@@ -23,21 +21,7 @@ NAMES = tuple(MODULES)
 
 
 def test_families_come_in_order():
-    assert [family(name).id for name in NAMES] == [f"F{k}" for k in range(1, 15)]
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_family_says_what_it_measures(name):
-    """Its folder's docstring: the law, its ranges, how many cases, and what passes."""
-    said = importlib.import_module(
-        f"comparisons.experiments.stability.{MODULES[name]}"
-    ).__doc__.lower()
-    one = family(name)
-    assert said.startswith(f"{one.id.lower()}:")
-    assert one.law
-    assert one.anchors
-    for words in (("law",), ("range",), ("count",), ("passes",)):
-        assert any(word in said for word in words), words
+    assert [family(name).id for name in NAMES] == [f"F{k}" for k in range(1, 14)]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -75,7 +59,7 @@ def test_ours_holds_everywhere(name, series, tmp_path):
     for k, x in enumerate(x for x in one.values if x <= one.holds_to):
         folder = tmp_path / str(k)
         folder.mkdir()
-        found = measured(name, series, x, folder, full=name in ("F9", "F14"))[OURS]
+        found = measured(name, series, x, folder, full=name == "F9")[OURS]
         assert found.failures == 0, (x, found.examples)
 
 

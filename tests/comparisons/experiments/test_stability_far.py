@@ -10,7 +10,7 @@ import reference_rt as rt
 from comparisons.experiments.stability.far import FAMILY as F1
 from comparisons.experiments.stability.far import curved, spheres
 from comparisons.experiments.stability.far.spheres import BAND, Truth, gaps, judge_by_moving
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, U
+from comparisons.experiments.stability.harness.core import OURS, U
 from comparisons.experiments.stability.harness.steps import Rays
 from comparisons.experiments.stability.roots import ferrari, judge, numpy_roots, of_quadratics
 
@@ -117,24 +117,6 @@ def test_kernels_asked_are_what_scenes_find():
     assert np.isfinite(hits.t).sum() > 300
     found = hits.p[np.isfinite(hits.t)]
     assert np.all(np.abs(found - row["center"][0]) <= 1.25 * (1.0 + 8.0 * U) + 8.0 * U)
-
-
-def test_mitsuba_takes_part(tmp_path):
-    pytest.importorskip("mitsuba")
-    near = drawn("F1", "body", 1.0, 200, tmp_path, mitsuba=True)[MITSUBA]
-    assert near.cases > 150
-    assert near.failures == 0
-    assert drawn("F1", "offset", 1e6, 200, tmp_path, mitsuba=True)[MITSUBA].failures > 20
-    assert MITSUBA in drawn("F1", "ellipsoid", 1.0, 40, tmp_path, mitsuba=True)
-
-
-def test_pictures_show_what_is_wrong():
-    shoot = F1.by_name["body"].shoot
-    red = (200, 30, 30)
-    for who, wrong in ((OURS, False), ("sphere.algebraic", True)):
-        shot = shoot(who, 1e8)
-        assert shot.pixels.shape == (192, 192, 3)
-        assert bool(np.all(shot.pixels == red, axis=2).sum() > 100) == wrong
 
 
 # ---- F8 -----------------------------------------------------------------------------------------

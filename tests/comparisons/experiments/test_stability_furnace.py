@@ -11,9 +11,14 @@ import numpy as np
 import pytest
 from stability_runs import measured
 
+from comparisons.experiments.stability import bsdfs, radiometry
 from comparisons.experiments.stability import furnaces as f10_furnaces
-from comparisons.experiments.stability.bsdfs import digits, samples
-from comparisons.experiments.stability.bsdfs.digits import density_between, fresnel, masking
+from comparisons.experiments.stability.bsdfs import (
+    density_between,
+    fresnel,
+    masking,
+    samples,
+)
 from comparisons.experiments.stability.harness.bsdfs import Bsdf, Ours, Samples, towards
 from comparisons.experiments.stability.harness.core import (
     OURS,
@@ -22,7 +27,7 @@ from comparisons.experiments.stability.harness.core import (
     of_errors,
     relative,
 )
-from comparisons.experiments.stability.radiometry import lights, solid_angles
+from comparisons.experiments.stability.radiometry import solid_angles
 from reference_rt.lights.emitters import point
 
 
@@ -105,7 +110,7 @@ def test_faults_of_materials_are_seen(
 def test_the_text_books_fresnel_in_our_place_is_seen(
     series: str, x: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(digits, "_ours", digits._textbook)
+    monkeypatch.setattr(bsdfs, "_ours", bsdfs._textbook)
     assert run("F11", series, x, 2_000).failures > 0
 
 
@@ -114,14 +119,14 @@ def test_a_faulty_point_light_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
         right = point.sample(points, i, p)
         return right._replace(radiance=right.radiance * (1.0 + 4e-15))
 
-    monkeypatch.setattr(lights, "point", SimpleNamespace(sample=sample))
+    monkeypatch.setattr(radiometry, "point", SimpleNamespace(sample=sample))
     assert run("F12", "point light", 1e3).failures > 0
 
 
 def test_wide_spots_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = lights.spot.falloff
+    right = radiometry.spot.falloff
     wrong = SimpleNamespace(falloff=lambda table, i, w: min(1.0, right(table, i, w) * 1.01))
-    monkeypatch.setattr(lights, "spot", wrong)
+    monkeypatch.setattr(radiometry, "spot", wrong)
     assert run("F12", "spot", 1e6).failures > 0
 
 

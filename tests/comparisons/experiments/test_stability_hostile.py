@@ -1,7 +1,6 @@
 """The families of hostile values and of solids: planted faults are seen, and attributed."""
 
 import contextlib
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -149,11 +148,6 @@ def test_hostile_scenes_in_plain_python(tmp_path):
     found = list(answers(scenes, by="plain"))
     assert [problem(a, s) for a, s in zip(found, scenes, strict=True)] == [None] * len(scenes)
     assert {answer.exit for answer in found} == {0, 3}
-
-
-def test_limits_of_time_differ(monkeypatch):
-    assert worker.PLAIN_SECONDS > worker.SECONDS
-    assert sys.executable
 
 
 # ---- hostile rays --------------------------------------------------------------------------------

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from stiff_scenes import FOLDER, STIFF, scene
+from stiff_scenes import scene
 
 from comparisons.mitsuba.translate import load
 from comparisons.mitsuba.translate.moved import frame_of, moved
@@ -31,14 +31,6 @@ def camera_hits(
 
 
 # ---- the scenes ---------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", STIFF)
-def test_each_says_what_is_stiff(name: str) -> None:
-    text = (FOLDER / f"{name}.yaml").read_text(encoding="utf-8")
-    assert text.startswith("# Stiff: ")
-    assert "To look for:" in text.split("description:")[0].replace("\n# ", " ")
-    assert scene(name).description
 
 
 def test_the_planets_horizon_is_where_it_must_be() -> None:

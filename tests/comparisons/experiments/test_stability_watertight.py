@@ -9,13 +9,11 @@ import stability_runs
 
 import reference_rt as rt
 from comparisons.experiments.stability import hierarchy, watertight
-from comparisons.experiments.stability import slivers as f04
 from comparisons.experiments.stability import watertight as f03
 from comparisons.experiments.stability.harness import meshes
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, U
+from comparisons.experiments.stability.harness.core import OURS, Draw, U
 from comparisons.experiments.stability.slivers.judge import DISTANCES, RING, Judge, Question
-from comparisons.experiments.stability.watertight import by_method, crossings
-from reference_rt import textbook
+from comparisons.experiments.stability.watertight import crossings
 
 # Cases have triangles without area on purpose: what a mesh leaves out is no news here.
 pytestmark = pytest.mark.filterwarnings("ignore::reference_rt.util.errors.SceneWarning")
@@ -84,20 +82,6 @@ def _parts(mesh):
     return mesh.vertices, mesh.faces
 
 
-@pytest.mark.slow
-def test_text_book_methods_leak():
-    """At edges, where neighbours do not compute the same; the watertight one does not."""
-    rng = np.random.default_rng(3)
-    mesh = meshes.noisy(rng)
-    o, d = meshes.from_inside(rng, mesh, 600)
-    lost = {
-        name: int((~by_method(name, mesh)(o[600:], d[600:])).sum())
-        for name in textbook.names("triangle")
-    }
-    assert lost.pop("triangle.watertight") == 0
-    assert all(n > 0 for n in lost.values()), lost
-
-
 def test_seams_of_something_else_are_seen():
     """Rays that hit nothing, or another shape than they start in."""
     case = watertight.drawn(np.random.default_rng(0), ("box", "sphere"), 1.0, 50)
@@ -106,15 +90,6 @@ def test_seams_of_something_else_are_seen():
     found = watertight.judged(case, SimpleNamespace(shape=shape, t=np.full(100, math.inf)))
     assert (found.cases, found.failures) == (100, 2)
     assert found.examples[1]["found"] == "shape 0 at t = inf"
-
-
-@pytest.mark.slow
-def test_mitsuba_leaks_without_the_robust_flag_and_in_groups(tmp_path):
-    found = measured(tmp_path, "F3", "offset", 1.0, 4000, mitsuba=True)
-    assert found[OURS].failures == 0
-    for name in ("mitsuba, not robust", "mitsuba, instanced"):
-        assert found[name].failures > 0.005 * found[name].cases
-    assert found[MITSUBA].failures < 1e-3 * found[MITSUBA].cases
 
 
 # ---- slivers ------------------------------------------------------------------------------------
@@ -164,29 +139,6 @@ def test_distances_of_other_shapes(kind):
     top = 1.0 if kind == "boxes" else 0.0
     p = np.array([[1.25, 0.0, 0.0], [0.5, 0.0, top + 0.25], [1.0, 0.0, top]], np.longdouble)
     assert DISTANCES[kind](row, p).tolist() == [0.25, 0.25, 0.0]
-
-
-@pytest.mark.slow
-def test_the_text_book_fails_on_slivers_and_under_grazing_rays(tmp_path):
-    """Cramer's rule names points that are not on the triangle; so did ours before edge functions
-    that cancel were worked out exactly."""
-    sliver = measured(tmp_path, "F4", "aspect", 1e12, 400)
-    grazing = measured(tmp_path, "F4", "grazing", 1e15, 2000)
-    assert sliver["triangle.two_step"].failures > 0
-    assert grazing["triangle.cramer"].failures > 0
-    assert grazing["triangle.watertight"].failures > 0
-    assert grazing[OURS].failures == 0
-    assert max(sliver[OURS].worst, grazing[OURS].worst) < 3.0  # of 144
-
-
-@pytest.mark.slow
-def test_pictures():
-    ours = f04.FAMILY.by_name["grazing"].shoot(OURS, 1e6)
-    assert "0 lost (white), 0 false (orange), 0 elsewhere (red)" in ours.caption
-    assert ours.pixels.shape == (192, 192, 3)
-    cramer = f03.FAMILY.by_name["offset"].shoot("triangle.cramer", 1.0)
-    assert (cramer.pixels == 255).all(axis=2).sum() > 50
-    assert not (f03.FAMILY.by_name["offset"].shoot(OURS, 1.0).pixels == 255).any()
 
 
 # ---- hierarchies --------------------------------------------------------------------------------

@@ -1,11 +1,9 @@
 """The frame of Mitsuba's copy of a scene: moved and scaled where float32 needs it, only there."""
 
 import numpy as np
-import pytest
 from stiff_scenes import FOLDER, STIFF, scene
 
-import comparisons.mitsuba.translate
-from comparisons.geometry.frame import OURS, RAY_EPSILON, SHARE, Frame, frame_for
+from comparisons.geometry.frame import RAY_EPSILON, SHARE, Frame, frame_for
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.translate import load
 from comparisons.mitsuba.translate.moved import frame_of, moved
@@ -87,19 +85,6 @@ lights:
     # But for a ray or two that pass an edge on different sides.
     assert np.count_nonzero(np.abs(ours - theirs).max(axis=1) > 1e-9) <= 2
     assert np.allclose(d, d2, atol=1e-14)
-
-
-@pytest.mark.slow
-def test_far_away_agrees_when_moved_and_not_without(monkeypatch: pytest.MonkeyPatch) -> None:
-    far = scene("far_origin")
-    tables = build_tables(far)
-    counterpart = load(far)
-    assert not counterpart.frame.is_ours
-    assert "moved by minus" in counterpart.notes()[0]
-    rung = geometry(far, tables, counterpart, 300)
-    assert rung.status == "agree", rung.reason
-    monkeypatch.setattr(comparisons.mitsuba.translate, "frame_of", lambda _: OURS)
-    assert geometry(far, tables, load(far), 300).status != "agree"
 
 
 def test_a_fault_is_seen_in_a_moved_scene() -> None:

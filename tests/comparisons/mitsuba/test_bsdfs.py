@@ -210,9 +210,9 @@ SAMPLED: tuple[Material, ...] = (
 @pytest.mark.parametrize("material", SAMPLED, ids=lambda m: m.type)
 def test_counterparts_draw_what_they_say(material: Material) -> None:
     """The mean of the weights of those that are written here is the integral of what they give."""
-    import drjit as dr
-
     mi = mitsuba()
+    import drjit as dr  # after the choice of its LLVM
+
     if mi.variant().startswith("scalar"):
         pytest.skip("a million samples, one at a time")
     bsdf = mi.load_dict(translate_material(material, TranslationContext({}, {}, Path())))

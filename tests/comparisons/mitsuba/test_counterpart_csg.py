@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from counterparts import coarse_meshes
 
-from comparisons.geometry.flatten import Tree
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import trace
-from comparisons.mitsuba.csg import evaluated
 from comparisons.mitsuba.translate import load
 from comparisons.rungs import geometry
 from reference_rt.rendering.scene import Scene
@@ -52,18 +50,6 @@ def scalar() -> Iterator[None]:
     mi.set_variant("scalar_rgb")
     yield
     mi.set_variant(chosen)
-
-
-def test_operations_on_states() -> None:
-    states = np.array([[False, True, False, True], [False, False, True, True]])
-    for operation, expected in (
-        ("union", [False, True, True, True]),
-        ("intersection", [False, False, False, True]),
-        ("difference", [False, True, False, False]),
-    ):
-        assert evaluated(Tree(operation, (0, 1)), states).tolist() == expected
-    nested = Tree("difference", (Tree("union", (0, 1)), Tree("intersection", (0, 1))))
-    assert evaluated(nested, states).tolist() == [False, True, True, False]
 
 
 LAWS = (
@@ -175,25 +161,6 @@ def test_a_crowd_of_instances() -> None:
         geometry(scene, build_tables(scene), load(instanced_group(1.001)), pixels=100).status
         == "differ"
     )
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("coarse", "scalar")
-@pytest.mark.parametrize(
-    "shapes",
-    [
-        ("{type: cylinder, radius: 0.5}", "{type: cone, transform: [{translate: [2, 0, 0]}]}"),
-        ("{type: sphere, transform: [{scale: [1, 2, 0.5]}]}", HALF),
-        (RING, "{type: disk, transform: [{scale: [1, 2, 1]}]}"),
-        (solid("difference", BOX, BALL, ROD),),
-    ],
-)
-def test_counterparts_in_the_scalar_variant(shapes: tuple[str, ...]) -> None:
-    scene = scene_of(*shapes)
-    rung = geometry(scene, build_tables(scene), load(scene), pixels=60)
-    assert rung.status in ("agree", "reference-limited"), rung.reason
-    assert rung.numbers["decided_ours"] == 0
-    assert rung.numbers["hits"] > 30
 
 
 MESH = (

@@ -56,9 +56,9 @@ class TheirBsdf:
         self.bsdf = mitsuba().load_dict(translate_material(scene.materials[name], around))
 
     def place(self, wo: Any, u: Any, v: Any) -> Any:
-        import drjit as dr
-
         mi = mitsuba()
+        import drjit as dr  # after the choice of its LLVM
+
         si = dr.zeros(mi.SurfaceInteraction3f)
         si.t, si.wi, si.uv = 1.0, wo, mi.Point2f(u, v)
         si.n, si.dp_du, si.dp_dv = mi.Normal3f(0, 0, 1), mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)

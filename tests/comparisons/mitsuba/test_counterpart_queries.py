@@ -125,9 +125,9 @@ def test_crossings_are_repeated_ray_intersections(shapes: Scene) -> None:
 
 def reference_point(p: Any) -> Any:
     """What Mitsuba samples lights for."""
-    import drjit as dr
-
     mi = mitsuba()
+    import drjit as dr  # after the choice of its LLVM
+
     it = dr.zeros(mi.SurfaceInteraction3f)
     it.t, it.p, it.n = 1.0, mi.Point3f(p), mi.Normal3f(0.0, 1.0, 0.0)
     it.sh_frame = mi.Frame3f(it.n)

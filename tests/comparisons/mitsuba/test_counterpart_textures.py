@@ -46,9 +46,9 @@ TEXTURES: tuple[Texture, ...] = (
 
 
 def interaction(u: Any, v: Any) -> Any:
-    import drjit as dr
-
     mi = mitsuba()
+    import drjit as dr  # after the choice of its LLVM
+
     si = dr.zeros(mi.SurfaceInteraction3f)
     si.t, si.uv = 1.0, mi.Point2f(u, v)
     return si

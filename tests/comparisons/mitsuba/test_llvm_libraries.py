@@ -3,11 +3,9 @@
 import os
 import shutil
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
-from packaging.requirements import Requirement
 
 from comparisons.mitsuba import backend
 from comparisons.mitsuba import llvm_libraries as libraries
@@ -74,19 +72,6 @@ def test_only_the_users_own_is_tried_where_one_is_named(
     monkeypatch.setenv(libraries.LIBRARY, "/some/libLLVM.so")
     assert libraries.candidates() == ["/some/libLLVM.so"]
     assert libraries.needed_by("/some/libLLVM.so") == []
-
-
-def test_the_wheel_is_asked_for_where_there_is_one() -> None:
-    """As exactly as Mitsuba, whose pictures it compiles, and nowhere that pip would find none."""
-    text = (Path(__file__).parents[3] / "pyproject.toml").read_text(encoding="utf-8")
-    extras = tomllib.loads(text)["project"]["optional-dependencies"]
-    (asked,) = (r for r in map(Requirement, extras["compare"]) if r.name == libraries._WHEEL)
-    assert [s.operator for s in asked.specifier] == ["=="]
-    assert asked.marker is not None
-    linux = {"sys_platform": "linux", "platform_machine": "x86_64"}
-    assert asked.marker.evaluate(linux)
-    assert not asked.marker.evaluate(linux | {"platform_machine": "aarch64"})
-    assert not asked.marker.evaluate(linux | {"sys_platform": "darwin"})
 
 
 def test_a_library_of_the_wheel_that_fails_leaves_it_to_the_systems(

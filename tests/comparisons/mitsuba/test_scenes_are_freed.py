@@ -84,16 +84,6 @@ def test_counterparts(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["a solid", "a mask", "a lamp of triangles"])
-def test_counterparts_in_the_fast_variant(name: str, tmp_path: Path) -> None:
-    scene = SCENES[name](tmp_path)
-    mi = mitsuba()
-    before = objects(mi)
-    use(scene, load(scene))
-    assert objects(mi) == before
-
-
-@pytest.mark.slow
 def test_files_of_users(tmp_path: Path) -> None:
     """As the reference of a comparison, which has our integrator for masks."""
     write_xml(SCENES["a mask"](tmp_path), tmp_path / "scene.xml")
@@ -102,14 +92,3 @@ def test_files_of_users(tmp_path: Path) -> None:
     before = objects(mi)
     picture(own_scene(scene), 1, 0)
     assert objects(mi) == before
-
-
-@pytest.mark.slow
-def test_what_stays_is_seen() -> None:
-    mitsuba()
-    with scalar() as mi:
-        before = objects(mi)
-        found = load(view(LEAF)(Path()))
-        found.mi_scene.integrator().kept = found.mi_scene
-        del found
-        assert objects(mi) > before

@@ -5,7 +5,6 @@ from itertools import product
 
 import numpy as np
 import pytest
-from builders import same_in_plain_python
 from bvh_checks import (
     BUILDERS,
     METHODS,
@@ -232,35 +231,6 @@ def test_cuts_stay_in_the_reference():
     spatial.cut(v, 0, box, 1, -5.0, parts)
     assert parts.left[0] == np.inf
     assert parts.left[3] == -np.inf
-
-
-# ---- plain Python -------------------------------------------------------------------------------
-
-
-def trees():
-    """Small ones of every kind, of ordinary and of extreme sizes."""
-    inputs = {
-        "small": small_triangles(40),
-        "slivers": slivers(40, 0.2),
-        "strips": strips(40),
-        "huge": 1e307 * small_triangles(30),
-        "tiny": 1e-309 * small_triangles(30),
-    }
-    return {
-        f"{name} {method} {k}": array
-        for (name, corners), method in product(inputs.items(), METHODS)
-        for nodes, references in [build(corners, method)]
-        for k, array in enumerate((*nodes, references))
-    }
-
-
-def write_trees(_folder, file):
-    np.savez(file, **trees())
-
-
-@pytest.mark.slow
-def test_plain_python_makes_the_same_bits(tmp_path):
-    assert len(same_in_plain_python(write_trees, tmp_path).files) == 5 * len(METHODS) * 4
 
 
 # ---- many ---------------------------------------------------------------------------------------

@@ -87,36 +87,3 @@ def test_help_says_in_forty_lines_what_the_fields_mean():
     assert " load, " in pydoc.render_doc(rt.Scene, renderer=pydoc.plaintext)
     assert "model_validate" not in pydoc.render_doc(rt.Scene, renderer=pydoc.plaintext)
     assert "model_validate" in dir(rt.Scene)
-
-
-def test_a_docstring_of_ones_own_replaces_an_inherited_one():
-    inherited = rt.RoughPlastic.model_fields["nonlinear"].description
-    assert rt.Plastic.model_fields["nonlinear"].description.startswith(inherited)
-    assert rt.Plastic.model_fields["nonlinear"].description != inherited
-    assert "`sphere`" in rt.Sphere.model_fields["type"].description
-
-
-def test_a_class_without_a_source_file_has_no_texts():
-    names = {}
-    code = "class Typed(Description):\n    x: float = 1.0\n    'Not in a file.'\n"
-    exec(code, {"Description": Description, "__name__": "typed_at_a_prompt"}, names)
-    assert field_texts(names["Typed"]) == {}
-    assert names["Typed"].model_fields["x"].description is None
-
-
-class Local(Description):
-    """Defined in a module of its own."""
-
-    x: float = 1.0
-    """Here."""
-
-
-def test_classes_of_other_modules_have_texts():
-    class Inner(Local):
-        y: float = 1.0
-        """There."""
-
-    assert {n: f.description for n, f in Inner.model_fields.items()} == {
-        "x": "Here.",
-        "y": "There.",
-    }

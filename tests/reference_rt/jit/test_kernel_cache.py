@@ -191,14 +191,6 @@ def test_a_function_of_no_file_is_compiled(kept):
     assert list(kept.folder.iterdir()) == [kept.path]
 
 
-def test_a_function_forgets_its_own_kernels(kept):
-    other = entry_kernel(lambda x: None)
-    other(np.ones(1))
-    kept.dispatcher._cache.flush()
-    assert not kept.is_found()
-    assert is_compiled(entry_kernel(other.py_func), SIGNATURE)
-
-
 # ---- the folder ---------------------------------------------------------------------------------
 
 

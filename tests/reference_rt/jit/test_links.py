@@ -2,7 +2,6 @@
 
 import gc
 import itertools
-import linecache
 import weakref
 from typing import Any
 
@@ -19,7 +18,6 @@ from linked_tables import (
     linked,
     of_pair,
     pairs,
-    product,
     tables_of,
     use_pair,
     values,
@@ -144,11 +142,6 @@ def test_parameters_with_names_of_the_generated_text_are_refused(name):
         Linkable().operation(names["operation"])
 
 
-def test_names_and_docstrings_are_kept():
-    assert (product.__name__, product.__module__) == ("product", "linked_tables")
-    assert product.__doc__ == "The product."
-
-
 @kernel
 def _one_if_absent(table: Any) -> int:
     return 1 if is_absent(table) else 0
@@ -167,11 +160,3 @@ def test_a_link_to_nothing_is_absent(table, expected):
     out = np.full(1, -1, np.int64)
     _absent(table, out)
     assert bool(out[0]) == expected
-
-
-@needs_jit
-def test_tracebacks_name_the_operation_of_a_link():
-    through = by_code.operations["value"].through_link("tables", "kind", kernel(values_of))
-    assert through.__code__.co_filename == "<linked_tables.value through a link>"
-    shown = linecache.getlines(through.__code__.co_filename)
-    assert shown[:2] == ["def value(tables, kind, i, x):\n", "    code = kind\n"]

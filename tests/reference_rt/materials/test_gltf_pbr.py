@@ -59,16 +59,6 @@ def test_the_specification_without_extensions_has_an_f0_of_4_percent():
     assert value == pytest.approx([0.04 / (4 * math.pi * 0.5**4)] * 3, rel=16 * U)
 
 
-def test_black_behind():
-    table = GltfPbr(metallic=0.5).tabulate(NO_TEXTURES)
-    up, down = towards(0.5, 1.0), towards(0.6, 2.0) * (1, 1, -1)
-    for a, b in ((down, up), (up, down), (down, down)):
-        value, density = evaluate(table, a, b)
-        assert not value.any()
-        assert not density.any()
-    assert not sample(table, down, np.full((1, 3), 0.5))[2].any()
-
-
 @pytest.mark.parametrize("metallic", [0.0, 0.5, 1.0])
 def test_lobes_are_drawn_as_often_as_they_shine(metallic):
     """No weight is above 2.  The largest of 7.5 million is 1.96 (measured), of a smooth white

@@ -4,7 +4,7 @@ densities are values.  Those of rough conductors and dielectrics: F11 of the sta
 import numpy as np
 import pytest
 from chi_square import sidak
-from leaf_checks import check_same_bits, check_weights, p_values
+from leaf_checks import check_same_bits, check_weights, evaluate, p_values, sample, towards
 from random_bsdfs import (
     NUMBERS,
     random_gltf,
@@ -21,6 +21,7 @@ from reference_rt.materials.bsdfs.principled import Principled
 from reference_rt.materials.bsdfs.rough_conductor import RoughConductor
 from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric
 from reference_rt.materials.bsdfs.rough_plastic import RoughPlastic
+from reference_rt.textures import NO_TEXTURES
 
 FEW_AND_MANY = (
     (random_phong, 65, (10, 200)),
@@ -63,6 +64,25 @@ def test_weight_times_density_is_the_value(materials, seed, condition):
     rng = np.random.default_rng(seed)
     for material, wo in materials:
         check_weights(material, wo, rng, condition, bends=material.type != "principled_thin")
+
+
+OPAQUE = [
+    *(material for material, _ in (*random_phong(4, 63), *random_plastic(4, 49))),
+    Principled(base_colour=0.8, sheen=1, clearcoat=1),
+    GltfPbr(metallic=0.5),
+    RoughConductor(eta=0.2, k=3.9),
+]
+
+
+@pytest.mark.parametrize("material", OPAQUE, ids=lambda material: material.type)
+def test_what_lets_no_light_pass_is_black_behind(material):
+    table, up, down = material.tabulate(NO_TEXTURES), towards(0.5, 1.0), -towards(0.6, 5.0)
+    for wo, wi in ((down, up), (up, down), (down, down)):
+        value, density = evaluate(table, wo, wi)
+        assert not value.any()
+        assert not density.any()
+    assert evaluate(table, up, up)[0].any()
+    assert not sample(table, down, np.full((1, 3), 0.5))[2].any()
 
 
 ONES = dict.fromkeys(NUMBERS, 1.0) | {"metallic": 0.0}

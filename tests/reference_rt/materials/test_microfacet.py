@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from builders import U, unit_vectors
+from builders import U
 from chi_square import chi_square, sidak
 from flint import arb, ctx
 from leaf_checks import vec_towards as towards
@@ -52,14 +52,6 @@ def _densities(kind, alpha, v, h, out):
     for i in range(len(h)):
         normal = Vec3(h[i, 0], h[i, 1], h[i, 2])
         out[i, 0], out[i, 1] = density(m, normal), visible_density(m, towards, normal)
-
-
-@entry_kernel
-def _maskings(kind, alpha, v, out):
-    m = Microfacets(kind, alpha[0], alpha[1])
-    for i in range(len(v)):
-        towards = Vec3(v[i, 0], v[i, 1], v[i, 2])
-        out[i, 0], out[i, 1] = g1(m, towards), g1_over_cos(m, towards)
 
 
 def draw(m, v, u):
@@ -176,21 +168,6 @@ def test_everything_is_finite(kind, alpha):
             assert math.isfinite(visible_density(m, v, h))
     assert half_vector(Vec3(1.0, 0.0, 0.0), Vec3(-1.0, 0.0, 0.0)).h == (0.0, 0.0, 0.0)
     assert density(m, Vec3(0.0, 0.0, 0.0)) == density(m, Vec3(0.0, 0.0, -1.0)) == 0.0
-
-
-def test_same_bits_as_plain_python():
-    rng = np.random.default_rng(16)
-    for m, v in random_cases(12, 17):
-        u = rng.uniform(0, 1, (200, 2))
-        normals = draw(m, v, u)
-        assert normals.tolist() == [list(sample_visible(m, v, *row)) for row in u.tolist()]
-        plain = [(density(m, Vec3(*h)), visible_density(m, v, Vec3(*h))) for h in normals.tolist()]
-        assert densities(m, v, normals).tolist() == [list(pair) for pair in plain]
-        directions = unit_vectors(rng, 200)
-        out = np.empty((200, 2))
-        _maskings(m.kind, np.array(m[1:]), directions, out)
-        plain = [(g1(m, Vec3(*d)), g1_over_cos(m, Vec3(*d))) for d in directions.tolist()]
-        assert out.tolist() == [list(pair) for pair in plain]
 
 
 def test_alpha_of_a_description():

@@ -97,17 +97,6 @@ def test_reciprocity():
         assert (there > 0).all()
 
 
-def test_one_sided():
-    for material, wo in random_plastic(4, 49):
-        table = material.tabulate(NO_TEXTURES)
-        below, up = -wo, towards(0.5, 1.0)
-        for a, b in ((below, up), (up, below), (below, below)):
-            value, density = evaluate(table, a, b)
-            assert not value.any()
-            assert not density.any()
-        assert not sample(table, below, np.full((1, 3), 0.5))[2].any()
-
-
 @pytest.mark.parametrize("eta", [1.2, 1.5, 2.4, 0.8])
 def test_the_linear_base_sends_back_its_reflectance(eta):
     """rho (1 - F(wo)) exactly: the mean of 1 - F over wi is (1 - F_int) eta²."""

@@ -126,14 +126,6 @@ def test_the_diffuse_parts_closed_forms():
             assert found == pytest.approx(expected, rel=32 * U, abs=32 * U)
 
 
-def test_black_behind_without_transmission():
-    table = Principled(base_colour=0.8, sheen=1, clearcoat=1).tabulate(NO_TEXTURES)
-    up, down = towards(0.5, 1.0), towards(0.6, 2.0) * (1, 1, -1)
-    for a, b in ((down, up), (up, down), (down, down)):
-        assert not evaluate(table, a, b)[0].any()
-    assert not sample(table, down, np.full((1, 3), 0.5))[2].any()
-
-
 GRID = (1.0, 0.5, 0.1, 0.01)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from builders import U, cube, same_in_plain_python, unit_vectors, write_obj
+from builders import U, cube, unit_vectors, write_obj
 from every_shape import GROUPS, kinds, tilted
 
 import reference_rt as rt
@@ -210,19 +210,6 @@ def test_few_shapes_without_a_hierarchy():
         assert getattr(found, name).tobytes() == getattr(other, name).tobytes(), name
     assert set(found.shape) == {0, 1, 2}
     assert found.count.max() >= 6
-
-
-def write_crossings(_folder, file):
-    rng = np.random.default_rng(7)
-    o = 3.0 * unit_vectors(rng, 40)
-    found = FEW.crossings(o, rng.uniform(-0.8, 0.8, (40, 3)) - o)
-    np.savez(file, **{name: getattr(found, name) for name in (*FIELDS, "first")})
-
-
-@pytest.mark.slow
-def test_plain_python_gives_the_same_bits(tmp_path):
-    compiled = same_in_plain_python(write_crossings, tmp_path)
-    assert len(compiled["t"]) > 40
 
 
 def test_rays_that_are_none_cross_nothing(forms):

@@ -9,7 +9,6 @@ from scipy import ndimage
 
 import reference_rt as rt
 from reference_rt.core.vec3 import Vec3, luminance
-from reference_rt.jit.kernel import entry_kernel
 from reference_rt.scene.build import build_tables
 from reference_rt.textures import (
     AnyTexture,
@@ -334,37 +333,3 @@ def test_parameters(tmp_path):
     assert number_at(palette.numbers(0.7), 0, at) == 0.7
     with pytest.raises(ValueError, match=r"values up to 0.9; expected at most 0.5"):
         palette.numbers("checks", most=0.5)
-
-
-@entry_kernel
-def _look_up(textures, colour, u, v, out):
-    for i in range(len(u)):
-        k = i % len(textures.kind)
-        at = At(textures, u[i], v[i], Vec3(colour[0], colour[1], colour[2]))
-        out[i, 0], out[i, 1], out[i, 2] = lookup(k, at)
-        out[i, 3], out[i, 4] = lookup_gradient(k, at)
-
-
-def test_compiled_and_plain_give_the_same_bits(tmp_path):
-    uv = UvMap(scale=(5.0, 3.0), rotate=77.0, offset=(0.3, 0.1))
-    textures = tables_of(
-        tmp_path,
-        a=raw(uv=uv),
-        b=raw("nearest", "mirror"),
-        c=raw(wrap="clamp"),
-        d=Checker(uv=uv),
-        e=VertexColours(),
-        f=raw(wrap=("mirror", "repeat"), uv=uv),
-        g=raw(cutoff=0.5),
-        h=rt.Product(of=("a", "d"), factor=(0.3, 0.2, 0.1)),
-    )
-    rng = np.random.default_rng(18)
-    u, v = rng.uniform(-1, 2, (2, 600)) * 10.0 ** rng.uniform(-3, 3, (2, 600))
-    u[:24] = np.repeat([0.0, 1.0, 1e18, math.nan], 6)
-    out = np.zeros((600, 5))
-    colour = np.array([-1.0, -1.0, -1.0])
-    _look_up(textures, colour, u, v, out)
-    for i in range(600):
-        at = At(textures, float(u[i]), float(v[i]), NO_COLOUR)
-        plain = (*lookup(i % 8, at), *lookup_gradient(i % 8, at))
-        assert np.array_equal(out[i], plain), i

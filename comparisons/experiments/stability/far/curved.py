@@ -24,9 +24,9 @@ from comparisons.experiments.stability.harness.core import (
     pixel_grid,
 )
 from comparisons.experiments.stability.harness.steps import Rays, matrix
+from comparisons.geometry.affine import across, unit_vectors
 from comparisons.geometry.exact.dyadic import Dyadic
 from comparisons.geometry.frame import round32
-from comparisons.geometry.vectors import across, unit_vectors
 from comparisons.mitsuba.backend import scalar
 from reference_rt.core.arrays import IntArray
 from reference_rt.core.transform import Transform, rotate

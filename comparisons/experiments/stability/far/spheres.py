@@ -16,6 +16,7 @@ from comparisons.experiments.stability.harness.core import (
     plain,
 )
 from comparisons.experiments.stability.harness.steps import Rays, traced
+from comparisons.geometry.affine import across, unit_vectors
 from comparisons.geometry.exact import KINDS, first_of
 from comparisons.geometry.exact.dyadic import (
     FRACTION,
@@ -27,7 +28,6 @@ from comparisons.geometry.exact.dyadic import (
     nearest,
 )
 from comparisons.geometry.frame import round32
-from comparisons.geometry.vectors import across, unit_vectors
 from comparisons.mitsuba.backend import scalar
 from reference_rt import textbook
 from reference_rt.core.vec3 import row

@@ -334,7 +334,6 @@ MODULES = {
     "F11": "bsdfs",
     "F12": "radiometry",
     "F13": "contact",
-    "F14": "determinism",
 }
 
 

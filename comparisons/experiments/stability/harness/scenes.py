@@ -1,4 +1,4 @@
-"""The scenes that F9 and F14 render, and pictures that must have the same bits.
+"""The scenes that F9 renders, and pictures that must have the same bits.
 
 All coordinates are multiples of 1/64 below 8 (where shapes are turned: of their centres), so that
 whole-number offsets up to 2^46 and factors 2^k move a scene exactly, in float64; in float32 up to
@@ -17,9 +17,9 @@ from reference_rt.textures.texture import UvMap
 
 if TYPE_CHECKING:
     import trimesh
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
-from comparisons.experiments.stability.harness.core import Draw, FloatArray, Outcome, outcome
+from comparisons.experiments.stability.harness.core import FloatArray, Outcome, outcome
 from comparisons.geometry.exact.dyadic import BoolArray
 
 SIZE = 4.0
@@ -239,17 +239,3 @@ def of_pixels(wrong: BoolArray, pictures: Mapping[str, FloatArray], worst: float
     y, x = (index.ravel() for index in np.indices(wrong.shape))
     columns = {name: pixels.reshape(wrong.size, -1) for name, pixels in pictures.items()}
     return outcome(wrong.ravel(), {"pixel": np.column_stack([x, y]), **columns}, worst=worst)
-
-
-MAKES = (path, whitted)
-
-
-def over(draw: Draw, pair: Callable[[rt.Scene, str], tuple[FloatArray, FloatArray]]) -> Outcome:
-    """Of both scenes;  pair(scene, its name): two pictures that must be the same."""
-    pairs = (pair(make(draw.folder), make.__name__) for make in MAKES)
-    return sum((same_bits(*pictures) for pictures in pairs), Outcome(0, 0))
-
-
-def on_threads(scene: rt.Scene, threads: int = 1) -> FloatArray:
-    """The picture."""
-    return rt.render(scene, threads=threads).colour

@@ -52,7 +52,7 @@ from comparisons.experiments.stability.harness.core import (
     decades,
     pixel_grid,
 )
-from comparisons.experiments.stability.harness.leaving import EPSILON, PIXELS, lit, picture
+from comparisons.experiments.stability.harness.steps import EPSILON, PIXELS, light_picture, lit
 from comparisons.experiments.stability.leaving.judge import Judge, Tally
 from comparisons.experiments.stability.leaving.shapes import (
     KINDS,
@@ -90,7 +90,7 @@ def shoot(contestant: str, kind: str, extent: Extent, draw: Draw) -> Shot:
         f"{contestant}: a {kind} in sunlight, {dark:,} of {int((found[:, 0] >= 0.0).sum()):,} "
         "points in shadow"
     )
-    return Shot(picture(found), caption)
+    return Shot(light_picture(found), caption)
 
 
 def _frame(placed: Placed) -> FloatArray:

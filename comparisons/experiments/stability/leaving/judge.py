@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.experiments.stability.harness.core import EXAMPLES, Outcome, hexed
-from comparisons.experiments.stability.harness.leaving import CONTACT
+from comparisons.experiments.stability.harness.steps import CONTACT
 from comparisons.experiments.stability.leaving.shapes import (
     KINDS,
     Departures,

@@ -13,12 +13,17 @@ import trimesh
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness.core import Draw
-from comparisons.experiments.stability.harness.leaving import bound, ray_leaving
 from comparisons.experiments.stability.harness.meshes import write_obj
-from comparisons.experiments.stability.harness.steps import loaded, matrix, vector
+from comparisons.experiments.stability.harness.steps import (
+    bound,
+    loaded,
+    matrix,
+    ray_leaving,
+    vector,
+)
+from comparisons.geometry.affine import unit_vectors
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.frame import round32
-from comparisons.geometry.vectors import unit_vectors
 from comparisons.mitsuba.backend import mitsuba
 from reference_rt import shapes as any_shape
 from reference_rt.accel.geometry import Geometry, closest_hit, surface

@@ -52,9 +52,9 @@ from comparisons.experiments.stability.harness.scenes import SIZE, same_bits
 from comparisons.experiments.stability.harness.steps import matrix
 from comparisons.experiments.stability.metamorphic import light, rays
 from comparisons.experiments.stability.metamorphic.rays import Outcomes
+from comparisons.geometry.affine import unit_rows
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.frame import round32
-from comparisons.geometry.vectors import unit_rows
 from reference_rt.shapes.csg import FAR
 from reference_rt.util.files import temporary_folder
 

@@ -20,12 +20,12 @@ from comparisons.experiments.stability.harness.core import (
 from comparisons.experiments.stability.harness.scenes import GRID
 from comparisons.experiments.stability.harness.solids import Truth, truths
 from comparisons.experiments.stability.harness.steps import traced
+from comparisons.geometry.affine import unit_rows
 from comparisons.geometry.exact.dyadic import BoolArray, nearest
 from comparisons.geometry.exact.referee import Referee
 from comparisons.geometry.exact.referee import Truth as First
 from comparisons.geometry.frame import round32
 from comparisons.geometry.sizes import ShapeSizes
-from comparisons.geometry.vectors import unit_rows
 from comparisons.mitsuba.backend import scalar
 from comparisons.rungs.rays.arbiter import directions
 from reference_rt.core.arrays import IntArray

@@ -24,8 +24,8 @@ from comparisons.experiments.stability.harness.core import (
     unit_of,
 )
 from comparisons.experiments.stability.harness.meshes import mitsuba_mesh
+from comparisons.geometry.affine import unit_vectors
 from comparisons.geometry.frame import round32
-from comparisons.geometry.vectors import unit_vectors
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from reference_rt.core.vec3 import row

@@ -29,10 +29,10 @@ from comparisons.experiments.stability.harness.core import (
     outcome,
 )
 from comparisons.experiments.stability.harness.steps import any_turn, scaled
+from comparisons.geometry.affine import unit_rows
 from comparisons.geometry.exact import first_hit
 from comparisons.geometry.exact.dyadic import BoolArray, Dyadic, cross
 from comparisons.geometry.frame import round32
-from comparisons.geometry.vectors import unit_rows
 from reference_rt.core import transform
 
 # ---- random slivers, and rays that graze ---------------------------------------------------------

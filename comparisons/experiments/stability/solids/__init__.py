@@ -63,7 +63,7 @@ from comparisons.experiments.stability.solids.trees import (
     placed,
     rewritten,
 )
-from comparisons.geometry.vectors import unit_vectors
+from comparisons.geometry.affine import unit_vectors
 from reference_rt.core import transform
 from reference_rt.shapes.meshes.files import read_mesh
 from reference_rt.util.files import temporary_folder

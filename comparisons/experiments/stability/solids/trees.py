@@ -9,7 +9,7 @@ import numpy as np
 import reference_rt as rt
 from comparisons.experiments.stability.harness.meshes import BALL
 from comparisons.experiments.stability.harness.steps import at, scaled, turned, vector
-from comparisons.geometry.vectors import unit_vectors
+from comparisons.geometry.affine import unit_vectors
 
 Tree = int | tuple[str, "Tree", "Tree"]
 """The number of a shape, or ("|", "&" or "-", a, b)."""
