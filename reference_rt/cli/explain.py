@@ -77,7 +77,7 @@ def _shapes(tables: SceneTables, used: Lines, pruned: Lines) -> None:
             pruned.append((field, "the scene has none: their kernels are not compiled"))
         else:
             size = sum(a.nbytes for a in table if a is not None)
-            used.append((field, f"{len(table.owner):,} ({_bytes(size)})"))
+            used.append((field, f"{len(table.face):,} ({_bytes(size)})"))
     triangles = tables.geometry.shapes.triangles
     if triangles is not None:
         for column, name, otherwise in (
@@ -130,7 +130,7 @@ def _named_meshes(scene: Scene) -> Iterator[tuple[str, Mesh]]:
 def _hierarchy(scene: Scene, tables: SceneTables, used: Lines, pruned: Lines) -> None:
     hierarchy = tables.geometry.bvh
     shapes = tables.geometry.shapes
-    count = sum(len(table.owner) for table in shapes if table is not None)
+    count = sum(len(table.face) for table in shapes if table is not None)
     if hierarchy is None:
         reason = f"{count} primitives: brute force is faster"
         pruned.append(("hierarchy", reason))

@@ -284,7 +284,7 @@ def _pictures(scene: Scene, tree: Tree) -> Iterator[str]:
     size = max(1, round(width * scale)), max(1, round(height * scale))
     picture = render(casting, size=size)
     shapes = scene.tables.geometry.shapes
-    count = sum(len(table.owner) for table in shapes if table is not None)
+    count = sum(len(table.face) for table in shapes if table is not None)
     words = {
         "colour": "the scene without light",
         "bvh_steps": "nodes of the hierarchy that each pixel's ray is tested against",

@@ -30,6 +30,7 @@ from reference_rt.jit.numba_codegen import call_llvm, data_of, nothing
 VECTOR_WIDTH = 8
 """The vector width: eight float64 are one AVX-512 register."""
 
+LANES = range(VECTOR_WIDTH)
 I32, I64 = ir.IntType(32), ir.IntType(64)
 F64_VECTOR = ir.VectorType(ir.DoubleType(), VECTOR_WIDTH)
 
@@ -92,6 +93,10 @@ class SimdVector:
         undefined = ir.Constant(F64_VECTOR, ir.Undefined)
         return SimdVector(self.builder, self.builder.shuffle_vector(self.value, undefined, which))
 
+    def first_lanes(self, n: int) -> Mask:
+        bits = ir.Constant(ir.VectorType(ir.IntType(1), VECTOR_WIDTH), [k < n for k in LANES])
+        return Mask(self.builder, bits)
+
     def compared(self, how: str, other: Any) -> Mask:
         return Mask(self.builder, self.builder.fcmp_ordered(how, self.value, self.of(other)))
 
@@ -127,6 +132,11 @@ def select(condition: Any, a: Any, b: Any) -> Any:
     if isinstance(condition, np.ndarray):
         return np.where(condition, a, b)
     return a if condition else b
+
+
+def first_lanes(x: Any, n: int) -> Any:
+    """The condition that holds in the first n lanes of the vector x."""
+    return x.first_lanes(n) if isinstance(x, SimdVector) else np.array(LANES) < n
 
 
 def smaller(a: Any, b: Any) -> Any:

@@ -351,7 +351,7 @@ def _met(ray: Ray, any_hit: bool, scene: SceneTables) -> dict[str, Any]:
     """The `steps` and `tests` of a ray that is traced alone."""
     geometry = scene.geometry
     if geometry.bvh is None:
-        count = sum(len(table.owner) for table in geometry.shapes if table is not None)
+        count = sum(len(table.face) for table in geometry.shapes if table is not None)
         return {"steps": [], "tests": count}
     steps: list[tuple[int, Any]] = []
     tests: list[int] = []

@@ -48,6 +48,7 @@ from reference_rt.materials.textured import textured_table, uses_textures
 from reference_rt.scene.build_geometry import assemble
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes import TABLES as SHAPE_TABLES
+from reference_rt.shapes.meshes.triangle_table import shared
 from reference_rt.textures import TABLES as TEXTURE_TABLES
 from reference_rt.textures import Colours, Palette, Product, Textures, bitmap, product
 from reference_rt.textures.parameter import join
@@ -261,12 +262,16 @@ def build_tables(scene: SceneModel) -> SceneTables:
     textures, palette = _texture_tables(scene)
     with np.errstate(over="ignore", invalid="ignore"):  # checked afterwards: not finite
         geometry = assemble(scene, numbers)
-        return SceneTables(
-            geometry=geometry,
-            materials=material_tables(scene, palette, _has_material(geometry, numbers[None])),
-            lights=light_tables(scene, geometry, palette),
-            textures=textures,
-        )
+        materials = material_tables(scene, palette, _has_material(geometry, numbers[None]))
+        lights = light_tables(scene, geometry, palette)
+        return SceneTables(_with_shared_ids(geometry), materials, lights, textures)
+
+
+def _with_shared_ids(geometry: Geometry) -> Geometry:
+    shapes = geometry.shapes
+    if shapes.triangles is None:
+        return geometry
+    return geometry._replace(shapes=shapes._replace(triangles=shared(shapes.triangles)))
 
 
 def _has_material(geometry: Geometry, number: int) -> bool:

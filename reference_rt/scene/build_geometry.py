@@ -103,7 +103,7 @@ class _Assembly:
         table = shape.tabulate(place)
         code = _CODES[type(table)]
         first = self.rows[code]
-        self.rows[code] += len(table.owner)
+        self.rows[code] += len(table.face)
         self.tables[code].append(table)
         return TableRows(code, np.arange(first, self.rows[code]))
 

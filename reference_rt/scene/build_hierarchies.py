@@ -232,6 +232,8 @@ def _distinct(kinds: IntArray) -> list[int]:
 def _first_named(rows: IntArray, count: int) -> IntArray:
     """A permutation of range(count): first those in rows (m,), in the order of their first
     occurrence, then the rest."""
+    if len(rows) == count and np.bincount(rows, minlength=count).max(initial=0) <= 1:
+        return rows  # all of them once, as in a mesh: sorting a million takes 60 ms
     first = np.full(count, len(rows))
     # Backwards, so that the first of several occurrences wins.
     first[rows[::-1]] = np.arange(len(rows))[::-1]

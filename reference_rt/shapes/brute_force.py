@@ -103,7 +103,7 @@ def nearest_in_table(kind: int, table: Any, ray: Any, closest: Hit) -> Hit:
     """The nearest of `closest` and all primitives of a table, one at a time."""
     if table is None:
         return closest
-    for i in range(len(table.owner)):
+    for i in range(len(table.face)):
         found: Crossing = intersect_row(table, i, ray)
         if found.t < closest.t:
             closest = Hit(found.t, kind, i, found.u, found.v, -1)
@@ -120,7 +120,7 @@ def nearer_spheres(
 ) -> None:
     """VECTOR_WIDTH rays, from number `at` on, against all spheres; updates t and codes."""
     if spheres is not None:
-        for i in range(len(spheres.owner)):
+        for i in range(len(spheres.face)):
             shape = (row(spheres.center, i), spheres.radius[i])
             sphere.nearer(rays.numbers, at, shape, SPHERE * KIND + i, t, codes)
 
@@ -131,7 +131,7 @@ def nearer_rectangles(
 ) -> None:
     """The same for rectangles."""
     if table is not None:
-        for i in range(len(table.owner)):
+        for i in range(len(table.face)):
             place = (row(table.center, i), row(table.normal, i))
             shape = (*place, row(table.x_of, i), row(table.y_of, i))
             rectangle.nearer(rays.numbers, at, shape, RECTANGLE * KIND + i, t, codes)
@@ -143,7 +143,7 @@ def nearer_boxes(
 ) -> None:
     """The same for boxes."""
     if boxes is not None:
-        for i in range(len(boxes.owner)):
+        for i in range(len(boxes.face)):
             box.nearer(rays.numbers, at, box.arguments(boxes, i), BOX * KIND + i, t, codes)
 
 

@@ -17,6 +17,7 @@ from reference_rt.shapes.shape import (
     LightPoint,
     Spans,
     Tangents,
+    in_column,
     no_spans,
     one_span,
 )
@@ -70,7 +71,7 @@ def enters(shapes: Shapes, kind: int, i: int, shear: Shear) -> int:
 
 @kernel
 def _owner_of_row(table: Any, i: int) -> int:
-    return int(table.owner[i])
+    return in_column(table.owner, i)
 
 
 @by_code(lambda module: _owner_of_row)
@@ -138,7 +139,7 @@ def _of_quadric(shapes: Shapes, kind: int, i: int, ray: Ray) -> Spans:
 
 @kernel
 def _rows(table: Any) -> int:
-    return len(table.owner)
+    return len(table.face)
 
 
 @by_code(lambda module: _rows)

@@ -115,6 +115,12 @@ def pack(*columns: FloatArray) -> FloatArray:
 
 
 @kernel
+def in_column(column: Any, i: int) -> int:
+    """Number i of a column of integers of any size; a column of one row has that one for all."""
+    return int(np.int64(column[min(i, len(column) - 1)]))
+
+
+@kernel
 def lane_vector(packets: FloatArray, packet: int, column: int, lane: int) -> Vec3:
     """Three columns of one lane of a packet."""
     return Vec3(

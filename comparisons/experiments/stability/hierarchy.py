@@ -288,7 +288,7 @@ def named(tables: SceneTables, found: Closest) -> FloatArray:
         mine = found.kind == code
         if mine.any():
             table = getattr(tables.geometry.shapes, field)
-            owner[mine] = table.owner[found.row[mine]]
+            owner[mine] = table.owner[np.minimum(found.row[mine], len(table.owner) - 1)]
             face[mine] = table.face[found.row[mine]]
     return np.column_stack([found.t, found.kind, owner, face, found.uv])
 

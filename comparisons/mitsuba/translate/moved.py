@@ -171,7 +171,8 @@ def _by_corners(table: Triangles) -> Soup:
         None if column is None else column.reshape(3 * len(table.face), -1)
         for column in (table.normals, table.uvs, table.colours)
     )
-    return Soup(table.vertices.reshape(-1, 3), normals, uvs, colours, numbers=table.face)
+    numbers = table.face.astype(np.int64)
+    return Soup(table.vertices.reshape(-1, 3), normals, uvs, colours, numbers=numbers)
 
 
 def _rounded(soup: Soup, material: str | None, frame: Frame) -> tuple[Mesh, float]:

@@ -19,8 +19,10 @@ from reference_rt.accel.bvh import top_down
 from reference_rt.accel.bvh.nodes import (
     FAR_SLACK,
     LEAF_SIZE,
+    REF_FLOATS,
     STACK_SIZE,
     Nodes,
+    aligned,
     half_area,
 )
 from reference_rt.accel.bvh.wide import (
@@ -91,17 +93,18 @@ def build(
       cut.
     - "none": one leaf with everything.
     """
-    primitives = np.concatenate([lower, upper], axis=1)
+    n = len(lower)
+    primitives = aligned(n + 1, REF_FLOATS)
+    primitives[:n, :3], primitives[:n, 3:6] = lower, upper
     # With sizes near the largest float, areas and extents overflow: a worse tree, not a wrong one.
     with np.errstate(over="ignore", invalid="ignore"):
         if method == "none":
             box = np.concatenate([lower.min(axis=0), upper.max(axis=0)])
-            n = len(lower)
             return Nodes(box[None], np.zeros(1, np.int64), np.full(1, n)), np.arange(n)
         if method == "median":
-            return top_down.build_median(primitives)
+            return top_down.build_median(primitives[:n])
         if method == "sah":
             return top_down.build_sah(primitives, None)
         if corners is None:
-            corners = np.full((len(lower), 9), np.nan)
+            corners = np.full((n, 9), np.nan)
         return top_down.build_sah(primitives, np.ascontiguousarray(corners))

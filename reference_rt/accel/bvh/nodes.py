@@ -3,14 +3,23 @@
 A box is six numbers, lower corner and upper corner; an empty one is +inf and -inf.
 """
 
-from typing import NamedTuple
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import UNIT_ROUNDOFF
 from reference_rt.jit.kernel import entry_kernel, kernel
+from reference_rt.jit.simd import VECTOR_WIDTH, simd_kernel
 
+T = TypeVar("T")
+U = TypeVar("U")
+
+REF_FLOATS = VECTOR_WIDTH
+"""Size of a builder's reference: a box, and two more numbers, so that it is a vector."""
 LEAF_SIZE = 4
 """The most references of a leaf, except for the method "none": more are always split, fewer where
 that is cheaper."""
@@ -99,12 +108,33 @@ def push(jobs: IntArray, top: int, a: int, b: int, c: int) -> int:
     return top + 1
 
 
+@simd_kernel
+def _exchange(refs: Any, i: Any, j: Any) -> Any:
+    one, other = refs.load(i), refs.load(j)
+    refs.store(i, other)
+    refs.store(j, one)
+    return one < 0.0
+
+
 @kernel
 def swap(refs: FloatArray, ids: IntArray, i: int, j: int) -> None:
-    """Exchanges references i and j: boxes (m, 6) and primitives' indices (m,)."""
-    for k in range(6):
-        refs[i, k], refs[j, k] = refs[j, k], refs[i, k]
+    """Exchanges references i and j: boxes (m + 1, REF_FLOATS) and primitives' indices (m,)."""
+    _exchange(refs, REF_FLOATS * i, REF_FLOATS * j)
     ids[i], ids[j] = ids[j], ids[i]
+
+
+def on_threads(run: Callable[[T], U], items: Sequence[T]) -> list[U]:
+    """What `run` returns for each item, on as many threads as there are cores; kernels run without
+    the GIL."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return [*pool.map(run, items)]
+
+
+def aligned(n: int, k: int) -> FloatArray:
+    """(n, k) zeros, aligned to cache lines: with k a multiple of 8, so is each row."""
+    memory = np.zeros(n * k + 8)
+    skipped = (-memory.ctypes.data % 64) // 8
+    return memory[skipped : skipped + n * k].reshape(n, k)
 
 
 def new_nodes(m: int) -> Nodes:

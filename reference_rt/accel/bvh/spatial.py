@@ -6,13 +6,13 @@ from typing import NamedTuple
 import numpy as np
 
 from reference_rt.accel.bvh.bins import (
+    ALL_BINS,
     BINS,
     Bins,
     Split,
     bin_of,
     bins_per_unit,
     cheapest_plane,
-    empty_bins,
     no_split,
 )
 from reference_rt.accel.bvh.nodes import (
@@ -28,6 +28,7 @@ from reference_rt.accel.bvh.nodes import (
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import UNIT_ROUNDOFF
 from reference_rt.jit.kernel import kernel
+from reference_rt.jit.simd import VECTOR_WIDTH
 
 MOST_REFERENCES = 2
 """The most references, as a multiple of the number of primitives."""
@@ -99,7 +100,7 @@ def is_worth_a_try(
     if split.axis < 0:
         return True
     a = split.axis
-    low, scale = centers[a], bins_per_unit(centers[a], centers[3 + a])
+    low, scale = centers[a], bins_per_unit(centers[a], centers[VECTOR_WIDTH + a])
     clear(parts.left_node)
     clear(parts.right_node)
     for k in range(begin, end):
@@ -179,10 +180,9 @@ def best_cut(
     for axis in range(3):
         low, high = box[axis], box[3 + axis]
         if bins_per_unit(low, high) > 0.0:
-            empty_bins(bins, axis)
             for k in range(begin, end):
                 _fill_bins(corners, ids[k], refs[k], axis, low, high, bins)
-            split = cheapest_plane(bins, axis, end - begin, spare, side)
+            split = cheapest_plane(bins, axis, ALL_BINS, bins.leave, end - begin, spare, side)
             if split.cost < best.cost:
                 best = split
     return best

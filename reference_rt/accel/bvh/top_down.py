@@ -5,6 +5,8 @@ The SAH builder splits each node at the cheapest of many planes (Wald 2007, "On 
 SAH-based bounding volume hierarchies", RT'07), with or without spatial splits.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from reference_rt.accel.bvh import spatial
@@ -13,27 +15,31 @@ from reference_rt.accel.bvh.bins import (
     Split,
     bin_of,
     bins_per_unit,
+    grow_bounds,
     new_bins,
     no_split,
     object_split,
 )
 from reference_rt.accel.bvh.nodes import (
     LEAF_SIZE,
+    REF_FLOATS,
     SAH_DEPTH,
     STACK_SIZE,
     Nodes,
+    aligned,
+    assign,
     center,
-    clear,
     fit,
     half_area,
-    merge,
     new_nodes,
+    on_threads,
     push,
     swap,
     trimmed,
 )
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.jit.kernel import entry_kernel, kernel, local_floats
+from reference_rt.jit.simd import VECTOR_WIDTH
 
 
 @entry_kernel
@@ -86,7 +92,7 @@ def build_median(primitives: FloatArray) -> tuple[Nodes, IntArray]:
     """Nodes and references for primitives with boxes (n, 6), in O(n log n) for any input.  Of equal
     centres that of the primitive with the lower index counts as smaller."""
     n = len(primitives)
-    centers = 0.5 * primitives[:, :3] + 0.5 * primitives[:, 3:]
+    centers = 0.5 * primitives[:, :3] + 0.5 * primitives[:, 3:6]
     ordered = np.ascontiguousarray(np.argsort(centers, axis=0, kind="stable").T)
     goes_left, waiting = np.empty(n, np.int64), np.empty(n, np.int64)
     jobs, nodes = np.empty((STACK_SIZE, 3), np.int64), new_nodes(n)
@@ -103,42 +109,34 @@ triangles are no faster."""
 
 
 @kernel
-def _bound(refs: FloatArray, begin: int, end: int, box: FloatArray, centers: FloatArray) -> None:
-    """Computes the bounds of references, and those of their centres."""
-    clear(box)
-    clear(centers)
-    for k in range(begin, end):
-        ref = refs[k]
-        merge(box, ref)
-        for a in range(3):
-            c = center(ref, a)
-            centers[a] = min(centers[a], c)
-            centers[3 + a] = max(centers[3 + a], c)
-
-
-@kernel
 def _partition(
-    refs: FloatArray, ids: IntArray, begin: int, end: int, centers: FloatArray, split: Split
+    refs: FloatArray, ids: IntArray, begin: int, end: int, bounds: FloatArray, split: Split
 ) -> int:
-    """Reorders references, the right child's first; the index of the left child's first one."""
+    """Reorders references, the right child's first; the index of the left child's first one.  It
+    exchanges each of them, whether or not it has to, because branches would be mispredicted."""
     a = split.axis
-    low, scale = centers[a], bins_per_unit(centers[a], centers[3 + a])
-    i, j = begin, end - 1
-    while i <= j:
-        if bin_of(center(refs[i], a), low, scale) > split.bin:
-            i += 1
-        elif bin_of(center(refs[j], a), low, scale) <= split.bin:
-            j -= 1
-        else:
-            swap(refs, ids, i, j)
-            i += 1
-            j -= 1
-    return i
+    low, high = bounds[VECTOR_WIDTH + a], bounds[2 * VECTOR_WIDTH + a]
+    scale, middle = bins_per_unit(low, high), begin
+    for k in range(begin, end):
+        is_right = bin_of(center(refs[k], a), low, scale) > split.bin
+        swap(refs, ids, middle, k)
+        middle += is_right
+    return middle
+
+
+class _Task(NamedTuple):
+    """A subtree to build, over a node's references begin ... end;  `limit`: nodes of at most this
+    many are left to others."""
+
+    begin: int
+    end: int
+    depth: int
+    limit: int
 
 
 @entry_kernel
 def _split_all(
-    n: int,
+    task: _Task,
     refs: FloatArray,
     ids: IntArray,
     corners: FloatArray | None,
@@ -147,29 +145,44 @@ def _split_all(
     parts: spatial.Parts,
     nodes: Nodes,
     references: IntArray,
-) -> tuple[int, int]:
-    """Fills nodes and references; returns how many of each.
+    left_out: IntArray,
+) -> tuple[int, int, int]:
+    """Fills nodes and references; returns how many nodes there are, where its references end, and
+    how many nodes are left to others: their numbers, begins, ends and depths are in `left_out`.
 
-    refs (m, 6), ids (m,): boxes and primitives of n references, with room for more.  They are a
-    stack: the current node has the last ones; its left child's are moved to the end and processed
-    first, and a leaf pops its own.
+    refs (m + 1, REF_FLOATS), ids (m,): boxes and primitives of n references, with room for more.
+    They are a stack: the current node has the last ones; its left child's are moved to the end and
+    processed first, and a leaf pops its own.
     """
-    side, centers = local_floats(6), local_floats(6)
-    end, budget = n, len(ids) - n
-    count, used, top = 1, 0, push(jobs, 0, 0, n, 0)
+    side, bounds = local_floats(VECTOR_WIDTH), local_floats(3 * VECTOR_WIDTH)
+    end, budget = task.end, len(ids) - task.end
+    used = 0 if corners is not None else budget
+    count, top, left = 1, push(jobs, 0, 0, task.end - task.begin, task.depth), 0
     while top > 0:
         top -= 1
         node, size, depth = jobs[top, 0], jobs[top, 1], jobs[top, 2]
         begin = end - size
+        if size <= task.limit:
+            left_out[left, 0], left_out[left, 1] = node, begin
+            left_out[left, 2], left_out[left, 3] = end, depth
+            left, used, end = left + 1, used + size, begin
+            continue
+        for k in range(3):
+            bounds[k], bounds[3 + k] = np.inf, -np.inf
+        for k in range(VECTOR_WIDTH):
+            bounds[VECTOR_WIDTH + k], bounds[2 * VECTOR_WIDTH + k] = np.inf, -np.inf
+        for k in range(begin, end):
+            grow_bounds(refs, REF_FLOATS * k, bounds)
         box = nodes.boxes[node]
-        _bound(refs, begin, end, box, centers)
+        assign(box, bounds)
         split, plane = no_split(), no_split()
-        if size > 1 and depth < SAH_DEPTH:
-            split = object_split(refs, begin, end, centers, bins, side)
+        # Two references are never worth a split, but their centres are those of one.
+        if size > 2 and depth < SAH_DEPTH:
+            split = object_split(refs, begin, end, bounds[VECTOR_WIDTH:], bins, side)
             if corners is not None:
                 root = nodes.boxes[0]
                 if budget > 0 and spatial.is_worth_a_try(
-                    refs, begin, end, centers, split, root, parts
+                    refs, begin, end, bounds[VECTOR_WIDTH:], split, root, parts
                 ):
                     # The node's share of the room that is left, rounded up.
                     spare = (budget * size + end - 1) // end
@@ -191,30 +204,67 @@ def _split_all(
                 budget -= new_end - end
                 end = new_end
         if split.axis >= 0 and not begin < middle < end:
-            middle = _partition(refs, ids, begin, end, centers, split)
+            middle = _partition(refs, ids, begin, end, bounds, split)
         if not begin < middle < end:
             middle = (begin + end) // 2
         nodes.first[node], nodes.size[node] = count, 0
         top = push(jobs, top, count + 1, middle - begin, depth + 1)
         top = push(jobs, top, count, end - middle, depth + 1)
         count += 2
-    return count, used
+    return count, used, left
+
+
+APART = 1 << 14
+"""Nodes of more references are split one by one, and those of fewer with all that is below them,
+on threads: the same tree whatever the number of threads."""
 
 
 def build_sah(primitives: FloatArray, corners: FloatArray | None) -> tuple[Nodes, IntArray]:
-    """Nodes and references for primitives with boxes (n, 6), which are reordered.  With corners (n,
-    9), see `reference_rt.accel.bvh.build`, spatial splits may cut them, into at most
-    spatial.MOST_REFERENCES n references."""
-    n = m = len(primitives)
+    """Nodes and references for primitives (n + 1, REF_FLOATS), n boxes and a row of any numbers,
+    which are reordered.  With corners (n, 9), see `reference_rt.accel.bvh.build`, spatial splits
+    may cut them, into at most spatial.MOST_REFERENCES n references."""
+    n = m = len(primitives) - 1
     refs = primitives
     if corners is not None:
         m = spatial.MOST_REFERENCES * n
-        refs = np.empty((m, 6))
-        refs[:n] = primitives
-    ids = np.arange(m)
-    nodes, references = new_nodes(m), np.empty(m, np.int64)
-    jobs = np.empty((STACK_SIZE, 3), np.int64)
-    count, used = _split_all(
-        n, refs, ids, corners, jobs, new_bins(), spatial.new_parts(), nodes, references
-    )
-    return trimmed(nodes, count), references[:used]
+        refs = aligned(m + 1, REF_FLOATS)
+        refs[:n] = primitives[:n]
+    ids, references, room = np.arange(m), np.empty(m, np.int64), new_nodes(m)
+
+    def build(task: _Task, nodes: Nodes) -> tuple[Nodes, int, IntArray]:
+        jobs, left_out = np.empty((STACK_SIZE, 3), np.int64), np.empty((2, 4), np.int64)
+        scratch = jobs, new_bins(), spatial.new_parts()
+        count, used, left = _split_all(
+            task, refs, ids, corners, *scratch, nodes, references, left_out
+        )
+        return trimmed(nodes, count), used, left_out[:left]
+
+    if corners is not None or n <= APART:
+        nodes, used, _ = build(_Task(0, n, 0, 0), room)
+        return nodes, references[:used]
+
+    def part(row: IntArray) -> tuple[Nodes, int, IntArray]:
+        _, begin, end, depth = row.tolist()
+        if end - begin > APART:
+            return build(_Task(begin, end, depth, end - begin - 1), new_nodes(2))
+        here = slice(2 * begin, 2 * end)
+        own = Nodes(room.boxes[here], room.first[here], room.size[here])
+        return build(_Task(begin, end, depth, 0), own)
+
+    # (number of its root, what to add to those of its other nodes, its nodes) of each part.
+    parts: list[tuple[int, int, Nodes]] = []
+    count, rows = 1, [np.array([0, 0, n, 0])]
+    while rows:
+        built = [*zip(rows, on_threads(part, rows), strict=True)]
+        rows = []
+        for row, (nodes, _, left_out) in built:
+            parts.append((int(row[0]), count - 1, nodes))
+            left_out[:, 0] += count - 1
+            rows += [*left_out]
+            count += len(nodes.first) - 1
+    joined = new_nodes(count // 2 + 1)
+    for root, more, nodes in parts:
+        nodes.first[nodes.size == 0] += more
+        for whole, part_of in zip(joined, nodes, strict=True):
+            whole[root], whole[more + 1 : more + len(part_of)] = part_of[0], part_of[1:]
+    return trimmed(joined, count), references

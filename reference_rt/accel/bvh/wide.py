@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from reference_rt.accel.bvh.nodes import STACK_SIZE, Nodes, half_area
+from reference_rt.accel.bvh.nodes import STACK_SIZE, Nodes, aligned, half_area, on_threads
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.jit.kernel import entry_kernel, kernel, local_integers
 from reference_rt.jit.simd import VECTOR_WIDTH
@@ -134,7 +134,7 @@ def joined(
     than MOST_REFERENCES."""
     if sum(map(len, rows)) > MOST_REFERENCES:
         raise ValueError(f"over {MOST_REFERENCES:,} primitives; expected fewer")
-    frames = _aligned(sum(len(tree.codes) for tree in trees))
+    frames = aligned(sum(len(tree.codes) for tree in trees), 32)
     boxes, children = frames.view(np.float32), frames.view(np.int32)
     node, reference = 0, 0
     for tree, of_tree in zip(trees, rows, strict=True):
@@ -153,18 +153,12 @@ def joined(
             codes >= 0, codes + node, codes
         )
         node, reference = here.stop, reference + len(of_tree)
-    codes = children[:, CHILDREN : CHILDREN + VECTOR_WIDTH].astype(np.int64)
     references = np.empty((sum(map(len, rows)), 2), np.int32)
     references[:, 0], references[:, 1] = np.concatenate(kinds), np.concatenate(rows)
-    corners = None if vertices is None else _corners_of(vertices, codes, references[:, 1])
+    corners = None
+    if vertices is not None:
+        corners = _corners_of(vertices, children, np.ascontiguousarray(references[:, 1]))
     return Bvh(boxes, children.reshape(-1), frames, references, corners, -1)
-
-
-def _aligned(n: int) -> FloatArray:
-    """(n, 32) zeros, aligned so that each row is four whole cache lines."""
-    memory = np.zeros((n + 1) * 32)
-    skipped = (-memory.ctypes.data % 64) // 8
-    return memory[skipped : skipped + 32 * n].reshape(n, 32)
 
 
 def _below(planes: FloatArray, center: FloatArray) -> Singles:
@@ -177,25 +171,32 @@ def _below(planes: FloatArray, center: FloatArray) -> Singles:
     return np.where(rounded > exact, lower, rounded).reshape(len(planes), -1)
 
 
-def _corners_of(vertices: FloatArray, codes: IntArray, rows: Codes) -> FloatArray | None:
-    """`Bvh.corners` for the triangle leaves among codes; rows (m,): each reference's row of
-    vertices (n, 9)."""
-    leaves = codes[(codes < NOTHING) & ((-1 - codes) & 1 == 1)]
-    if len(leaves) == 0:
+def _corners_of(vertices: FloatArray, children: Codes, rows: Codes) -> FloatArray | None:
+    """`Bvh.corners` for the triangle leaves among the children (n, NODE_SINGLES) of nodes; rows
+    (m,): each reference's row of vertices (n, 9)."""
+    codes = children[:, CHILDREN : CHILDREN + VECTOR_WIDTH]
+    if not ((codes < NOTHING) & ((-1 - codes) & 1 == 1)).any():
         return None
-    first, size = (-1 - leaves) >> 5, ((-1 - leaves) >> 1) & 15
     corners = np.zeros(9 * len(rows) + VECTOR_WIDTH)
-    for s in range(1, LEAF_SHARE + 1):
-        leaves = first[size == s][:, None]
-        for begin in range(0, len(leaves), _TOGETHER):
-            at = leaves[begin : begin + _TOGETHER]
-            lanes = vertices[rows[at + np.arange(s)]].transpose(0, 2, 1)
-            corners[9 * at + np.arange(9 * s)] = lanes.reshape(len(at), 9 * s)
+    blocks = [children[k : k + _TOGETHER] for k in range(0, len(children), _TOGETHER)]
+    on_threads(lambda block: _copy_corners(block, rows, vertices, corners), blocks)
     return corners
 
 
-_TOGETHER = 1 << 16
-"""Leaves whose corners are copied together: more only take more memory."""
+_TOGETHER = 1 << 10
+"""Nodes whose leaves' corners are copied by one call."""
+
+
+@entry_kernel
+def _copy_corners(children: Codes, rows: Codes, vertices: FloatArray, corners: FloatArray) -> None:
+    for node in range(len(children)):
+        for lane in range(VECTOR_WIDTH):
+            code: int = np.int64(children[node, CHILDREN + lane])  # type: ignore[assignment]
+            if code < NOTHING and is_triangle_leaf(code):
+                first, size = first_of(code), size_of(code)
+                for k in range(size):
+                    for i in range(9):
+                        corners[9 * first + i * size + k] = vertices[rows[first + k], i]
 
 
 # ---- collapsing a binary BVH ---------------------------------------------------------------------

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from reference_rt import lights as any_light
+from reference_rt import shapes as any_shape
 from reference_rt.accel.array_query import Primitives
 from reference_rt.accel.geometry import Geometry, closest_hit, surface
 from reference_rt.core.arrays import FloatArray, IntArray
@@ -42,7 +43,6 @@ from reference_rt.rendering.query.tracing import (
     linked,
 )
 from reference_rt.scene.build import BuiltScene
-from reference_rt.shapes import TABLES as SHAPE_TABLES
 from reference_rt.shapes import Shapes
 from reference_rt.textures import Textures
 from reference_rt.util.errors import Brief
@@ -177,9 +177,8 @@ def light_sources(scene: BuiltScene) -> LightSources:
     shape = []
     if areas is not None:
         parts = tables.geometry.parts
-        fields = {code: field for code, field, _, _ in SHAPE_TABLES}
         for kind, i in zip(areas.kind.tolist(), areas.row.tolist(), strict=True):
-            number = getattr(tables.geometry.shapes, fields[kind]).owner[i]
+            number = any_shape.owner(tables.geometry.shapes, kind, i)
             shape.append(number if parts is None else parts.shape[number])
     light: list[int] = []
     for kinds in (*(description for _, _, description, _ in TABLES), Constant | EnvironmentMap):

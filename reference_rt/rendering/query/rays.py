@@ -118,25 +118,33 @@ def in_blocks(
     trace: Callable[[slice], None], n: int, threads: int | None, least: int = _LEAST
 ) -> None:
     """Call `trace` for blocks of at least `least` of n rays, on threads (None: all cores; kernels
-    release the GIL).  Raises ValueError for a number of threads below 1."""
-
-    def run(k: slice) -> None:
-        with np.errstate(all="ignore"):
-            trace(k)
-
+    release the GIL), of which the caller's is one.  Raises ValueError for a number of threads below
+    1."""
     if threads is not None and threads < 1:
         raise ValueError(f"threads: expected 1 or more, got {threads}")
     threads = threads or os.cpu_count() or 1
-    # Eight blocks per thread, so that no thread waits long for the last block of another.
-    size = min(max(n // (8 * threads), least), _MOST)
-    blocks = [slice(k, min(k + size, n)) for k in range(0, n, size)]
-    if len(blocks) < 2 or threads == 1:
-        for k in blocks:
-            run(k)
+    # Ever smaller blocks, so that no thread waits long for the last block of another.
+    blocks, end = [], 0
+    while end < n:
+        begin, size = end, min(max((n - end) // (2 * threads), least), _MOST)
+        end = min(begin + size, n)
+        blocks.append(slice(begin, end))
+    waiting = iter(blocks)
+
+    def run() -> None:
+        with np.errstate(all="ignore"):
+            for k in waiting:
+                trace(k)
+
+    helpers = min(threads, len(blocks)) - 1
+    if helpers < 1:
+        run()
         return
-    with ThreadPoolExecutor(threads) as pool:
-        for _ in pool.map(run, blocks):
-            pass
+    with ThreadPoolExecutor(helpers) as pool:
+        helping = [pool.submit(run) for _ in range(helpers)]
+        run()
+        for helper in helping:
+            helper.result()
 
 
 # ---- the rays of a scene's camera ----------------------------------------------------------------

@@ -33,6 +33,7 @@ from reference_rt.shapes.shape import (
     TabulationContext,
     Tangents,
     any_tangents,
+    in_column,
     lift,
     solid_angle_pdf,
 )
@@ -165,9 +166,8 @@ def surface(triangles: Triangles, ray: Ray, hit: Hit) -> SurfacePoint:
     p = interpolate(triangles.vertices, i, hit.u, hit.v)
     n = normal(triangles, i)
     ns = shading_normal(triangles.normals, i, hit.u, hit.v, n)
-    return SurfacePoint(
-        p, n, ns, error_at(triangles, i, p), triangles.material[i], triangles.light[i]
-    )
+    material, light = in_column(triangles.material, i), in_column(triangles.light, i)
+    return SurfacePoint(p, n, ns, error_at(triangles, i, p), material, light)
 
 
 @kernel
@@ -249,7 +249,7 @@ def _interpolated_colour(colours: FloatArray | None, hit: Hit, without: Vec3) ->
 @kernel
 def face_of(triangles: Triangles, hit: Hit) -> int:
     """The number of the triangle in its mesh."""
-    return int(triangles.face[hit.row])
+    return in_column(triangles.face, hit.row)
 
 
 __all__ = [

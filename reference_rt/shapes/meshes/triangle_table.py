@@ -7,24 +7,25 @@ import numpy as np
 import numpy.typing as npt
 
 from reference_rt.core import transform
-from reference_rt.core.arrays import Bounds, FloatArray, IntArray
+from reference_rt.core.arrays import Bounds, FloatArray, IdArray, IntArray
 from reference_rt.shapes.shape import TabulationContext
 
 
 class Triangles(NamedTuple):
     """n triangles: vertices v0 v1 v2 (n, 9); unit vertex normals (n, 9), texture coordinates (n, 6)
     and linear sRGB colours (n, 9; -1 for none) of the vertices, each None if no triangle has any;
-    the columns of `placement.owners`, with the number in the shape or in the mesh's file as
-    face."""
+    the columns of `placement.owners`, int32, with the number in the shape or in the mesh's file as
+    face.  Of a scene, owner, material and light have one row where they are the same for all: see
+    `shared`."""
 
     vertices: FloatArray
     normals: FloatArray | None
     uvs: FloatArray | None
     colours: FloatArray | None
-    owner: IntArray
-    material: IntArray
-    light: IntArray
-    face: IntArray
+    owner: IdArray
+    material: IdArray
+    light: IdArray
+    face: IdArray
 
 
 def soup(
@@ -42,11 +43,20 @@ def soup(
         normals=normals,
         uvs=uvs,
         colours=colours,
-        owner=np.full(n, context.owner),
-        material=np.full(n, context.material),
-        light=np.full(n, -1),
-        face=np.arange(n) if face is None else face,
+        owner=np.full(n, context.owner, np.int32),
+        material=np.full(n, context.material, np.int32),
+        light=np.full(n, -1, np.int32),
+        face=np.arange(n, dtype=np.int32) if face is None else face.astype(np.int32),
     )
+
+
+def shared(triangles: Triangles) -> Triangles:
+    """One row of the columns that are the same for all triangles, such as those of a single mesh:
+    less memory, and a number that stays in the cache."""
+    names = "owner", "material", "light"
+    columns = {name: getattr(triangles, name) for name in names}
+    same = {name: c[:1].copy() for name, c in columns.items() if (c == c[0]).all()}
+    return triangles._replace(**same)
 
 
 def facing(m: transform.Affine, triangles: Triangles) -> Triangles:

@@ -20,7 +20,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reference_rt.accel import bvh
-from reference_rt.accel.bvh import spatial
+from reference_rt.accel.bvh import spatial, top_down
 
 # ---- any input ----------------------------------------------------------------------------------
 
@@ -106,6 +106,27 @@ def test_scaled_by_a_power_of_two():
         assert np.array_equal(nodes.first, scaled.first)
         assert np.array_equal(nodes.size, scaled.size)
         assert np.array_equal(nodes.boxes * 2.0**power, scaled.boxes)
+
+
+def test_subtrees_apart_are_the_same_tree(monkeypatch):
+    """What threads build, split by split and subtree by subtree, is what one call builds, but for
+    the order of the nodes."""
+    corners = small_triangles(3000)
+    whole, references = build(corners, "sah")
+    monkeypatch.setattr(top_down, "APART", 100)
+    nodes, same = build(corners, "sah")
+    check(*bounds(corners), nodes, same, "sah")
+    assert np.array_equal(references, same)
+    assert not np.array_equal(whole.first, nodes.first)
+    rows = [
+        sorted(
+            zip(
+                tree.boxes.tolist(), np.where(tree.size > 0, tree.first, -1), tree.size, strict=True
+            )
+        )
+        for tree in (whole, nodes)
+    ]
+    assert rows[0] == rows[1]
 
 
 # ---- spatial splits -----------------------------------------------------------------------------

@@ -204,3 +204,16 @@ def test_nothing_is_reported_where_nothing_is_left_out(tmp_path):
     scene = placed(tmp_path, mesh_of("mesh.obj", *grid(()), tmp_path))
     used, left_out = explain(scene, scene.tables)
     assert not [what for what, _ in [*used, *left_out] if "shapes[0]" in what]
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_ids_are_one_row_where_they_are_the_same_for_all(count):
+    corners = np.eye(3) + np.arange(4)[:, None, None]
+    faces = np.arange(12).reshape(4, 3)
+    mesh = rt.Mesh(vertices=corners.reshape(-1, 3), faces=faces)
+    scene = rt.Scene(shapes=(mesh,) * count)
+    ids = scene.tables.geometry.shapes.triangles
+    rows = [len(column) for column in (ids.owner, ids.material, ids.light, ids.face)]
+    assert rows == [1 if count == 1 else 8, 1, 1, 4 * count]
+    hits = scene.first_hits(np.full(3, 9.0), -np.ones(3))
+    assert (hits.shape, hits.primitive) == (0, 3)

@@ -11,6 +11,7 @@ import pytest
 from builders import cube, unit_vectors, write_obj
 
 import reference_rt as rt
+from reference_rt import shapes as any_shape
 from reference_rt.core.transform import Matrix, compose
 from reference_rt.core.vec3 import Vec3
 from reference_rt.lights.emitters import point as point_light
@@ -97,11 +98,10 @@ def test_no_convex_lamp_lights_itself(tmp_path, count):
 
 def lights_by_shape(tables, count):
     """The entries of the light choice that belong to each shape."""
-    fields = {code: field for code, field, _, _ in TABLES}
     lights = [[] for _ in range(count)]
     areas = tables.lights.areas
     for k, (code, row) in enumerate(zip(areas.kind, areas.row, strict=True)):
-        lights[getattr(tables.geometry.shapes, fields[code]).owner[row]].append(k)
+        lights[any_shape.owner(tables.geometry.shapes, code, row)].append(k)
     return lights
 
 

@@ -413,7 +413,7 @@ def subjects(kind: str, placed: list[Placed]) -> list[Subject]:
     found = []
     for code, field, _, _ in TABLES:
         table = getattr(geometry.shapes, field)
-        for i, owner in enumerate(table.owner.tolist()):
+        for i, owner in enumerate(np.broadcast_to(table.owner, len(table.face)).tolist()):
             if owner < len(placed):
                 found.append((owner, Subject(geometry, by_link, field, code, i)))
     return [subject for _, subject in sorted(found, key=lambda pair: pair[0])]
