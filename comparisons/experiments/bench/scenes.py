@@ -202,10 +202,13 @@ def affordable(seconds: float, budget: float) -> int:
 
 
 def sized(scene: Scene, pixels: int) -> Scene:
-    """The scene with a film of its shape and about so many pixels."""
-    factor = (pixels / (scene.film.width * scene.film.height)) ** 0.5
-    size = {edge: max(1, round(factor * getattr(scene.film, edge))) for edge in ("width", "height")}
-    return scene.changed(film=scene.film.model_copy(update=size))
+    """The scene with a film of its shape and about so many pixels, without layers, which Mitsuba is
+    not asked for."""
+    film = scene.film
+    factor = (pixels / (film.width * film.height)) ** 0.5
+    width, height = (max(1, round(factor * edge)) for edge in (film.width, film.height))
+    size = {"width": width, "height": height, "layers": ()}
+    return scene.changed(film=film.model_copy(update=size))
 
 
 def rows(name: str, size: tuple[int, int], sampler: str, taken: Mapping[str, Taken]) -> list[Row]:

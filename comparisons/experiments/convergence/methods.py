@@ -177,7 +177,7 @@ class Stable:
             picture = render(seeded, tables=tables).colour
             return Shot(picture, spp, time.perf_counter() - start)
 
-        small = scene.changed(sampler=make(spp=1, seed=first))
+        small = scene.changed(sampler=make(spp=FIRST, seed=first))
         # From now on the specialised kernels are in the cache, and `shot` uses them.
         render(small, tables=tables, progress=progress, specialised=True)
         return shot
