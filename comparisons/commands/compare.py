@@ -46,7 +46,7 @@ def compare(
     spp: Annotated[
         int | None,
         typer.Option(
-            help="Samples per pixel of each replicate. (default: a quarter of the scene's; "
+            help="Samples per pixel of each replicate. (default: half of the scene's; "
             "with --replicates or --fixed all)"
         ),
     ] = None,
@@ -59,7 +59,7 @@ def compare(
         typer.Option(
             min=2,
             help="Independent pictures by each renderer (path tracing) at the first look. "
-            "(default: 16; with --spp 8)",
+            "(default: 10; with --spp 8, with --fixed 16)",
         ),
     ] = None,
     time_limit: TimeLimit = None,
@@ -80,7 +80,7 @@ def compare(
     """
     with compare_extra():
         from comparisons.compare.budget import Budget
-        from comparisons.compare.looks import FIRST, PARTS, SECONDS
+        from comparisons.compare.looks import FIRST, PARTED, PARTS, SECONDS
         from comparisons.results.case import exit_code
         from comparisons.suites.run import Options, Run, run_cases, summarise
         from comparisons.suites.suite import Changes, plan_of_files
@@ -93,7 +93,7 @@ def compare(
     if fixed:
         budget = Budget(replicates=replicates or Budget().replicates)
     elif spp is None and replicates is None:
-        budget = Budget(replicates=2 * FIRST, parts=PARTS, seconds=time_limit or SECONDS)
+        budget = Budget(replicates=PARTED, parts=PARTS, seconds=time_limit or SECONDS)
     else:
         budget = Budget(replicates=replicates or FIRST, seconds=time_limit or SECONDS)
     plan = plan_of_files(scenes, changes, budget.model_copy(update={"witness": witness}))

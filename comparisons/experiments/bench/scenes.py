@@ -221,12 +221,13 @@ def rows(name: str, size: tuple[int, int], sampler: str, taken: Mapping[str, Tak
     ours, peer = taken["ours"], taken["default"]
     facts: dict[str, Any] = {"width": size[0], "height": size[1], "sampler": sampler}
     facts |= {f"relmse_{who}": float(one.relmse.mean()) for who, one in taken.items()}
-    facts["difference"] = difference(ours, peer)
+    peers = ("default", "best")
+    facts |= {f"difference_{who}": difference(ours, taken[who]) for who in peers}
     title = f"{name}, {size[0]}x{size[1]}: "
     kind = KINDS["samples"]
     args = ours.warm.tolist(), ("Mitsuba llvm", peer.warm.tolist()), kind.worst
     found = [against(f"{name}.samples", title + kind.title, *args, details=facts)]
-    for who, its in (("default", DEFAULT.sampler), ("best", sampler)):
+    for who, its in zip(peers, (DEFAULT.sampler, sampler), strict=True):
         kind, theirs = KINDS[who], taken[who]
         each = spread((ours.warm * ours.relmse[1:] / (theirs.warm * theirs.relmse[1:])).tolist())
         ratio = {"ratio": [each.low, each.high]}
@@ -293,7 +294,7 @@ def scene_of(row: Row) -> str:
 
 def is_other(row: Row) -> bool:
     """Whether Mitsuba's expectation is further from ours than its pictures are from it."""
-    return bool(row.details["difference"] > row.details["relmse_default"])
+    return bool(row.details["difference_default"] > row.details["relmse_default"])
 
 
 def is_of_scene(row: Row) -> bool:

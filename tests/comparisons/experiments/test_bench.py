@@ -150,6 +150,7 @@ def test_a_scene_has_a_row_of_time_and_two_of_error_times_time() -> None:
     rows = scenes.rows("x", (3, 2), "multijitter", methods)
     assert [row.name for row in rows] == ["x.samples", "x.default", "x.best"]
     assert [row.ratio for row in rows] == pytest.approx([2.0, 0.5, 0.25], rel=1e-12)
+    assert rows[1].spread["ratio"] == pytest.approx([0.5, 0.5], rel=1e-12)
     assert all(row_from(json.loads(json.dumps(row.as_json()))) == row for row in rows)
 
 
@@ -162,7 +163,7 @@ def test_no_scene_is_left_out_of_median_and_worst() -> None:
     assert [line[0] for line in scenes.lines(rows)] == ["s8", "s3", "s2", "s1"]
     far = of_scene("far", 100.0, 2.0, 4.0)
     for row in far:
-        row.details["difference"] = 0.6  # more than Mitsuba's noise
+        row.details["difference_default"] = 0.6  # more than Mitsuba's noise
     again = {row.name: row for row in scenes.summary([*rows, *far])}
     assert [row.ratio for row in again.values()] == [row.ratio for row in found.values()]
     assert "4 scenes (not far: " in again["best_median"].title
