@@ -45,7 +45,10 @@ def compare(
     out: Annotated[Path, out_folder("results.json and report.html")] = Path("out"),
     spp: Annotated[
         int | None,
-        typer.Option(help="Samples per pixel of each replicate. (default: the scene's)"),
+        typer.Option(
+            help="Samples per pixel of each replicate. (default: half of the scene's; "
+            "with --replicates or --fixed all)"
+        ),
     ] = None,
     size: Annotated[
         str | None, typer.Option(help="WIDTHxHEIGHT in pixels. (default: the scene's)")
@@ -56,7 +59,7 @@ def compare(
         typer.Option(
             min=2,
             help="Independent pictures by each renderer (path tracing) at the first look. "
-            "(default: 8; with --fixed 16)",
+            "(default: 10; with --spp 8, with --fixed 16)",
         ),
     ] = None,
     time_limit: TimeLimit = None,
@@ -77,7 +80,7 @@ def compare(
     """
     with compare_extra():
         from comparisons.compare.budget import Budget
-        from comparisons.compare.looks import FIRST, SECONDS
+        from comparisons.compare.looks import FIRST, PARTED, PARTS, SECONDS
         from comparisons.results.case import exit_code
         from comparisons.suites.run import Options, Run, run_cases, summarise
         from comparisons.suites.suite import Changes, plan_of_files
@@ -87,11 +90,12 @@ def compare(
     )
     if fixed and time_limit is not None:
         raise UsageError("got --fixed and --time-limit; expected one of them")
-    budget = (
-        Budget(replicates=replicates or Budget().replicates)
-        if fixed
-        else Budget(replicates=replicates or FIRST, seconds=time_limit or SECONDS)
-    )
+    if fixed:
+        budget = Budget(replicates=replicates or Budget().replicates)
+    elif spp is None and replicates is None:
+        budget = Budget(replicates=PARTED, parts=PARTS, seconds=time_limit or SECONDS)
+    else:
+        budget = Budget(replicates=replicates or FIRST, seconds=time_limit or SECONDS)
     plan = plan_of_files(scenes, changes, budget.model_copy(update={"witness": witness}))
     given = {
         "replicates": replicates,

@@ -29,7 +29,9 @@ def bench(
     out: Annotated[Path, out_folder("results.json and bench.md")] = Path("out/bench"),
     only: Annotated[
         list[str] | None,
-        typer.Option(metavar="ROW", help="Only these rows, and those measured together with them."),
+        typer.Option(
+            metavar="ROW", help="Only these rows or scenes, and rows measured together with them."
+        ),
     ] = None,
     mesh: Annotated[
         Path | None,
@@ -47,6 +49,7 @@ def bench(
         from comparisons.experiments.bench.row import Setting
         from comparisons.experiments.bench.run import (
             Display,
+            all_groups,
             chosen,
             markdown_table,
             run,
@@ -54,14 +57,14 @@ def bench(
         )
         from comparisons.report import templates, terminal
 
-    groups = chosen(only or ())
+    setting = Setting(scenes=scenes, mesh=mesh, quick=quick)
+    groups = chosen(only or (), all_groups(setting))
     if mesh is not None and not mesh.is_file():
         raise UsageError(f"--mesh: there is no file '{mesh}'")
     if markdown is not None:
         templates.check(markdown, "bench")
     with Display() as display:
-        setting = Setting(scenes=scenes, mesh=mesh, quick=quick, say=display.say)
-        outcome = run(groups, setting, out, display, fresh)
+        outcome = run(groups, replace(setting, say=display.say), out, display, fresh)
     console = terminal.console()
     console.print(terminal_table(outcome.rows, console.width))
     if markdown is not None:

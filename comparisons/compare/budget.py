@@ -10,14 +10,20 @@ from reference_rt.core.model import Description
 PixelSize = tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]]
 
 
+LEAST = 4
+"""Samples per pixel: of fewer a pixel takes few values, unlike the noise that tests know best."""
+
+
 class Budget(Description):
     """The work of one comparison of a scene, and the bias that it must be able to detect."""
 
     spp: Annotated[int, Field(ge=1)] | None = None
-    """Samples per pixel of each replicate; None: the scene's own."""
+    """Samples per pixel of each replicate; None: the scene's own, or a part of them."""
     reference_spp: Annotated[int, Field(ge=1)] | None = None
     """Samples per pixel of Mitsuba's replicates; None: as many as ours.  Its samples are cheaper
     and, being independent, noisier: with more of them the difference has the least noise."""
+    parts: Annotated[int, Field(ge=1)] = 1
+    """Without `spp`: each replicate has this part of the scene's own samples, at least LEAST."""
     size: Annotated[PixelSize, Field(strict=False)] | None = None
     """Width and height in pixels; None: the scene's own."""
     replicates: Annotated[int, Field(ge=2)] = 16

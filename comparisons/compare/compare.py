@@ -12,7 +12,7 @@ import numpy as np
 from comparisons import rungs as ladder
 from comparisons import statistics
 from comparisons.compare import looks, pictures, ray_starts
-from comparisons.compare.budget import Budget
+from comparisons.compare.budget import LEAST, Budget
 from comparisons.compare.judge import Evidence, Rendered, judge, of_replicates, picture_rungs
 from comparisons.compare.path_length import path_lengths
 from comparisons.geometry.flatten import copies_of
@@ -204,8 +204,9 @@ def budgeted(scene: Scene, budget: Budget) -> Scene:
     sampler = scene.resolved_sampler
     if isinstance(sampler, Grid) and not scene.integrator.deterministic:
         sampler = Sobol()
-    if budget.spp is not None and not scene.integrator.deterministic:
-        sampler = sampler.model_copy(update={"spp": budget.spp})
+    if not scene.integrator.deterministic:
+        spp = budget.spp or max(min(LEAST, sampler.spp), sampler.spp // budget.parts)
+        sampler = sampler.model_copy(update={"spp": spp})
     return scene.changed(film=scene.film.model_copy(update=film), sampler=sampler)
 
 

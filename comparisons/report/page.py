@@ -14,14 +14,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
 from comparisons.report.pictures_data import COARSE, EXACT, Bits, as_json, pack
 from comparisons.report.plots import histograms
 from comparisons.report.templates import encoded, template, write
-from comparisons.report.thumbnails import Thumbnail, Thumbnails, flip_map, of_witness, thumbnails
 from comparisons.report.values import label, shown
 from comparisons.results.case import (
     INTERRUPTED,
@@ -37,6 +36,12 @@ from comparisons.results.files import named, plain
 from comparisons.results.headline import headline, in_short, is_of_statistics, numbers_rows
 from comparisons.results.rungs import RUNGS
 from reference_rt.util.files import replacing
+
+if TYPE_CHECKING:
+    from comparisons.report.thumbnails import Thumbnail, Thumbnails
+
+# `thumbnails` is imported where it is needed: with SciPy that takes 0.6 s, in which workers render
+# (`comparisons.suites.run`).
 
 # ---- limits the size of the page: reduces or omits the float pictures of some cases --------------
 
@@ -156,6 +161,8 @@ def write_report(
 
     In the numbers of a rung, a name that ends in `_bias` means a fraction and is shown in percent.
     """
+    from comparisons.report.thumbnails import thumbnails
+
     ranked = sorted(cases, key=lambda case: ORDER.index(case.verdict))
     mapped = len(cases) <= MOST_MAPPED
     views = [_view(case, mapped or case.verdict in FAILED, walls or {}) for case in ranked]
@@ -226,6 +233,8 @@ def _script() -> str:
 
 def _view(case: Case, mapped: bool, walls: Mapping[str, float]) -> dict[str, Any]:
     """A case as the template takes it.  mapped: whether it has a map of FLIP."""
+    from comparisons.report.thumbnails import of_witness
+
     short, seen = in_short(case)
     pictures = _thumbnails(case)
     return {
@@ -271,7 +280,7 @@ def _common_sides(cases: Sequence[Case]) -> tuple[str, str]:
     return found.pop() if len(found) == 1 else ("candidate", "reference")
 
 
-def _histograms(case: Case, pictures: Thumbnails) -> list[dict[str, Any]]:
+def _histograms(case: Case, pictures: "Thumbnails") -> list[dict[str, Any]]:
     """Title, drawing and text of each histogram."""
     assert case.images is not None
     # Trusted: `svg` escapes its texts.
@@ -281,16 +290,22 @@ def _histograms(case: Case, pictures: Thumbnails) -> list[dict[str, Any]]:
     ]
 
 
-def _thumbnails(case: Case) -> Thumbnails | None:
+def _thumbnails(case: Case) -> "Thumbnails | None":
     """None without pictures, and for pictures without pixels, which a gate may get."""
+    from comparisons.report.thumbnails import thumbnails
+
     images = case.images
     if images is None or not images.candidate.size or not images.reference.size:
         return None
     return thumbnails(images)
 
 
-def _figures(case: Case, pictures: Thumbnails, mapped: bool) -> list[tuple[str, Thumbnail, str]]:
+def _figures(
+    case: Case, pictures: "Thumbnails", mapped: bool
+) -> list[tuple[str, "Thumbnail", str]]:
     """Kind, thumbnail and title of each picture; the z-map, drawn by the script, has none."""
+    from comparisons.report.thumbnails import flip_map
+
     candidate, reference = case.sides
     figures = [
         ("candidate", pictures.candidate, candidate),

@@ -11,7 +11,9 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
+from threading import Thread
 from types import FrameType
 from typing import Any, NamedTuple
 
@@ -314,6 +316,7 @@ def run_cases(
 
     with Display(len(plan.work), options.steps) as display, _terminable():
         display.line(f"Mitsuba {told['mitsuba']}")
+        Thread(target=import_module, args=("comparisons.report.thumbnails",)).start()
         # The page of an earlier run must not be mistaken for this run's.
         options.report.unlink(missing_ok=True)
         try:

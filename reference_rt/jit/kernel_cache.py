@@ -37,6 +37,7 @@ import llvmlite
 import numba
 import platformdirs
 from numba.core.compiler import CompileResult
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from reference_rt.util.errors import ImageError
@@ -242,7 +243,9 @@ class KernelCache:
     def load_overload(self, signature: Any, target_context: Any) -> Any:
         """The `CompileResult` for arguments of these types; None if there is none, or if its file
         was damaged, and is deleted now."""
-        target_context.refresh()
+        # Numba's own cache calls `target_context.refresh()`, which takes 0.2 s: it also fills the
+        # registries of the compiler, which does that itself before it compiles.
+        rtsys.initialize(target_context)
         key = self._key(signature, target_context.codegen())
         path = self._path(key)
         try:

@@ -43,6 +43,18 @@ def test_the_command_line_imports_nothing_slow_before_a_command_is_known():
     assert imported_by(f"{code}; assert {{'render', 'compare', 'gate'}} <= {names}") == []
 
 
+def test_own_commands_import_no_others():
+    code = "import sys; sys.argv[1:] = ['schema']; from reference_rt.cli import main; main.main()"
+    code = (
+        f"try:\n    {code}\nfinally:\n    assert not [n for n in sys.modules if 'comparisons' in n]"
+    )
+    subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
+
+
+def test_suites_begin_before_the_statistics_are_imported():
+    assert "skimage" not in imported_by("import comparisons.suites.run")
+
+
 def test_a_name_is_imported_when_it_is_used():
     assert "numba" in imported_by("import reference_rt; reference_rt.Sphere")
     assert "numba" in imported_by("from reference_rt import Scene, render, query")

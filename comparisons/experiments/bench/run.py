@@ -13,14 +13,16 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from llvmlite import binding
 from rich.console import Console, RenderableType
+from rich.console import Group as Tables
 from rich.progress import TimeElapsedColumn
 
-from comparisons.experiments.bench import equal, mesh_rays, program
+from comparisons.experiments.bench import equal, mesh_rays, program, scenes
 from comparisons.experiments.bench.row import LIMIT, Row, Setting, row_from
 from comparisons.report.terminal import fitted
 from comparisons.results.files import write_json
@@ -34,22 +36,30 @@ _COLUMNS = ("what", "ours", "against", "ratio", "quartiles", "goal", "met")
 
 
 def terminal_table(rows: Sequence[Row], width: int) -> RenderableType:
-    """The table for a terminal of so many columns."""
-    styles = [None if row.met else "yellow" for row in rows]
-    return fitted(width, _COLUMNS, [_cells(row) for row in rows], styles=styles)
+    """The tables for a terminal of so many columns."""
+    others = [row for row in rows if not scenes.is_of_scene(row)]
+    styles = [None if row.met else "yellow" for row in others]
+    table = fitted(width, _COLUMNS, [_cells(row) for row in others], styles=styles)
+    lines = scenes.lines(rows)
+    return Tables(fitted(width, scenes.COLUMNS, lines), table) if lines else table
 
 
 def markdown_table(
     rows: Sequence[Row], machine: Mapping[str, Any], not_measured: Mapping[str, str]
 ) -> str:
     """The table with its date and machine."""
-    lines = [described(machine), ""]
-    lines.append("| " + " | ".join(_COLUMNS) + " |")
-    lines.append("|---" * len(_COLUMNS) + "|")
-    lines += ["| " + " | ".join(c.replace("|", "\\|") for c in _cells(row)) + " |" for row in rows]
+    others = [_cells(row) for row in rows if not scenes.is_of_scene(row)]
+    lines = [described(machine), "", *_markdown(_COLUMNS, others)]
+    if each := scenes.lines(rows):
+        lines += ["", *_markdown(scenes.COLUMNS, each)]
     if not_measured:
         lines += ["", "Not measured: " + "; ".join(f"{k} ({v})" for k, v in not_measured.items())]
     return "\n".join(lines) + "\n"
+
+
+def _markdown(columns: Sequence[str], lines: Sequence[Sequence[str]]) -> list[str]:
+    rows = [columns, ["---"] * len(columns), *lines]
+    return ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
 
 
 def described(machine: Mapping[str, Any]) -> str:
@@ -132,11 +142,6 @@ class Group(NamedTuple):
 GROUPS = (
     Group("equal_samples", tuple(equal.VARIANTS), equal.measure_samples),
     Group(
-        "equal_error",
-        ("error_default", "error_default_worst", "error_best", "error_cycles"),
-        equal.measure_error,
-    ),
-    Group(
         "mesh_rays", (*(f"rays_{kind}" for kind in mesh_rays.GOALS), "any_hit"), mesh_rays.measure
     ),
     Group("threads", ("threads",), equal.measure_threads),
@@ -148,16 +153,22 @@ GROUPS = (
 )
 
 
-def chosen(patterns: Sequence[str]) -> tuple[Group, ...]:
+def all_groups(setting: Setting) -> tuple[Group, ...]:
+    """Those of every scene, each of the scene's name, and the others."""
+    each = [Group(n, (n,), partial(scenes.measure, n)) for n in scenes.names(setting)]
+    return (*each, *GROUPS)
+
+
+def chosen(patterns: Sequence[str], groups: tuple[Group, ...]) -> tuple[Group, ...]:
     """The groups with a row that matches one of these shell patterns; all groups if there are no
     patterns.  Raises UsageError for a pattern that matches no row."""
     for pattern in patterns:
-        if not any(fnmatchcase(row, pattern) for group in GROUPS for row in group.rows):
-            known = ", ".join(row for group in GROUPS for row in group.rows)
+        if not any(fnmatchcase(row, pattern) for group in groups for row in group.rows):
+            known = ", ".join(row for group in groups for row in group.rows)
             raise UsageError(f"--only: no row has the name '{pattern}'; expected some of {known}")
     return tuple(
         group
-        for group in GROUPS
+        for group in groups
         if not patterns
         or any(fnmatchcase(row, pattern) for row in group.rows for pattern in patterns)
     )
@@ -292,8 +303,10 @@ def read_rows(path: Path, key: str) -> list[Row] | None:
 
 def _write(out: Path, outcome: Outcome, key: str, setting: Setting) -> None:
     """Write the outputs with the stored rows of all groups, in the order of the table."""
-    kept = {group.name: read_rows(out / "rows" / f"{group.name}.json", key) for group in GROUPS}
-    outcome.rows = [row for rows in kept.values() for row in rows or ()]
+    groups = all_groups(setting)
+    kept = {group.name: read_rows(out / "rows" / f"{group.name}.json", key) for group in groups}
+    measured = [row for rows in kept.values() for row in rows or ()]
+    outcome.rows = [*scenes.summary(measured), *measured]
     document = {
         "schema": SCHEMA,
         "kind": "bench",

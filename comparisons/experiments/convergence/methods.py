@@ -177,7 +177,7 @@ class Stable:
             picture = render(seeded, tables=tables).colour
             return Shot(picture, spp, time.perf_counter() - start)
 
-        small = scene.changed(sampler=make(spp=1, seed=first))
+        small = scene.changed(sampler=make(spp=FIRST, seed=first))
         # From now on the specialised kernels are in the cache, and `shot` uses them.
         render(small, tables=tables, progress=progress, specialised=True)
         return shot
@@ -301,20 +301,63 @@ def merits(scene: Scene, method: Method) -> dict[str, float]:
     the best.  Raises as `Stable.ready` does."""
     width, height = size_within(scene.film, WIDEST)
     film = scene.film.model_copy(update={"width": width, "height": height})
-    shots: dict[str, list[Shot]] = {name: [] for name in CANDIDATES}
-    with Stable(scene.changed(film=film)) as stable:
-        renderers = {name: stable.ready(with_sampler(method, name)) for name in CANDIDATES}
-        for k in range(PICTURES):  # in turn: what disturbs the machine disturbs all
-            for name, renderer in renderers.items():
-                shots[name].append(renderer(SPP, k))
+    candidates = {name: with_sampler(method, name) for name in CANDIDATES}
+    found = in_turn(scene.changed(film=film), candidates, SPP, PICTURES)
+    return {name: one.work for name, one in found.items()}
+
+
+class Taken(NamedTuple):
+    """The pictures of a method.
+
+    seconds (pictures,): of each;  relmse (pictures,): the squared deviation of each from their
+    mean, relative as in `weights`, and times n / (n - 1), so that the mean over the pictures is the
+    relMSE of one picture, without a reference and without the bias of one;  mean (height, width,
+    3).
+    """
+
+    seconds: FloatArray
+    relmse: FloatArray
+    mean: FloatArray
+
+    @property
+    def warm(self) -> FloatArray:
+        """The seconds of all but the first picture, which may compile."""
+        return self.seconds[1:]
+
+    @property
+    def work(self) -> float:
+        """relMSE times seconds: what does not depend on the number of independent samples."""
+        return float(self.relmse.mean() * np.median(self.warm))
+
+
+def in_turn(
+    scene: Scene,
+    methods: Mapping[str, Method],
+    spp: int,
+    pictures: int,
+    say: Progress = lambda what, fraction: None,
+) -> dict[str, Taken]:
+    """Independent pictures of `scene` by each method, at least two, by the names of the methods.
+
+    The methods take turns, in every other round in the reverse order: what disturbs the machine
+    disturbs all.  Weights of errors come from the mean of all pictures.  Raises as `Stable.ready`
+    does.
+    """
+    shots: dict[str, list[Shot]] = {name: [] for name in methods}
+    with Stable(scene) as stable:
+        renderers = {name: stable.ready(method) for name, method in methods.items()}
+        for k in range(pictures):
+            for name in list(methods)[:: 1 if k % 2 == 0 else -1]:
+                say(name, k / pictures)
+                shots[name].append(renderers[name](spp, k))
     weight = weights(np.mean([shot.picture for taken in shots.values() for shot in taken], axis=0))
-    return {
-        name: float(
-            (weight * np.var([shot.picture for shot in taken], axis=0, ddof=1)).mean()
-            * np.median([shot.seconds for shot in taken[1:]])
-        )
-        for name, taken in shots.items()
-    }
+    found = {}
+    for name, taken in shots.items():
+        mean = np.mean([shot.picture for shot in taken], axis=0)
+        squares = [float((weight * (shot.picture - mean) ** 2).mean()) for shot in taken]
+        relmse = np.array(squares) * pictures / (pictures - 1)
+        found[name] = Taken(np.array([shot.seconds for shot in taken]), relmse, mean)
+    return found
 
 
 # ---- the ladder ---------------------------------------------------------------------------------

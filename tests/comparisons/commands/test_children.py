@@ -167,7 +167,7 @@ def test_nohup_goes_on(tmp_path):
     """Who has SIGHUP ignored, keeps that."""
     code = "import signal; signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
     code += "import os, reference_rt.cli.main as c\n"
-    code += "c._add_commands = lambda: os.kill(os.getpid(), signal.SIGHUP)\n"
+    code += "app = c.app; c.app = lambda: (os.kill(os.getpid(), signal.SIGHUP), app())\n"
     code += "import sys; sys.argv[1:] = ['schema']; c.main()"
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path

@@ -91,6 +91,11 @@ def test_a_budget_changes_size_samples_and_filter(scene: Scene) -> None:
     other = budgeted(scene, Budget(size=(16, 12), spp=4))
     assert (other.film.width, other.film.height, other.resolved_sampler.spp) == (16, 12, 4)
     assert other.film.filter.type == "box"
+    samples = [budgeted(other, Budget(parts=n)).resolved_sampler.spp for n in (1, 2)]
+    assert samples == [4, 4]  # not fewer than LEAST
+    many = scene.changed(sampler=Sobol(spp=64))
+    assert budgeted(many, Budget(parts=4)).sampler == Sobol(spp=16)
+    assert budgeted(many, Budget(parts=4, spp=8)).sampler == Sobol(spp=8)
     lamp = Point(position=(0.0, 3.0, 0.0), intensity=(1.0, 1.0, 1.0))
     dark = {"materials": {}, "shapes": (), "lights": (lamp,)}
     fixed = scene.changed(integrator=Direct(), sampler=Grid(), **dark)

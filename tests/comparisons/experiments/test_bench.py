@@ -5,12 +5,14 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from bench_rows import FIELDS, a_table, made_up
 
-from comparisons.experiments.bench import equal
+from comparisons.experiments.bench import scenes
 from comparisons.experiments.bench.row import (
     LIMIT,
+    Row,
     Setting,
     against,
     alternate,
@@ -21,6 +23,7 @@ from comparisons.experiments.bench.row import (
     within,
 )
 from comparisons.experiments.bench.run import machine
+from comparisons.experiments.convergence.methods import Taken
 
 SCENES = Path(__file__).parents[3] / "scenes"
 
@@ -126,49 +129,86 @@ def test_what_is_no_number_is_null() -> None:
     assert math.isnan(row_from(json.loads(json.dumps(document))).ours)
 
 
-# ---- error at equal time ------------------------------------------------------------------------
+# ---- scenes -------------------------------------------------------------------------------------
 
 
-def test_equal_error_takes_the_median_of_the_scenes_ratios() -> None:
-    times = {
-        "a": {"ours": 1.0, "mitsuba_llvm": 4.0, "mitsuba_llvm_best": 2.0},
-        "b": {"ours": 1.0, "mitsuba_llvm": 2.0, "mitsuba_llvm_best": 1.0, "cycles": 5.0},
-        "c": {"ours": 3.0, "mitsuba_llvm": 1.5},
-        "d": {"mitsuba_llvm": 1.5},
-    }
-    median, worst, best, cycles = equal.rows(times, {"e": "why"})
-    assert (cycles.name, cycles.ratio) == ("error_cycles", 0.2)
-    assert (median.ratio, median.met) == (0.5, True)
-    assert (worst.ratio, worst.met, worst.details["worst"]) == (2.0, False, "c")
-    assert (best.ratio, best.met) == (0.75, True)
-    assert median.details["ratios"] == {"a": 0.25, "b": 0.5, "c": 2.0}
-    assert median.details["left_out"] == {"e": "why"}
+def taken(seconds: float, noise: float, pictures: int = 6) -> Taken:
+    """Pictures of a method; the first takes a hundred times as long."""
+    times = np.full(pictures, seconds)
+    times[0] *= 100.0
+    return Taken(times, np.full(pictures, noise), np.ones((2, 3, 3)))
 
 
-def test_who_never_reaches_the_error_takes_infinitely_long() -> None:
-    never = math.inf
-    times = {
-        "a": {"ours": 1.0, "mitsuba_llvm": never, "mitsuba_llvm_best": never},
-        "b": {"ours": never, "mitsuba_llvm": 1.0, "mitsuba_llvm_best": never},
-        "c": {"ours": never, "mitsuba_llvm": never, "mitsuba_llvm_best": 1.0},
-    }
-    median, worst, best = equal.rows(times, {})
-    assert median.details["ratios"] == {"a": 0.0, "b": never}
-    assert not worst.met
-    assert best.details["ratios"] == {"a": 0.0, "c": never}
-    for row in (median, worst, best):
-        again = row_from(json.loads(json.dumps(row.as_json(), allow_nan=False)))
-        assert again.title in a_table([again])
+def of_scene(name: str, ours: float, default: float, best: float) -> list[Row]:
+    """The rows of a scene that one of these takes so many seconds to render, all as noisily."""
+    methods = {"ours": taken(ours, 0.5), "default": taken(default, 0.5), "best": taken(best, 0.5)}
+    return scenes.rows(name, (3, 2), "multijitter", methods)
 
 
-def test_equal_error_of_nothing_meets_no_goal() -> None:
-    assert not any(row.met for row in equal.rows({}, {}))
+def test_a_scene_has_a_row_of_time_and_two_of_error_times_time() -> None:
+    methods = {"ours": taken(2.0, 0.1), "default": taken(1.0, 0.4), "best": taken(4.0, 0.2)}
+    rows = scenes.rows("x", (3, 2), "multijitter", methods)
+    assert [row.name for row in rows] == ["x.samples", "x.default", "x.best"]
+    assert [row.ratio for row in rows] == pytest.approx([2.0, 0.5, 0.25], rel=1e-12)
+    assert rows[1].spread["ratio"] == pytest.approx([0.5, 0.5], rel=1e-12)
+    assert all(row_from(json.loads(json.dumps(row.as_json()))) == row for row in rows)
+
+
+def test_no_scene_is_left_out_of_median_and_worst() -> None:
+    rows = [r for k in (1.0, 8.0, 2.0, 3.0) for r in of_scene(f"s{k:g}", k, 2.0, 4.0)]
+    found = {row.name: row for row in scenes.summary(rows)}
+    assert [found[f"{k}_median"].ratio for k in scenes.KINDS] == [1.25, 1.25, 0.625]
+    assert [found[f"{k}_worst"].ratio for k in scenes.KINDS] == [4.0, 4.0, 2.0]
+    assert all("(s8)" in found[f"{kind}_worst"].title for kind in scenes.KINDS)
+    assert [line[0] for line in scenes.lines(rows)] == ["s8", "s3", "s2", "s1"]
+    far = of_scene("far", 100.0, 2.0, 4.0)
+    for row in far:
+        row.details["difference_default"] = 0.6  # more than Mitsuba's noise
+    again = {row.name: row for row in scenes.summary([*rows, *far])}
+    assert [row.ratio for row in again.values()] == [row.ratio for row in found.values()]
+    assert "4 scenes (not far: " in again["best_median"].title
+    assert scenes.lines([*rows, *far])[0][-1] == "multijitter, another picture"
+    text = a_table([*scenes.summary(rows), *rows])
+    assert text.count("| s3 |") == 1
+    assert scenes.summary([made_up()]) == []
+
+
+def test_a_difference_is_that_of_expectations() -> None:
+    """Means whose difference is their noise have no other, on average: here over many pixels."""
+    rng = np.random.default_rng(1)
+    shape, n, sigma = (100, 100, 3), 6, 0.3
+    one, two = (
+        Taken(np.ones(n), np.full(n, sigma**2), 1.0 + sigma / n**0.5 * rng.standard_normal(shape))
+        for _ in range(2)
+    )
+    # Its standard error is 2 sigma² / n sqrt(2 / 30,000), and weights add a percent to its scale.
+    error = 2.0 * sigma**2 / n * (2.0 / 30_000) ** 0.5
+    assert abs(scenes.difference(one, two)) < 0.1 * sigma**2 / n + 4.0 * error
+    other = two._replace(mean=two.mean * 1.5)
+    assert scenes.difference(one, other) > 0.1
+
+
+def test_pictures_are_as_large_as_the_time_allows() -> None:
+    most, fewest = scenes.PIXELS, scenes.FEWEST
+    assert scenes.affordable(0.01, 0.01 * most / fewest) == most
+    assert scenes.affordable(0.01, 0.009 * most / fewest) == most // 2
+    assert scenes.affordable(1e9, 1.0) == fewest
+    film = scenes.sized(Setting(scenes=SCENES).load("environment"), 4000).film
+    assert (film.width, film.height) == (80, 50)
 
 
 @pytest.mark.slow
-def test_only_path_traced_scenes_of_the_standard_suite_count() -> None:
-    names = set(equal.path_traced(Setting(scenes=SCENES, quick=True)))
-    assert names == set(equal.QUICK)
+def test_scenes_without_noise_and_those_that_the_suite_skips_have_no_rows() -> None:
+    names = scenes.names(Setting(scenes=SCENES))
+    assert {"cornell_box", "environment", "materials_200"} < set(names)
+    assert not {"whitted_classic", "quadrics", "csg_lens"} & set(names)
+
+
+@pytest.mark.parametrize("name", ["spheres_10000", "materials_200"])
+def test_kinds_of_scenes_that_suites_lack(name: str, tmp_path: Path) -> None:
+    scene = scenes.STRANGERS[name](tmp_path)
+    assert len(scene.shapes) > int(name.rpartition("_")[2])
+    assert len(set(map(repr, scene.materials.values()))) == len(scene.materials)
 
 
 # ---- table --------------------------------------------------------------------------------------

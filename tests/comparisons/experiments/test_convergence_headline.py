@@ -12,7 +12,6 @@ from convergence_fakes import EXACT, SHAPE, Fake, climbs
 from typer.testing import CliRunner
 
 import comparisons.commands.register
-from comparisons.experiments.bench import equal
 from comparisons.experiments.convergence import run
 from comparisons.experiments.convergence.estimates import Estimate
 from comparisons.experiments.convergence.findings import (
@@ -267,18 +266,6 @@ def test_who_is_never_there_is_part_of_the_median(tmp_path):
     assert _median([half, never, never])[0] == "∞"
     assert _median([half, half, never])[:2] == ("0.50", "of 3 scenes")
     assert _median([Ratio(None, why="unknown")])[0] == "–"
-
-
-def test_the_benchmark_says_how_many_are_extrapolated():
-    times = {s: {"ours": 1.0, "mitsuba_llvm": 4.0, "mitsuba_llvm_best": 2.0} for s in "abc"}
-    median, worst, best = equal.rows(times, {}, {"a": ["mitsuba_llvm"], "b": []})
-    assert "median over 3 scenes (1 extrapolated): / Mitsuba llvm, its default" in median.title
-    assert worst.title == "the same, the worst scene (a, extrapolated)"
-    assert "median over scenes: / Mitsuba llvm, its best" in best.title
-    median, _, best = equal.rows(times, {}, {"a": ["ours"], "b": ["ours"]})
-    assert "(2 extrapolated)" in median.title
-    assert "(2 extrapolated)" in best.title
-    assert median.details["extrapolated"] == {"a": ["ours"], "b": ["ours"]}
 
 
 # ---- the command --------------------------------------------------------------------------------

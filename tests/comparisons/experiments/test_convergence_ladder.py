@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from convergence_fakes import EXACT, Fake, climbs
+from convergence_fakes import EXACT, TRUE, Fake, climbs
 
 from comparisons.experiments.convergence import methods
 from comparisons.experiments.convergence.methods import Climb, Shot, climb
-from comparisons.experiments.convergence.store import Store
+from comparisons.experiments.convergence.store import Store, weights
 
 
 def test_methods_take_turns_and_numbers_are_used_once():
@@ -23,6 +23,24 @@ def test_methods_take_turns_and_numbers_are_used_once():
     assert len(asked) == 2 * 3 * 8
     numbers = [replicate for _, replicate in a.asked]
     assert len(set(numbers)) == len(numbers)
+
+
+def test_the_variance_of_pictures_is_their_error_without_a_reference(monkeypatch):
+    fakes = {"a": Fake(), "b": Fake(noise=0.2, speed=1e-2)}
+    order = []
+
+    class Ready(methods.Stable):
+        def ready(self, method, progress=None):
+            return lambda spp, k: order.append((method, k)) or fakes[method](spp, k)
+
+    monkeypatch.setattr(methods, "Stable", Ready)
+    found = methods.in_turn(None, {name: name for name in fakes}, 64, 6)
+    assert [name for name, _ in order] == [*"abba" * 3]
+    for name, fake in fakes.items():
+        # 5 degrees of freedom in each of 576 numbers: a standard error of 2.6 %.
+        true = float((weights(TRUE) * fake.noise**2 / 64).mean())
+        assert found[name].relmse.mean() == pytest.approx(true, rel=0.1)
+        assert found[name].work == pytest.approx(fake.speed * 64 * found[name].relmse.mean())
 
 
 def test_what_is_done_is_not_done_again(tmp_path):
