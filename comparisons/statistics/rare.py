@@ -43,14 +43,14 @@ def met_once(pictures: FloatArray) -> FloatArray:
     return np.asarray(np.where(excess > ALONE * (most - least), excess, 0.0))
 
 
-def event(energy: FloatArray, scale: FloatArray) -> FloatArray:
-    """(3,): of energies met once (h, w, 3) the size over `scale`, weighted by itself; 0 if there is
-    none.
+def event(energy: FloatArray, scale: FloatArray, weight: FloatArray | float = 1.0) -> FloatArray:
+    """(3,): of energies met once (h, w, 3) the size over `scale`, weighted by itself and by
+    `weight`; 0 if there is none.
 
     If every event has the same multiple of its pixel's `scale`, this is that multiple; if all have
     one energy, it is that over the mean scale where they fell.
     """
-    return event_of(energy**2, energy * scale)
+    return event_of(weight * energy**2, weight * energy * scale)
 
 
 def event_of(squares: FloatArray, products: FloatArray) -> FloatArray:

@@ -47,7 +47,8 @@ class Margins:
     image: float = 0.001
     """About five times that offset in a scene of unit size."""
     tile: float = 0.01
-    """An edge or a contact shadow fills more of a tile than of the image."""
+    """An edge or a contact shadow fills more of a tile than of the image. The most for a row or a
+    column, too."""
     pixel: float = 0.05
     """And still more of a pixel: in a picture 256 pixels wide the offset is a fortieth of a pixel,
     and light that leaks along a contact may double the error."""

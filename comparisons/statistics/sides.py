@@ -101,14 +101,14 @@ class Side:
         for which this is unknown, zero."""
         return np.zeros_like(self.mean) if self.pictures is None else met_once(self.pictures)
 
-    def event(self, scale: FloatArray) -> FloatArray:
+    def event(self, scale: FloatArray, weight: FloatArray | float = 1.0) -> FloatArray:
         """(3,): the energy of an event of rare light in a pixel of one picture over `scale`, (h, w,
         3) and >= 0; of a known mean, that of a Poisson variable's events, the variance over the
-        mean."""
+        mean;  weight: of each pixel, besides its energy."""
         if self.pictures is not None:
-            return event(self.met_once, scale)
+            return event(self.met_once, scale, weight)
         lit = np.where(self.variance > 0.0, np.abs(self.mean), 0.0)
-        return event_of(self.variance, lit * scale)
+        return event_of(weight * self.variance, weight * lit * scale)
 
     def _dof(
         self, variance: FloatArray, fourth: FloatArray, pixels: FloatArray | float

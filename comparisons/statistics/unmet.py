@@ -34,7 +34,8 @@ class Events:
         weighted by itself as the energy of events is. Pixels without noise, such as those of a
         lamp, do not count: their light does not arrive by chance. Below the picture's mean, events
         may be as large as there, as of light that leaks into the dark, or smaller: the larger size
-        counts.
+        counts. So it does where the edge of a lamp, whose events are no multiple of its brightness,
+        has most of the energy: there the size is also weighted by events over brightness.
         The side with fewer replicates has seen fewer rare paths: its events count as at least as
         large as the other's.
         """
@@ -58,13 +59,14 @@ def _in_cells(side: Side, seen: FloatArray, sums: Callable[[FloatArray], FloatAr
     """The energy of an event of `side` in each cell of one picture;  seen: the other's radiance."""
     mean, noisy = float(seen.mean()), side.variance > (HALF * side.mean) ** 2
     found = []
-    for least in (DARK, 1.0):
+    for least, of_places in ((DARK, 0.0), (1.0, 0.0), (1.0, 2.0)):
         scale = np.maximum(seen, least * mean) if mean else np.ones_like(seen)
         lit = sums(scale * noisy)
         whole = sums(scale**2) / sums(scale)
         own = sums(scale**2 * noisy) / np.where(lit > 0.0, lit, 1.0)
-        found.append(side.event(scale) * np.where(lit > 0.0, own, whole))
-    return np.maximum(*found)
+        size = side.event(scale, scale**-of_places)
+        found.append(size * np.where(lit > 0.0, own, whole))
+    return np.asarray(np.max(found, axis=0))
 
 
 def of_image(a: Side, b: Side) -> Events:

@@ -21,7 +21,7 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Cylinder, Sphere, Torus, instances, shape
 from reference_rt.shapes.meshes import mesh as meshes
 from reference_rt.shapes.meshes import topology
-from reference_rt.textures import image_file
+from reference_rt.textures import bitmap, image_file
 
 Patch = pytest.MonkeyPatch
 
@@ -44,6 +44,12 @@ def _result(owner: Any, name: str, change: Callable[[Any], Any]) -> Callable[[Pa
         patch.setattr(owner, name, lambda *given, **more: change(right(*given, **more)))
 
     return plant
+
+
+def _argument(owner: Any, name: str, change: Callable[..., Any]) -> Callable[[Patch], None]:
+    """A fault in what a function is called with."""
+    right = getattr(owner, name)
+    return lambda patch: patch.setattr(owner, name, lambda *given: right(*change(*given)))
 
 
 def _field(owner: Any, name: str, change: Callable[[Any], Any]) -> Callable[[Patch], None]:
@@ -122,6 +128,21 @@ PLANTED: dict[str, tuple[str, Callable[[Patch], None], str]] = {
         "environment",
         _result(environment_map, "orthogonal", lambda m: m @ transform.rotate((0, 1, 0), 2)[:, :3]),
         "turns directions",
+    ),
+    "repeated images clamped at their last texel": (
+        "texture_filters",
+        _argument(bitmap, "_wrapped", lambda i, n, wrap: (i - (i == n and wrap == 0), n, wrap)),
+        "places at borders of texels differ; ",
+    ),
+    "mirrored images that repeat the edge twice": (
+        "texture_filters",
+        _argument(bitmap, "_wrapped", lambda i, n, wrap: (i + (i == 2 * n and wrap == 2), n, wrap)),
+        "textures.flipped: tiles.png: ",
+    ),
+    "a sky's first column lost": (
+        "environment",
+        _argument(environment_map, "texel", lambda table, y, x: (table, y, max(x, 1))),
+        "places at borders of texels differ; ",
     ),
     ".hdr half a mantissa brighter": ("hdr", _half_a_mantissa, "the pixel at"),
     "sRGB decoded twice": (

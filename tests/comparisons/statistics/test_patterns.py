@@ -18,7 +18,7 @@ def scene() -> FloatArray:
     return (0.5 + 0.2 * np.sin(5.0 * x) * np.cos(7.0 * y))[..., None] * np.array([1.0, 0.8, 0.3])
 
 
-def judged(changed: FloatArray, seed: int = 0, noise: float = 0.05):
+def judged(changed: FloatArray, seed: int = 0, noise: float = 0.039):
     rng = np.random.default_rng(seed)
     shape = noise**-2
     sides = [m * rng.gamma(shape, 1.0 / shape, (16, *m.shape)) for m in (changed, scene())]
@@ -38,9 +38,10 @@ def vignette(amount: float) -> FloatArray:
 
 @pytest.mark.parametrize("along", ["row", "column"])
 def test_a_line_that_tiles_and_pixels_do_not_show(along: str) -> None:
+    """Two percent, ten standard errors; twice the margin that lines with edges have."""
     for seed, k in enumerate((0, 13, 47)):
         changed = scene()
-        changed[(k,) if along == "row" else (slice(None), k)] *= 0.97
+        changed[(k,) if along == "row" else (slice(None), k)] *= 0.98
         result = judged(changed, seed)
         assert result.status == "differ"
         assert (
@@ -49,13 +50,26 @@ def test_a_line_that_tiles_and_pixels_do_not_show(along: str) -> None:
         )
 
 
-@pytest.mark.parametrize(("amount", "noise"), [(0.02, 0.03), (-0.02, 0.03), (0.01, 0.01)])
+def test_an_edge_that_moves_by_a_fortieth_of_a_pixel_is_no_difference() -> None:
+    for axis in (0, 1):
+        mean = np.ones((HEIGHT, WIDTH, 3))
+        mean[(slice(20),) if axis == 0 else (slice(None), slice(20))] = 1.25
+        moved = mean + 0.025 * (np.roll(mean, 1, axis=axis) - mean)
+        noisy = np.random.default_rng(axis).gamma(1e4, 1e-4, (2, 16, HEIGHT, WIDTH, 3))
+        a, b = side_of(moved * noisy[0]), side_of(mean * noisy[1])
+        where = 20 if axis == 0 else HEIGHT + 20
+        found, strict = line_test(a, b, Margins()), line_test(a, b, Margins(pixel=0.0))
+        assert not found.differs[where].any()
+        assert strict.differs[where].all()
+
+
+@pytest.mark.parametrize(("amount", "noise"), [(0.02, 0.04), (-0.02, 0.04), (0.008, 0.025)])
 def test_a_vignette_that_keeps_the_mean(amount: float, noise: float) -> None:
     for seed in range(3):
         result = judged(vignette(amount), seed, noise)
         assert result.status == "differ"
         assert (
-            "brightness differs smoothly over the picture, though not its mean: a whole wave"
+            "brightness differs smoothly over the picture, though not its mean: from the middle"
             in (result.reason)
         )
 
@@ -64,18 +78,24 @@ def test_each_mode_is_found_and_named() -> None:
     sides = [side_of(scene() * np.random.default_rng(k).gamma(1e4, 1e-4, (8, HEIGHT, WIDTH, 1)))
              for k in (1, 2)]  # fmt: skip
     assert mode_test(*sides, Margins()).differs.sum() == 0
-    for index, (y, x) in enumerate(ORDERS):
-        wave = np.outer(
+    waves = [
+        np.outer(
             np.cos(np.pi * y * (np.arange(HEIGHT) + 0.5) / HEIGHT),
             np.cos(np.pi * x * (np.arange(WIDTH) + 0.5) / WIDTH),
         )
+        for y, x in ORDERS
+    ]
+    for index, wave in enumerate(waves):
         changed = side_of(sides[0].pictures + 0.01 * scene().mean() * wave[..., None])
         found = mode_test(changed, sides[1], Margins())
         assert found.worst[0] == index
-        amplitude = found.difference[index] / scene().mean()
-        np.testing.assert_allclose(amplitude, 0.01, rtol=0.1)
+        expected = 0.01 * np.sqrt((wave**2).mean())
+        np.testing.assert_allclose(found.difference[index] / scene().mean(), expected, rtol=0.1)
         assert found.differs[index].all()
-        assert not np.delete(found.differs, index, axis=0).any()
+        round_too = [index, len(ORDERS)] if index in (2, 4) else [index]
+        assert not np.delete(found.differs, round_too, axis=0).any()
+    changed = side_of(sides[0].pictures + 0.01 * scene().mean() * (waves[2] + waves[4])[..., None])
+    assert mode_test(changed, sides[1], Margins()).worst[0] == len(ORDERS)
     assert named_mode(3) == "half a wave along x and half a wave along y"
     assert (named_line(5, HEIGHT), named_line(HEIGHT + 5, HEIGHT)) == ("row 5", "column 5")
 

@@ -75,6 +75,18 @@ def test_a_lamp_found_by_scattered_rays_alone_in_a_thousand_cases(event, swapped
     assert alarms <= 1
 
 
+def test_a_lamp_that_is_seen_does_not_make_events_of_its_light_small():
+    """One replicate alone meets a pixel of the lamp's rim twice as often: most of the energy that
+    was met once, and no multiple of what is seen there."""
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        rare, sampled = rare_light(rng, 16, 100.0), sampled_light(rng, 16)
+        rare[:, 2, 24] = sampled[:, 2, 24] = 300.0
+        rare[0, 2, 24] += 600.0
+        case = verdict(rare, sampled)
+        assert case.verdict == "inconclusive", case.reason
+
+
 def test_a_known_mean_with_a_lamp_found_by_scattered_rays_alone():
     rng = np.random.default_rng(0)
     many = sampled_light(rng, 64)
