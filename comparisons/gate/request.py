@@ -1,7 +1,7 @@
 """A gate's request: what the candidates are compared with."""
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -21,9 +21,10 @@ from comparisons.gate.pictures_in import Picture, pictures_of
 from comparisons.gate.reference import Reference, check_sizes, size_of
 from comparisons.gate.rim import check_rim
 from comparisons.gate.terms import is_sure, missing_terms
-from comparisons.gate.tone_curves import ESTIMATE, ToneCurve, another_exposure, curve_of, estimated
+from comparisons.gate.tone_curves import ESTIMATE, ToneCurve, curve_of, estimated
 from comparisons.renderers import WitnessName
 from comparisons.results.case import Case, Cause, FloatArray
+from comparisons.results.headline import UP_TO
 from comparisons.rungs.witness import Witness, witness_of
 from comparisons.statistics import Margins
 from reference_rt.rendering.render import Progress
@@ -162,11 +163,12 @@ class Judge:
         request, candidates = self.request, gate.args[0]
         found = self._case(gate)
         if request.tone_curve == ESTIMATE and self.curve is not None:
-            reason = f"up to a tone curve, {self.curve}: {found.reason}"
+            where = str(self.curve).replace(":", " at exposure ")
+            reason = f"{UP_TO}the tone curve {where}, estimated: {found.reason}"
             found = replace(found, reason=reason)
         if found.verdict != "differ":
             return found
-        toned = None if request.tone_curve else self._toned(candidates, found)
+        toned = None if request.tone_curve == ESTIMATE else self._toned(candidates, found)
         if toned is not None or request.references or request.baseline:
             return found if toned is None else replace(found, cause=toned)
         assert self.scene is not None
@@ -180,26 +182,30 @@ class Judge:
         return found if cause is None else replace(found, cause=cause)
 
     def _toned(self, candidates: Sequence[Picture], found: Case) -> Cause | None:
-        """That the candidate of a case that differs went through a tone curve that was not
-        declared."""
-        if not self.linear.noise_free:
-            return None
-        curve = estimated(candidates[0].radiance, self.linear.pictures[0])
-        if curve is None or (curve.name == "linear" and is_sure(found.cause)):
+        """That the candidate of a case that differs went through another tone curve, or the same at
+        another exposure."""
+        own, shown = self.curve, candidates[0].radiance
+        curve = estimated(shown, self.linear.pictures[0]) if self.linear.noise_free else None
+        if curve is None or str(curve) == str(own or "linear"):
             return None
         other = replace(self, curve=curve, request=replace(self.request, tone_curve=str(curve)))
         case = other.case(partial(gate_pictures, candidates, other.reference))
-        if case.verdict != "agree" and is_sure(found.cause):
+        is_gain = curve.name == ("linear" if own is None else own.name)
+        if is_sure(found.cause) and (case.verdict != "agree" or (is_gain and own is None)):
             return None
-        evidence = f"switch it off, or declare --tone-curve {curve}: then the pictures agree"
+        name = f"the tone curve {curve}"
+        if is_gain:
+            where = "" if own is None else " before the tone curve"
+            gain = curve.exposure / (1.0 if own is None else own.exposure)
+            name = f"constant gain of {gain:.3g}{where}"
+        evidence = f"with --tone-curve {curve} the pictures agree: declare it, or switch it off"
         if case.verdict != "agree":
             of = case.reason if case.cause is None else f"{case.cause.name}, {case.cause.evidence}"
-            evidence = f"switch it off, or declare --tone-curve {curve}; besides: {of}"
+            evidence = f"with --tone-curve {curve} most pixels are right; besides: {of}"
         before, after = (
-            float(((candidates[0].radiance - x.pictures[0]) ** 2).sum())
-            for x in (self.linear, other.reference)
+            float(((shown - judge.reference.pictures[0]) ** 2).sum()) for judge in (self, other)
         )
-        return Cause(f"the tone curve {curve}", evidence, 1.0 - after / before)
+        return Cause(name, evidence, 1.0 - after / before)
 
     def _case(self, gate: "partial[Case]", diagnosed: bool = True) -> Case:
         """The verdict.  diagnosed: whether the cause of a difference is sought by rendering."""
@@ -213,9 +219,8 @@ class Judge:
             steep, floor = curve.errors(self.linear.pictures[0], DARK)
             edges = Edges(look, request.tolerance * steep, curve, floor)
         lengths = None if known is None else _hypotheses(known, request.threads)
-        candidate = gate.args[0][0]
-        if diagnosed and (curve or (self.linear.noise_free and candidate.displayed)):
-            lengths = self._through(curve or curve_of("linear"), candidate, lengths)
+        if curve is not None and lengths is not None:
+            lengths = self._through(curve, lengths)
         return gate(
             limit=request.limit,
             name=request.name,
@@ -227,13 +232,11 @@ class Judge:
             rim=request.rim,
         )
 
-    def _through(self, curve: ToneCurve, candidate: Picture, lengths: Lengths | None) -> Lengths:
+    def _through(self, curve: ToneCurve, lengths: Lengths) -> Lengths:
         """Hypotheses about linear pictures, as the curve shows them."""
 
         def hypotheses(shown: FloatArray) -> Iterator[Hypothesis]:
-            linear = self.linear.pictures[0]
-            yield from another_exposure(curve, candidate.radiance, linear)
-            for found in () if lengths is None else lengths(linear):
+            for found in lengths(self.linear.pictures[0]):
                 yield replace(found, picture=curve(found.picture))
 
         return hypotheses
@@ -268,7 +271,8 @@ def prepared(
         return Judge(request, found, scene, curve_of(request.tone_curve))
     check_sizes(candidates, size_of(found.pictures[0]), "as the reference")
     curve = estimated(candidates[0].radiance, found.pictures[0])
-    if curve is None:
+    if curve is None or str(curve) == "linear":
+        curve = None
         found = replace(found, notes=(*found.notes, "no tone curve was recognised"))
     return Judge(request, found, scene, curve)
 

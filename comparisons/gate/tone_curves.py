@@ -7,14 +7,13 @@ Contract: a curve takes linear radiance (..., 3) to linear values of the display
 to 1.  Increasing values per channel stay so only where a curve mixes no channels: ACES and AgX do.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from scipy import optimize
 
-from comparisons.compare.diagnosis.misfit import Hypothesis
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.image import srgb
 from reference_rt.textures.image_file import linear
@@ -130,7 +129,10 @@ class ToneCurve:
     def errors(self, radiance: FloatArray, dark: float) -> tuple[float, FloatArray]:
         """How much larger relative errors of a picture (height, width, 3) become, at most, and the
         displayed values (3,) to which they are relative at least.  Those of radiance are relative
-        to a value, or to the fraction `dark` of its channel's mean."""
+        to a value, or to the fraction `dark` of its channel's mean.
+
+        Dark values change most, since curves have a foot or subtract: they do not make the errors
+        of brighter ones larger."""
         floor = dark * np.abs(radiance.mean(axis=(0, 1)))
         shown, step = self(radiance), 1e-4  # of the difference quotient
         changes = np.zeros_like(shown)
@@ -138,11 +140,11 @@ class ToneCurve:
             moved = radiance.copy()
             moved[..., channel] += step * np.maximum(radiance[..., channel], floor[channel])
             changes += np.abs(self(moved) - shown) / step
-        least = dark * float(shown.mean())
-        bright = (shown >= least) & (shown > 0.0)
+        mean = float(shown.mean())
+        bright = (shown >= mean) & (shown > 0.0)
         steep = float((changes[bright] / shown[bright]).max(initial=1.0))
-        least = max(least, float(changes[~bright].max(initial=0.0)) / steep)
-        return steep, np.full(3, least)
+        least = float(changes[~bright].max(initial=0.0)) / steep
+        return steep, np.full(3, max(least, dark * mean))
 
 
 def curve_of(text: str) -> ToneCurve:
@@ -237,28 +239,11 @@ def _codes(values: FloatArray) -> FloatArray:
 
 def estimated(candidate: FloatArray, reference: FloatArray) -> ToneCurve | None:
     """The one of CURVES, with its exposure, that takes a reference (height, width, 3) without noise
-    to the candidate, within a code in EXPLAINED of its lit pixels; None if none does, or if there
-    is none."""
+    to the candidate, within a code in EXPLAINED of its lit pixels; None if none does."""
     if not (reference.any() and np.isfinite(candidate).all()):
         return None
     fit = _Fit(candidate, reference)
     found = [fit.exposed(ToneCurve(name, of)) for name, of in CURVES.items()]
     least = min(map(fit.error, found))
     best = next(curve for curve in found if fit.error(curve) <= least + ALIKE)
-    if str(best) == "linear":
-        return None
     return best if (fit.errors(best) <= 1.0).mean() >= EXPLAINED else None
-
-
-def another_exposure(
-    curve: ToneCurve, candidate: FloatArray, reference: FloatArray
-) -> Iterator[Hypothesis]:
-    """That the candidate is the linear reference, brighter or darker before the curve."""
-    best = _Fit(candidate, reference).exposed(curve)
-    gain = best.exposure / curve.exposure
-    if abs(gain - 1.0) < 0.005:  # what few digits make of it
-        return
-    where = "" if curve.name == "linear" else " before the tone curve"
-    evidence = f"the candidate is the reference, {gain:.4g} times as bright{where}"
-    name = f"constant gain of {gain:.3g}{where}"
-    yield Hypothesis("gain", name, evidence, best(reference), 1)
