@@ -140,11 +140,11 @@ class ToneCurve:
             moved = radiance.copy()
             moved[..., channel] += step * np.maximum(radiance[..., channel], floor[channel])
             changes += np.abs(self(moved) - shown) / step
-        mean = float(shown.mean())
-        bright = (shown >= mean) & (shown > 0.0)
+        lit = shown > 0.0
+        bright = lit & (shown >= shown.mean(where=lit)) if lit.any() else lit
         steep = float((changes[bright] / shown[bright]).max(initial=1.0))
         least = float(changes[~bright].max(initial=0.0)) / steep
-        return steep, np.full(3, max(least, dark * mean))
+        return steep, np.full(3, max(least, dark * float(shown.mean())))
 
 
 def curve_of(text: str) -> ToneCurve:
