@@ -137,6 +137,14 @@ def gate(
             help="Permitted relative error of a value in a picture of --scene without noise."
         ),
     ] = 0.001,
+    tone_curve: Annotated[
+        str,
+        typer.Option(
+            metavar="CURVE[:EXPOSURE]",
+            help="What pictures without noise went through before sRGB: linear, reinhard, cineon, "
+            "aces, agx, neutral, filmic, exponential, a file of pairs, or estimate.",
+        ),
+    ] = "",
     witness: Witness = None,
     rim: Annotated[
         int,
@@ -205,6 +213,7 @@ def gate(
         }
         others |= {"baseline": baseline, "fixed": fixed, "noise-free": noise_free, "rim": rim}
         others |= {"witness": witness, "browser": browser, "allow-missing": allow_missing}
+        others |= {"tone-curve": tone_curve}
         for name, value in {**others, "junit": junit, "github": github, "define": define}.items():
             if value:
                 raise UsageError(f"--{name}: does not apply to --truth; expected one of them")
@@ -259,6 +268,7 @@ def gate(
             limit=limit,
             noise_free=noise_free,
             tolerance=tolerance,
+            tone_curve=tone_curve,
             threads=threads,
             rim=rim,
             name=name,

@@ -19,8 +19,14 @@ with NODES x NODES rays. Their spacing is SNAP: a surface may be a node away fro
 These intervals are widened by the tolerance, relative to the value, and for pictures of 8 bits by
 half a code.
 
-Contract: pictures are linear (height, width, 3), row 0 on top.  A `Look` takes points (..., 2), in
-pixels to the right and down from the picture's top left corner.
+Pictures that went through a tone curve are judged as displayed, so is what footprints see.
+Renderers average samples before the curve, after it, or as the codes that are stored: each is a
+rule.  Of curves that mix channels an average may be none of what it is made of, so the range of a
+footprint has what mixtures of any two of its extremes show.
+
+Contract: pictures are linear (height, width, 3), row 0 on top, the reference after the tone curve.
+A `Look` takes points (..., 2), in pixels to the right and down from the picture's top left corner,
+and returns radiance before the curve.
 """
 
 from collections.abc import Callable
@@ -109,6 +115,15 @@ RULES: dict[str, npt.NDArray[np.int64]] = {
 """How pixels may be sampled, in sixteenths of a pixel to the right and down.  2, 4 and 8 samples
 are those of Direct3D and Vulkan."""
 
+SPACES = ("", ", averaged after the tone curve", ", averaged as codes")
+"""Where samples are averaged: linear ones, and where there is a tone curve also displayed ones."""
+
+CHORD = np.arange(1, 8) / 8.0
+"""Shares of two values in mixtures.  A parabola that has its vertex between is off by 1/256 of its
+height."""
+
+Curve = Callable[[FloatArray], FloatArray]
+
 Look = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """The radiance (..., 3) at points of the film, and the distance (...) of what is seen there."""
 
@@ -135,21 +150,62 @@ def look_at(scene: Scene, threads: int | None = None) -> Look | None:
 
 
 class Edges(NamedTuple):
-    """What a gate knows of the footprints of pixels;  tolerance: relative error of a value."""
+    """What a gate knows of the footprints of pixels;  tolerance: relative error of a value, after
+    the tone curve;  floor (3,): the values to which it is relative at least, where there is one."""
 
     look: Look
     tolerance: float = TOLERANCE
+    curve: Curve | None = None
+    floor: FloatArray | None = None
 
     def without_rim(self, pixels: int) -> "Edges":
         return self._replace(look=lambda points: self.look(points + pixels))
 
 
 class _Law(NamedTuple):
-    """floor (3,): the values to which errors are relative at least;  displayed: 8-bit sRGB."""
+    """floor (3,): the values to which errors are relative at least;  displayed: 8-bit sRGB;  curve:
+    the tone curve."""
 
     tolerance: float
     floor: FloatArray
     displayed: bool
+    curve: Curve | None
+
+    def shown(self, radiance: FloatArray) -> FloatArray:
+        return radiance if self.curve is None else self.curve(radiance)
+
+    def with_mixtures(self, radiance: FloatArray, *bounds: FloatArray) -> tuple[FloatArray, ...]:
+        """The bounds (2, n, 3) of what nodes (n, y, x, 3) show, and of what mixtures of those nodes
+        show that are the least or the largest of a channel."""
+        if self.curve is None:
+            return bounds
+        nodes = radiance.reshape(len(radiance), -1, 3)
+        ends = np.concatenate([nodes.argmin(axis=1), nodes.argmax(axis=1)], axis=1)
+        ends = np.take_along_axis(nodes, ends[..., None], axis=1)
+        i, j = np.triu_indices(ends.shape[1], 1)
+        a, b = ends[:, i, None], ends[:, j, None]
+        mixed = self.curve(a + CHORD[:, None] * (b - a)).reshape(len(nodes), -1, 3)
+        return np.minimum(bounds[0], mixed.min(axis=1)), np.maximum(bounds[1], mixed.max(axis=1))
+
+    def by_rules(self, radiance: FloatArray, shown: FloatArray) -> tuple[list[FloatArray], ...]:
+        """The least and the largest (n, 3) that each of RULES gives to nodes, in each of SPACES,
+        where each sample is within SNAP of its place."""
+        found: tuple[list[FloatArray], ...] = [], []
+        nodes = [(at + REACH).T for at in RULES.values()]
+        curve = self.curve
+        if curve is not None:  # all samples are moved alike: single ones would mix channels
+            around = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+            for x, y in nodes:
+                moved = [curve(radiance[:, y + i, x + j].mean(axis=1)) for i, j in around]
+                found[0].append(np.min(moved, axis=0))
+                found[1].append(np.max(moved, axis=0))
+        for encode, decode in [(None, None), (srgb, linear)][: 1 if curve is None else 2]:
+            values = shown if encode is None else encode(shown)
+            for f, of in zip((minimum_filter1d, maximum_filter1d), found, strict=True):
+                moved = f(f(values, 3, axis=1), 3, axis=2)
+                means = (moved[:, y, x].mean(axis=1) for x, y in nodes)
+                of += means if decode is None else map(decode, means)
+        return found
 
     def widened(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What candidates may have whose values are within low and high."""
@@ -191,7 +247,8 @@ def edges_rung(
 
     reference: exact, also where the candidate is `displayed`, that is of 8-bit sRGB.
     """
-    law = _Law(edges.tolerance, DARK * np.abs(reference.mean(axis=(0, 1))), displayed)
+    floor = DARK * np.abs(reference.mean(axis=(0, 1))) if edges.floor is None else edges.floor
+    law = _Law(edges.tolerance, floor, displayed, edges.curve)
     differs = np.any(law.beyond(candidate, reference, reference), axis=-1)
     chosen = differs | _crossed(edges.look, law, differs.shape)
     row, column = np.nonzero(chosen)
@@ -236,7 +293,7 @@ def _crossed(look: Look, law: _Law, shape: tuple[int, ...]) -> BoolArray:
     """Which pixels seem to have an edge, by their corners, sides and centre (height, width)."""
     height, width = shape
     x, y = np.meshgrid(0.5 * np.arange(2 * width + 1), 0.5 * np.arange(2 * height + 1))
-    found, _ = look(np.stack([x, y], axis=-1))
+    found = law.shown(look(np.stack([x, y], axis=-1))[0])
     nine = np.stack([
         found[i : i + 2 * height - 1 : 2, j : j + 2 * width - 1 : 2]
         for i in range(3)
@@ -292,34 +349,33 @@ def _are_tips(
     found = [np.empty(0, np.bool_)]
     for k in range(0, len(row), 64):
         some = slice(k, k + 64)
-        low, high, step = _range(look(_nodes(row[some], column[some], AROUND, SNAP / 2.0))[0])
-        outside = law.beyond(values[some], low, high).any(axis=-1)
+        radiance, _ = look(_nodes(row[some], column[some], AROUND, SNAP / 2.0))
+        low, high, step = _range(law.shown(radiance))
+        seen = law.with_mixtures(radiance, low, high)
+        outside = law.beyond(values[some], *seen).any(axis=-1)
         found.append(_is_step(law, low, high, step, STEP) & ~outside)
     return np.concatenate(found)
 
 
-def _range(radiance: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _range(shown: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The least, the largest, and the largest step of nodes (n, y, x, 3), each (n, 3)."""
-    low, high = radiance.min(axis=(1, 2)), radiance.max(axis=(1, 2))
-    step = np.maximum(*(np.abs(np.diff(radiance, axis=k)).max(axis=(1, 2)) for k in (1, 2)))
+    low, high = shown.min(axis=(1, 2)), shown.max(axis=(1, 2))
+    step = np.maximum(*(np.abs(np.diff(shown, axis=k)).max(axis=(1, 2)) for k in (1, 2)))
     return low, high, step
 
 
 def _reduced(radiance: FloatArray, distance: FloatArray, law: _Law, values: FloatArray) -> _Seen:
     """radiance (n, NODES, NODES, 3), distance (n, NODES, NODES), values (n, 3) of the candidate."""
-    low, high, step = _range(radiance)
-
+    shown = law.shown(radiance)
+    low, high, step = _range(shown)
     channel = np.argmax((high - low) / (high + law.floor + np.finfo(float).tiny), axis=-1)
     one = np.arange(len(radiance)), channel
     contrast = np.where((high > low)[one], (high - low)[one], np.inf)
-    nodes = [(at + REACH).T for at in RULES.values()]
-    least, most = (
-        f(f(radiance, 3, axis=1), 3, axis=2) for f in (minimum_filter1d, maximum_filter1d)
-    )
-    rules = [[f[:, y, x].mean(axis=1) for x, y in nodes] for f in (least, most)]
+    rules = law.by_rules(radiance, shown)
     left = [law.beyond(values, *bounds)[one] for bounds in zip(*rules, strict=True)]
-    mean = 0.5 * (rules[0][-1] + rules[1][-1])[one]
-    seen = radiance[one[0], :, :, channel]
+    area = len(RULES) - 1
+    mean = 0.5 * (rules[0][area] + rules[1][area])[one]
+    seen = shown[one[0], :, :, channel]
     inner = seen[:, 1:-1, 1:-1]  # the nodes of the pixel itself
     shift = [inner[:, :, -1] - inner[:, :, 0], inner[:, -1] - inner[:, 0]]
     nearest = distance.min(axis=(1, 2), keepdims=True)
@@ -336,7 +392,7 @@ def _reduced(radiance: FloatArray, distance: FloatArray, law: _Law, values: Floa
     turn = np.floor(16.0 * (np.arctan2(modes[:, 1], modes[:, 0]) / (2.0 * np.pi) + 0.5))
     return _Seen(
         np.stack([np.min(rules[0], axis=0), np.max(rules[1], axis=0)]),
-        np.stack([low, high]),
+        np.stack(law.with_mixtures(radiance, low, high)),
         _is_step(law, low, high, step, STEP),
         np.stack(left, axis=-1) / contrast[:, None],
         np.column_stack([modes, np.ones(len(modes))]),
@@ -365,7 +421,7 @@ def _of_all(seen: _Seen, tips: int) -> dict[str, Any]:
             "margin": MARGIN,
         }
     return {
-        "rule": list(RULES)[best],
+        "rule": [name + space for space in SPACES for name in RULES][best],
         "choices": tips + int(np.count_nonzero(np.abs(rest) > MOST_LEFT)),
         "modes": found,
     }
@@ -397,7 +453,7 @@ def _words(numbers: dict[str, Any]) -> str:
     codes = "half a code and " if numbers["codes"] else ""
     text = (
         f"{numbers['inside']:,} pixels inside surfaces are judged within "
-        f"{codes}{100.0 * numbers['tolerance']:g} %, {numbers['edge']:,} on edges by what their "
+        f"{codes}{100.0 * numbers['tolerance']:.3g} %, {numbers['edge']:,} on edges by what their "
         "footprints see"
     )
     if numbers["rule"]:

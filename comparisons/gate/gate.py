@@ -1,12 +1,13 @@
 """The gate: another renderer's pictures against a reference, rung by rung."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from comparisons import statistics
 from comparisons.compare import diagnosis
+from comparisons.compare.diagnosis.misfit import Hypothesis
 from comparisons.compare.judge import Lights, despite, likeliest_cause, with_vote
 from comparisons.compare.looks import Looks, level_of
 from comparisons.compare.path_length import Lengths
@@ -139,6 +140,7 @@ def judged(
             )
         else:
             shown = _displayed(reference.pictures)
+            lengths = None if lengths is None else _displayed_later(lengths)
             notes.append(
                 "the candidate is stored as 8-bit sRGB: the reference is rounded and clamped to 1 "
                 "in the same way, and brighter values are not compared"
@@ -309,6 +311,16 @@ def _is_dithered(candidate: FloatArray, reference: FloatArray) -> bool:
 def _displayed(pictures: FloatArray) -> FloatArray:
     """Linear pictures rounded to 8-bit sRGB."""
     return linear(np.round(255.0 * srgb(np.clip(pictures, 0.0, 1.0))) / 255.0)
+
+
+def _displayed_later(lengths: Lengths) -> Lengths:
+    """The same of pictures that are rendered only if they are needed: rounding is no misfit."""
+
+    def hypotheses(reference: FloatArray) -> Iterator[Hypothesis]:
+        for one in lengths(reference):
+            yield replace(one, picture=_displayed(one.picture))
+
+    return hypotheses
 
 
 def _notes(candidates: Sequence[Picture]) -> tuple[str, ...]:

@@ -63,6 +63,7 @@ class ImageGate:
         limit: float = 0.005,
         noise_free: bool = False,
         tolerance: float = 0.001,
+        tone_curve: str = "",
         rim: int = 0,
         defaults: Mapping[str, str] | None = None,
     ) -> "Case":
@@ -75,9 +76,9 @@ class ImageGate:
         accept` wrote;  reference: pictures, like `candidate`;  variance: a file with the variance
         of a single reference;  limit: the smallest relative bias of the image mean that must be
         detectable;  noise_free: the candidates were rendered without random numbers;  tolerance:
-        relative error of a value of such a picture of a scene;  rim: how many of the outermost
-        pixels are left out on each side;  defaults: values for the <default> elements of a Mitsuba
-        scene.
+        relative error of a value of such a picture of a scene;  tone_curve: what such a picture
+        went through, as of `gate --tone-curve`;  rim: how many of the outermost pixels are left out
+        on each side;  defaults: values for the <default> elements of a Mitsuba scene.
 
         Pictures that are too noisy to tell fail too.  Returns the
         `comparisons.results.case.Case`.
@@ -109,6 +110,7 @@ class ImageGate:
                 limit=limit,
                 noise_free=noise_free,
                 tolerance=tolerance,
+                tone_curve=tone_curve,
                 rim=rim,
                 name=self._node.nodeid + (f" [{self._calls}]" if self._calls > 1 else ""),
             )

@@ -1,27 +1,30 @@
 """A gate's request: what the candidates are compared with."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 from comparisons.compare.compare import single_lights
+from comparisons.compare.diagnosis.misfit import Hypothesis
 from comparisons.compare.judge import Lights
 from comparisons.compare.misreadings import misreadings
 from comparisons.compare.one_scene import NotebookCase
 from comparisons.compare.path_length import Lengths, path_lengths
 from comparisons.gate import baselines, reference
 from comparisons.gate.digest import scene_digest
-from comparisons.gate.edges import TOLERANCE, Edges, look_at
+from comparisons.gate.edges import DARK, TOLERANCE, Edges, look_at
 from comparisons.gate.gate import LIMIT, gate_pictures
 from comparisons.gate.pictures_in import Picture, pictures_of
-from comparisons.gate.reference import Reference, check_sizes
+from comparisons.gate.reference import Reference, check_sizes, size_of
 from comparisons.gate.rim import check_rim
-from comparisons.gate.terms import missing_terms
+from comparisons.gate.terms import is_sure, missing_terms
+from comparisons.gate.tone_curves import ESTIMATE, ToneCurve, curve_of, estimated
 from comparisons.renderers import WitnessName
-from comparisons.results.case import Case
+from comparisons.results.case import Case, Cause, FloatArray
+from comparisons.results.headline import UP_TO
 from comparisons.rungs.witness import Witness, witness_of
 from comparisons.statistics import Margins
 from reference_rt.rendering.render import Progress
@@ -39,9 +42,10 @@ class Request:
 
     variance: a file with the variance of a single reference;  baselines: their folder;  limit: the
     smallest relative bias of the image mean that must be detectable;  noise_free: the renderer uses
-    no random numbers;  tolerance: relative error of a value of such a picture;  rim: how many of
-    the outermost pixels are left out;  name: the case's;  witness: a third renderer, of the scene,
-    with a box filter.
+    no random numbers;  tolerance: relative error of a value of such a picture;  tone_curve: what
+    such a picture went through, as `curve_of` takes it, or ESTIMATE;  rim: how many of the
+    outermost pixels are left out;  name: the case's;  witness: a third renderer, of the scene, with
+    a box filter.
     """
 
     scene: Scene | None = None
@@ -52,6 +56,7 @@ class Request:
     limit: float = LIMIT
     noise_free: bool = False
     tolerance: float = TOLERANCE
+    tone_curve: str = ""
     threads: int | None = None
     rim: int = 0
     name: str = "candidate"
@@ -81,6 +86,8 @@ class Request:
             )
         if self.baseline:
             baselines.check_name(self.baseline)
+        if self.tone_curve not in ("", ESTIMATE):
+            curve_of(self.tone_curve)
 
 
 def gated(
@@ -101,6 +108,7 @@ def gate(
     reference: Any = None,
     limit: float = LIMIT,
     noise_free: bool = False,
+    tone_curve: str = "",
     rim: int = 0,
     threads: int | None = None,
 ) -> NotebookCase:
@@ -111,58 +119,127 @@ def gate(
     which are replicates with different seeds;  scene: a scene or a scene file, which reference_rt
     renders;  reference: in its place, pictures that are right;  limit: the smallest relative bias
     of the image mean that must be detectable;  noise_free: they were rendered without random
-    numbers;  rim: how many of the outermost pixels are left out;  threads: ours, None for all.
+    numbers;  tone_curve: what such a picture went through, as of `gate --tone-curve`;  rim: how
+    many of the outermost pixels are left out;  threads: ours, None for all.
 
     The case has `verdict`, `reason`, `cause` and `write_page`.  Raises ImageError, SceneError,
     UsageError.
     """
     known = scene if scene is None or isinstance(scene, Scene) else Scene.load(os.fspath(scene))
     others = () if reference is None else pictures_of(reference)
-    request = Request(known, others, limit=limit, noise_free=noise_free, threads=threads, rim=rim)
+    settings: dict[str, Any] = {"limit": limit, "noise_free": noise_free, "tone_curve": tone_curve}
+    request = Request(known, others, threads=threads, rim=rim, **settings)
     case = gated(request, pictures_of(pictures))
     return NotebookCase(**{field.name: getattr(case, field.name) for field in fields(case)})
 
 
 @dataclass(frozen=True)
 class Judge:
-    """What candidates are compared with, and what is known for the diagnosis of a difference."""
+    """What candidates are compared with, and what is known for the diagnosis of a difference.
+
+    linear: the reference before the tone curve.
+    """
 
     request: Request
-    reference: Reference
+    linear: Reference
     scene: Scene | None
+    curve: ToneCurve | None = None
+
+    @cached_property
+    def reference(self) -> Reference:
+        """What candidates show if they are right."""
+        if self.curve is None:
+            return self.linear
+        how = "was estimated from the candidate: another strength of all lights is not seen"
+        if self.request.tone_curve != ESTIMATE:
+            how = "was declared"
+        note = f"the tone curve {self.curve} {how}; the reference is displayed through it"
+        shown = self.curve(self.linear.pictures)
+        return replace(self.linear, pictures=shown, notes=(*self.linear.notes, note))
 
     def case(self, gate: "partial[Case]") -> Case:
         """The verdict by `gate_pictures` or `judged`, whose candidates and reference are given
         already; a difference from our own pictures may be of terms that the renderer lacks."""
-        request = self.request
+        request, candidates = self.request, gate.args[0]
         found = self._case(gate)
-        if found.verdict != "differ" or request.references or request.baseline:
+        if request.tone_curve == ESTIMATE and self.curve is not None:
+            where = str(self.curve).replace(":", " at exposure ")
+            reason = f"{UP_TO}the tone curve {where}, estimated: {found.reason}"
+            found = replace(found, reason=reason)
+        if found.verdict != "differ":
             return found
+        toned = None if request.tone_curve == ESTIMATE else self._toned(candidates, found)
+        if toned is not None or request.references or request.baseline:
+            return found if toned is None else replace(found, cause=toned)
         assert self.scene is not None
-        candidates = gate.args[0]
 
         def judged(scene: Scene) -> Case:
             ours = reference.of_scene(scene, request.limit, threads=request.threads)
-            plain = Judge(replace(request, witness=None), ours, scene)
-            return plain._case(partial(gate_pictures, candidates, ours), diagnosed=False)
+            plain = Judge(replace(request, witness=None), ours, scene, self.curve)
+            return plain._case(partial(gate_pictures, candidates, plain.reference), diagnosed=False)
 
-        cause = missing_terms(self.scene, found, request.rim, request.threads, judged)
+        cause = missing_terms(self.scene, found, request.rim, request.threads, judged, self.curve)
         return found if cause is None else replace(found, cause=cause)
 
-    def _case(self, gate: Callable[..., Case], diagnosed: bool = True) -> Case:
+    def _toned(self, candidates: Sequence[Picture], found: Case) -> Cause | None:
+        """That the candidate of a case that differs went through another tone curve, or the same at
+        another exposure."""
+        own, shown = self.curve, candidates[0].radiance
+        curve = estimated(shown, self.linear.pictures[0]) if self.linear.noise_free else None
+        if curve is None or str(curve) == str(own or "linear"):
+            return None
+        other = replace(self, curve=curve, request=replace(self.request, tone_curve=str(curve)))
+        case = other.case(partial(gate_pictures, candidates, other.reference))
+        is_gain = curve.name == ("linear" if own is None else own.name)
+        if is_sure(found.cause) and (case.verdict != "agree" or (is_gain and own is None)):
+            return None
+        name = f"the tone curve {curve}"
+        if is_gain:
+            where = "" if own is None else " before the tone curve"
+            gain = curve.exposure / (1.0 if own is None else own.exposure)
+            name = f"constant gain of {gain:.3g}{where}"
+        evidence = f"with --tone-curve {curve} the pictures agree: declare it, or switch it off"
+        if case.verdict != "agree":
+            of = case.reason if case.cause is None else f"{case.cause.name}, {case.cause.evidence}"
+            evidence = f"with --tone-curve {curve} most pixels are right; besides: {of}"
+        before, after = (
+            float(((shown - judge.reference.pictures[0]) ** 2).sum()) for judge in (self, other)
+        )
+        return Cause(name, evidence, 1.0 - after / before)
+
+    def _case(self, gate: "partial[Case]", diagnosed: bool = True) -> Case:
         """The verdict.  diagnosed: whether the cause of a difference is sought by rendering."""
-        request, scene = self.request, self.scene
+        request, scene, curve = self.request, self.scene, self.curve
         known = scene if diagnosed else None
-        look = look_at(scene, request.threads) if scene and self.reference.noise_free else None
+        edges = None
+        look = look_at(scene, request.threads) if scene and self.linear.noise_free else None
+        if look is not None and curve is None:
+            edges = Edges(look, request.tolerance)
+        elif look is not None and curve is not None:
+            steep, floor = curve.errors(self.linear.pictures[0], DARK)
+            edges = Edges(look, request.tolerance * steep, curve, floor)
+        lengths = None if known is None else _hypotheses(known, request.threads)
+        if curve is not None and lengths is not None:
+            lengths = self._through(curve, lengths)
         return gate(
             limit=request.limit,
             name=request.name,
-            lights=None if known is None else _lights(known, request.threads),
-            lengths=None if known is None else _hypotheses(known, request.threads),
-            edges=None if look is None else Edges(look, request.tolerance),
+            # Pictures of single lights do not add up behind a curve.
+            lights=None if known is None or curve else _lights(known, request.threads),
+            lengths=lengths,
+            edges=edges,
             witness=self._witness(),
             rim=request.rim,
         )
+
+    def _through(self, curve: ToneCurve, lengths: Lengths) -> Lengths:
+        """Hypotheses about linear pictures, as the curve shows them."""
+
+        def hypotheses(shown: FloatArray) -> Iterator[Hypothesis]:
+            for found in lengths(self.linear.pictures[0]):
+                yield replace(found, picture=curve(found.picture))
+
+        return hypotheses
 
     def _witness(self) -> Witness | None:
         if self.request.witness is None or self.request.scene is None:
@@ -186,7 +263,18 @@ def prepared(
         check_sizes(candidates, expected, f"the size of the scene '{scene.name}'")
     found, scene = _judge(request, scene, [picture.name for picture in candidates], say)
     check_rim(found.pictures.shape, request.rim)
-    return Judge(request, found, scene)
+    if not request.tone_curve:
+        return Judge(request, found, scene)
+    if not found.noise_free:
+        raise UsageError("--tone-curve: the pictures have noise; expected those of a scene without")
+    if request.tone_curve != ESTIMATE:
+        return Judge(request, found, scene, curve_of(request.tone_curve))
+    check_sizes(candidates, size_of(found.pictures[0]), "as the reference")
+    curve = estimated(candidates[0].radiance, found.pictures[0])
+    if curve is None or str(curve) == "linear":
+        curve = None
+        found = replace(found, notes=(*found.notes, "no tone curve was recognised"))
+    return Judge(request, found, scene, curve)
 
 
 def _judge(

@@ -40,27 +40,35 @@ RIVAL = 2.0
 """Such pictures leave at most this many times what the best one leaves."""
 
 
+def is_sure(cause: Cause | None) -> bool:
+    return cause is not None and cause.explained > SURE and cause.name not in UNSURE
+
+
 def missing_terms(
-    scene: Scene, case: Case, rim: int, threads: int | None, judged: Callable[[Scene], Case]
+    scene: Scene,
+    case: Case,
+    rim: int,
+    threads: int | None,
+    judged: Callable[[Scene], Case],
+    curve: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Cause | None:
     """The terms without which our picture of a scene is the candidate's in a case that differs;
     None if it is no such picture, or if the case has a sure cause.
 
     rim: how many pixels the case leaves out on each side;  judged: the case of the same candidates
-    against another scene.
+    against another scene;  curve: the tone curve of its pictures.
     """
-    known = case.cause
-    if known is not None and known.explained > SURE and known.name not in UNSURE:
+    if is_sure(case.cause):
         return None
     if case.images is None or case.images.candidate.shape != case.images.reference.shape:
         return None
     misfit = Misfit(case.images)
     if not (misfit.clear and misfit.excess > 0.0):
         return None
-    left = {
-        terms: (misfit.squares(_picture(other, rim, threads)), other)
-        for terms, other in variants(scene)
-    }
+    left = {}
+    for terms, other in variants(scene):
+        picture = _picture(other, rim, threads)
+        left[terms] = misfit.squares(picture if curve is None else curve(picture)), other
     most = WORTH * misfit.squares(misfit.reference)
     best = min((squares for squares, _ in left.values()), default=most)
     for terms, (squares, other) in left.items():

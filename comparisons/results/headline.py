@@ -8,6 +8,9 @@ from typing import Any
 from comparisons.results.case import Case, RungResult, Status
 from comparisons.results.rungs import OF_LIGHT
 
+UP_TO = "up to "
+"""How the reason of a case begins that is judged up to something, which a colon ends."""
+
 
 def headline(case: Case) -> str:
     """One sentence without a full stop, such as "likeliest cause: half-pixel shift in x; 25 of 64
@@ -39,18 +42,20 @@ def in_short(case: Case) -> tuple[str, str]:
     """The headline, and apart from it the smallest bias of the image mean that would have been
     seen; "" if it is unknown."""
     seen = _detectable(next((rung for rung in case.rungs if rung.name == "statistics"), None))
-    sentence = _NONE if case.verdict == "agree" else headline(case)
+    sentence = _none(case) if case.verdict == "agree" else headline(case)
     return sentence, "" if seen is None else _percent(seen)
 
 
-_NONE = "no difference was found"
+def _none(case: Case) -> str:
+    up_to = case.reason.partition(":")[0] if case.reason.startswith(UP_TO) else ""
+    return f"no difference was found {up_to}".strip()
 
 
 def _agree(case: Case) -> str:
-    _, seen = in_short(case)
+    none, seen = in_short(case)
     if not seen:
-        return _NONE
-    return f"{_NONE}, and a bias of the image mean of {seen} would have been seen"
+        return none
+    return f"{none}, and a bias of the image mean of {seen} would have been seen"
 
 
 def _unchanged(case: Case) -> str:

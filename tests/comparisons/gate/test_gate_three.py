@@ -22,10 +22,17 @@ SCENES = [
 ]
 
 
-def judged(scene: str, page: str = str(THREE / "page.html"), folder: str = "scenes") -> dict:
+def judged(
+    scene: str,
+    page: str = str(THREE / "page.html"),
+    folder: str = "scenes",
+    query: str = "",
+    more: tuple[str, ...] = (),
+) -> dict:
+    """query: what the page's address has besides;  more: options of the gate."""
     result, found = run(
-        *("--browser", f"{page}?standard=textbook"),
-        *("--scene", str(THREE / folder / f"{scene}.yaml")),
+        *("--browser", f"{page}?standard=textbook{query}"),
+        *("--scene", str(THREE / folder / f"{scene}.yaml"), *more),
     )
     (case,) = found["cases"]
     assert result.exit_code == {"agree": 0, "invalid": 3}.get(case["verdict"], 1), result.output
@@ -124,14 +131,98 @@ FAULTS = {
 }
 
 
+def plant(change: tuple[str, str], folder: Path) -> None:
+    text = (THREE / "page.html").read_text(encoding="utf-8")
+    assert text.count(change[0]) == 1
+    (folder / "page.html").write_text(text.replace(*change))
+    (folder / "node_modules").symlink_to(THREE / "node_modules")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_planted_faults_are_named(fault: str, tmp_path: Path) -> None:
     scene, change, name = FAULTS[fault]
-    text = (THREE / "page.html").read_text(encoding="utf-8")
-    assert text.count(change[0]) == 1
-    (tmp_path / "page.html").write_text(text.replace(*change))
-    (tmp_path / "node_modules").symlink_to(THREE / "node_modules")
+    plant(change, tmp_path)
     case = judged(scene, "page.html")
     assert case["verdict"] == "differ"
     assert name in case["cause"]["name"]
+
+
+CURVES = {
+    "ACESFilmic": "aces",
+    "AgX": "agx",
+    "Neutral": "neutral",
+    "Reinhard": "reinhard",
+    "Cineon": "cineon",
+    "Linear": "linear",
+}
+"""Names in three.js, and ours."""
+
+
+def toned(tone: str, exposure: float, scene: str, *curve: str, page: str | None = None) -> dict:
+    """The case of a canvas of 8 bits, with the curve that is declared."""
+    more = ("--suffix", ".png", *(x for one in curve for x in ("--tone-curve", one)))
+    query = f"&tone={tone}&exposure={exposure}"
+    return judged(scene, page or str(THREE / "page.html"), query=query, more=more)
+
+
+def test_a_declared_tone_curve() -> None:
+    case = toned("AgX", 0.6, "orthographic", "agx:0.6")
+    assert case["verdict"] == "agree", case["reason"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tone", CURVES)
+def test_the_tone_curves_of_three(tone: str) -> None:
+    """Declared they agree, undeclared and wrongly declared they are named."""
+    name = CURVES[tone]
+    for exposure in (1.0, 0.6):
+        curve = f"{name}:{exposure:g}"
+        for scene in ("ball", "metal"):
+            case = toned(tone, exposure, scene, curve)
+            assert case["verdict"] == "agree", (scene, exposure, case["reason"])
+        case = toned(tone, exposure, "ball")
+        if name == "linear":
+            assert case["verdict"] == ("agree" if exposure == 1.0 else "differ")
+            assert exposure == 1.0 or "constant gain of 0." in case["cause"]["name"]
+        else:
+            assert case["verdict"] == "differ"
+            assert case["cause"]["name"] == f"the tone curve {curve.removesuffix(':1')}"
+    for other in CURVES.values():
+        if other != name:
+            case = toned(tone, 1.0, "ball", other)
+            assert case["verdict"] == "differ"
+            assert case["cause"]["name"] == f"the tone curve {name}"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tone", CURVES)
+def test_samples_that_are_averaged_as_codes(tone: str) -> None:
+    """As a canvas of three.js averages them; the box is flat, so that nothing is extrapolated."""
+    case = judged(
+        "orthographic",
+        query=f"&tone={tone}&samples=4",
+        more=("--suffix", ".png", "--tone-curve", CURVES[tone]),
+    )
+    assert case["verdict"] == "agree", case["reason"]
+
+
+BEHIND = {
+    "light": ("ball", ("linear(of.intensity), 1, 0, 2", "linear(of.intensity), 1.05, 0, 2")),
+    "half a pixel": ("ball", FAULTS["half a pixel"][1]),
+    "roughness squared": ("metal", FAULTS["roughness squared"][1]),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tone", CURVES)
+@pytest.mark.parametrize("fault", BEHIND)
+def test_faults_behind_a_tone_curve_are_seen(fault: str, tone: str, tmp_path: Path) -> None:
+    scene, change = BEHIND[fault]
+    plant(change, tmp_path)
+    case = toned(tone, 0.6, scene, f"{CURVES[tone]}:0.6", page="page.html")
+    assert case["verdict"] == "differ"
+    if fault == "light":
+        assert case["cause"]["name"] == "constant gain of 1.05 before the tone curve"
+    if fault == "roughness squared":
+        assert case["cause"]["name"] == "roughness is squared once too often"
