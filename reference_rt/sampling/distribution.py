@@ -42,10 +42,10 @@ def blended(sums: FloatArray, k: int, s: float, i: int) -> float:
 
 
 def guide(sums: FloatArray) -> IdArray:
-    """Where to begin a search in running sums (m, n + 1), as `bracket` reads it: (m, n // 4 + 2)
-    cells, at equal steps of each row's total (Chen and Asau 1974, the method of guide tables)."""
-    steps = sums.shape[1] // 4 + 1
-    found, last = np.empty((len(sums), steps + 1), np.int32), sums.shape[1] - 2
+    """Where to begin a search in running sums (m, n + 1), as `bracket` reads it: (m, n + 1) cells,
+    at equal steps of each row's total (Chen and Asau 1974, the method of guide tables)."""
+    steps, last = sums.shape[1] // 4 + 1, sums.shape[1] - 2
+    found = np.empty((len(sums), steps + 1), np.int32)
     for row, cells in zip(sums, found, strict=True):
         after = np.searchsorted(row, np.linspace(0.0, row[-1], steps + 1), side="right")
         cells[:] = np.minimum(after - 1, last)
@@ -61,6 +61,19 @@ def bracket(guides: IdArray, k: int, u: float) -> tuple[int, int]:
     low = min(guides[k, j], guides[k + 1, j])
     high = max(guides[k, j + 1], guides[k + 1, j + 1])
     return int(low), int(high) + 1
+
+
+@kernel
+def guided_cell_of(sums: FloatArray, guides: IdArray, u: float) -> int:
+    """As `cell_of`, for the share u of the last of running sums (n + 1,) that have `guides`."""
+    steps, x = len(guides) - 1, u * sums[-1]
+    j = min(int(u * steps), steps - 1)
+    i = int(guides[j])
+    while i < len(sums) - 2 and sums[i + 1] <= x:
+        i += 1
+    while sums[i] > x:  # by rounding alone
+        i -= 1
+    return i
 
 
 @kernel

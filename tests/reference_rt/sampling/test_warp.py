@@ -15,6 +15,7 @@ from reference_rt.sampling.warp import (
     concentric_disk,
     cosine_hemisphere,
     on_circle,
+    turns,
     uniform_sphere,
 )
 
@@ -68,6 +69,30 @@ def test_on_circle():
         for found, exact in zip(pair, exact_circle(float(t)), strict=True)
     )
     assert worst <= 4 * U  # what its docstring promises
+
+
+@entry_kernel
+def _turns(points, out):
+    for i in range(len(points)):
+        out[i] = turns(points[i, 0], points[i, 1])
+
+
+def test_turns():
+    """Against the library's atan2 in long double, over all octants and near their borders."""
+    rng = np.random.default_rng(73)
+    angles = np.concatenate([rng.uniform(-math.pi, math.pi, 3000), np.arange(1, 9) * math.pi / 8])
+    sizes = 10.0 ** rng.uniform(-150, 150, len(angles))
+    near_axes = rng.normal(size=(400, 2)) * [1.0, 1e-9]
+    around = np.column_stack([np.sin(angles), np.cos(angles)]) * sizes[:, None]
+    points = np.concatenate([around, near_axes, near_axes[:, ::-1]])
+    found = np.empty(len(points))
+    _turns(points, found)
+    y, x = points.T.astype(np.longdouble)
+    exact = np.arctan2(y, x) / (2 * np.longdouble("3.14159265358979323846264338327950288"))
+    assert np.abs(found / exact - 1).max() <= 4 * U  # what its docstring promises
+    corners = [(0, 0), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-0.0, -1)]
+    at_corners = [turns(float(a), float(b)) for a, b in corners]
+    assert at_corners == [0, 0, 0.125, 0.25, 0.375, 0.5, -0.375, -0.25, -0.5]
 
 
 def test_quarter_turns_are_exact():
