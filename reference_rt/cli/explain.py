@@ -272,7 +272,7 @@ def _light_selection(tables: SceneTables, used: Lines, pruned: Lines) -> None:
         pruned.append(("light tree", "few lights: they are selected by power"))
     else:
         size = _bytes(sum(column.nbytes for column in tree))
-        placed = np.count_nonzero(tree.light >= 0)
+        placed = np.count_nonzero(tree.trail >= 0)
         used.append(("light tree", f"{placed:,} lights, by power, distance and direction ({size})"))
 
 

@@ -159,7 +159,9 @@ def least(x: Any) -> Any:
 
 
 def square_root(x: Any) -> Any:
-    return x.call("sqrt") if isinstance(x, SimdVector) else math.sqrt(x)
+    if isinstance(x, SimdVector):
+        return x.call("sqrt")
+    return np.sqrt(x) if isinstance(x, np.ndarray) else math.sqrt(x)
 
 
 def with_sign(x: Any, sign: Any) -> Any:
@@ -214,7 +216,7 @@ def broadcast(builder: ir.IRBuilder, x: ir.Value, of: ir.Type = F64_VECTOR) -> i
     return builder.shuffle_vector(one, undefined, which)
 
 
-# ---- `simd_kernel`: makes a generic function of `simd.py` callable from kernels ------------------
+# ---- `simd_kernel` and `simd_lanes`: make generic functions callable from kernels ----------------
 
 
 class _Index:
@@ -288,18 +290,22 @@ def _conditions(found: Any) -> tuple[Any, ...]:
     return found if isinstance(found, tuple) else (found,)
 
 
+def _as_lanes(arguments: Any) -> list[Any]:
+    """A SIMD kernel's arguments in plain Python: NumPy arrays of VECTOR_WIDTH numbers."""
+    return [
+        _PlainMemory(a)
+        if isinstance(a, np.ndarray)
+        else (np.full(VECTOR_WIDTH, a) if isinstance(a, float) else int(a))
+        for a in arguments
+    ]
+
+
 def plain(function: Callable[..., Any]) -> Callable[..., int]:
     """A SIMD kernel as plain Python on NumPy arrays of VECTOR_WIDTH numbers."""
 
     @functools.wraps(function)
     def run(*arguments: Any) -> int:
-        wrapped: list[Any] = [
-            _PlainMemory(a)
-            if isinstance(a, np.ndarray)
-            else (np.full(VECTOR_WIDTH, a) if isinstance(a, float) else int(a))
-            for a in arguments
-        ]
-        lanes = np.concatenate(_conditions(function(*wrapped)))
+        lanes = np.concatenate(_conditions(function(*_as_lanes(arguments))))
         return int.from_bytes(np.packbits(lanes, bitorder="little").tobytes(), "little")
 
     return run
@@ -321,6 +327,38 @@ def simd_kernel(function: Callable[..., Any]) -> Callable[..., int]:
     if numba.config.DISABLE_JIT:
         return plain(function)
 
+    def bits_of(context: Any, builder: Any, found: Any) -> Any:
+        bits = I64(0)
+        for k, condition in enumerate(_conditions(found)):
+            of_lanes = builder.bitcast(condition.value, ir.IntType(VECTOR_WIDTH))
+            bits = builder.or_(
+                bits, builder.shl(builder.zext(of_lanes, I64), I64(k * VECTOR_WIDTH))
+            )
+        return bits
+
+    return _as_intrinsic(function, types.int64, bits_of)
+
+
+def simd_lanes(function: Callable[..., Any]) -> Callable[..., tuple[float, ...]]:
+    """The same for a generic function that returns a vector: the kernel returns a tuple of its
+    VECTOR_WIDTH numbers."""
+    if numba.config.DISABLE_JIT:
+
+        @functools.wraps(function)
+        def run(*arguments: Any) -> tuple[float, ...]:
+            return tuple(function(*_as_lanes(arguments)).tolist())
+
+        return run
+    lanes = types.UniTuple(types.float64, VECTOR_WIDTH)
+
+    def tuple_of(context: Any, builder: Any, found: Any) -> Any:
+        numbers = [builder.extract_element(found.value, I32(k)) for k in range(VECTOR_WIDTH)]
+        return context.make_tuple(builder, lanes, numbers)
+
+    return _as_intrinsic(function, lanes, tuple_of)
+
+
+def _as_intrinsic(function: Callable[..., Any], returns: Any, finish: Any) -> Callable[..., Any]:
     def typed(typing_context: Any, *arguments: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             written: list[Any] = []
@@ -332,15 +370,9 @@ def simd_kernel(function: Callable[..., Any]) -> Callable[..., int]:
                     written.append(SimdVector(builder, broadcast(builder, value)))
                 else:
                     written.append(_Index(builder, value))
-            bits = I64(0)
-            for k, condition in enumerate(_conditions(function(*written))):
-                of_lanes = builder.bitcast(condition.value, ir.IntType(VECTOR_WIDTH))
-                bits = builder.or_(
-                    bits, builder.shl(builder.zext(of_lanes, I64), I64(k * VECTOR_WIDTH))
-                )
-            return bits
+            return finish(context, builder, function(*written))
 
-        return types.int64(*map(_taken_as, arguments)), generate
+        return returns(*map(_taken_as, arguments)), generate
 
     # Numba reads the number of arguments from the signature.
     names = ("typing_context", *inspect.signature(function).parameters)
@@ -348,7 +380,7 @@ def simd_kernel(function: Callable[..., Any]) -> Callable[..., int]:
     typed.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
         [inspect.Parameter(name, kind) for name in names]
     )
-    made: Callable[..., int] = intrinsic(typed)
+    made: Callable[..., Any] = intrinsic(typed)
     return made
 
 

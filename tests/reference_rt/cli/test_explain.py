@@ -77,7 +77,7 @@ def test_everything_is_used(tmp_path):
     assert {*LIGHTS, *WRAPPERS, "tangents"} <= set(lights)
     assert laws["film layers"] == "albedo, normal, position"
     assert lights["film layers"] == "depth, id, variance"
-    assert lights["light tree"].startswith(f"{(tables.lights.tree.light >= 0).sum()} lights")
+    assert lights["light tree"].startswith(f"{(tables.lights.tree.trail >= 0).sum()} lights")
     assert lights["environment"].startswith("a map of 4 x 3 pixels")
     assert {"vertex normals", "vertex colours", "texture coordinates", "Mitsuba"} <= set(without)
     assert "ambient light" in dark

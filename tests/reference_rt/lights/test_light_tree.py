@@ -32,7 +32,7 @@ def _picks(tree, p, n, u, light, probability):
 
 
 def probabilities(tree, p, n):
-    out = np.empty(len(tree.leaf))
+    out = np.empty(len(tree.trail))
     with np.errstate(all="ignore"):
         _probabilities(tree, np.array([p], float), np.array([n], float), out)
     return out
@@ -187,7 +187,7 @@ def test_lights_that_share_a_place():
     )
     tree = build(many, np.arange(1000), 1000)
     assert probabilities(tree, [0, 0, 0], ANY_SIDE) == pytest.approx(1e-3, rel=1e-12)
-    assert max(int(t).bit_length() for t in tree.trail) <= 10
+    assert max(int(t).bit_length() for t in tree.trail) <= 12  # 8^4 lights
     here = probabilities(tree, [1, 2, 3], ANY_SIDE)
     assert np.isfinite(here).all()
 
@@ -211,7 +211,7 @@ def test_a_spot_in_the_tree_lights_its_cone_alone():
     parts = (of_spots(spot.tabulate()), of_points(point.tabulate()))
     bounds = LightBounds(*(np.concatenate(c) for c in zip(*parts, strict=True)))
     tree = build(bounds, np.array([3, 1]), 5)
-    assert list(tree.leaf >= 0) == [False, True, False, True, False]
+    assert list(tree.trail >= 0) == [False, True, False, True, False]
     edge = 5 * math.tan(math.radians(30))
     for x, is_lit in ((0, True), (0.999 * edge, True), (1.001 * edge, False)):
         found = probabilities(tree, [x, 0, 0], ANY_SIDE)
