@@ -32,6 +32,15 @@ AnyIntegrator = Annotated[RayCast | Whitted | Direct | Path, Field(discriminator
 INTEGRATORS: dict[type, str] = {PathSetup: "path", DirectSetup: "direct", WhittedSetup: "whitted"}
 """The names of the integrators, by the classes of their setups."""
 
+
+def setup_of(integrator: Whitted | Direct | Path, has_numbers: bool) -> Any:
+    """What `radiances` takes for an integrator: its own, or that of the path tracer that draws the
+    same samples.  has_numbers: whether the sampler has random numbers."""
+    if has_numbers and isinstance(integrator, Direct):
+        return integrator.as_path() or integrator.setup()
+    return integrator.setup()
+
+
 _of_one = ByClass("radiance")
 _of_one.register(DirectSetup, direct.radiance)
 _of_one.register(WhittedSetup, whitted.radiance)
@@ -55,4 +64,13 @@ radiances = _radiances.function
 """radiances(setup, scene, samplers, n, scratch): estimates of the radiance along the first n of
 `scratch.rays`, into `scratch.totals`."""
 
-__all__ = ["AnyIntegrator", "Direct", "Path", "RayCast", "Whitted", "WhittedSetup", "radiances"]
+__all__ = [
+    "AnyIntegrator",
+    "Direct",
+    "Path",
+    "RayCast",
+    "Whitted",
+    "WhittedSetup",
+    "radiances",
+    "setup_of",
+]

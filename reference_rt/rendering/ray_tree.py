@@ -224,8 +224,6 @@ class _Recorder:
     def _shade(self, r: _Return) -> None:
         if r.caller in (_WHITTED, _DIRECT):
             self.rays[-1]["point"] = r.result.point
-        else:
-            self._last["point"] = r
 
     # ---- Whitted and direct illumination --------------------------------------------------------
 
@@ -285,7 +283,7 @@ class _Recorder:
         kind = CAMERA if own["depth"] == 0 else SCATTERED
         record = self._ray(kind, self._surface, own["ray"], state.throughput, found=own["hit"])
         if own["hit"].kind >= 0:
-            record["point"] = self._last.pop("point").result.point
+            record["point"] = own["point"]
         if (emission := self._last.pop("emission", None)) is not None:
             record["numbers"] |= _of_emission(emission.own, state.bsdf_pdf)
         if (scatter := self._last.pop("scatter", None)) is not None:

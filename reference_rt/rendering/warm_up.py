@@ -131,7 +131,8 @@ def _picture(scene: BuiltScene) -> tuple[list[Job], SceneTables, Any, Any]:
     return jobs, scene.tables, scene.camera.setup(1, 1), film.filter.setup()
 
 
-_INTEGRATORS = PathTracing(), Direct(), Whitted(), RayCast()
+_INTEGRATORS = PathTracing(), Direct(light_samples=2), Whitted(), RayCast()
+"""Of `Direct` one that is not rendered as paths (`Direct.as_path`)."""
 
 
 def _pictures(scene: BuiltScene) -> Iterator[Call]:

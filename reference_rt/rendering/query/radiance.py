@@ -13,7 +13,7 @@ import numpy.typing as npt
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import UNIT_ROUNDOFF, Ray
 from reference_rt.core.vec3 import row
-from reference_rt.integrators import AnyIntegrator, Path, RayCast
+from reference_rt.integrators import AnyIntegrator, Path, RayCast, setup_of
 from reference_rt.integrators.ray_cast import cast
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel
@@ -74,7 +74,7 @@ def radiance(
             )
         mean = _colours(tables, rays, threads)
         return Radiance(shaped(mean, rays.shape), shaped(np.zeros_like(mean), rays.shape))
-    setup = integrator.setup()
+    setup = setup_of(integrator, True)
     mean, error = estimate(tables, setup, rays, spp, seed, threads)
     if integrator.deterministic:
         error = np.zeros_like(mean)

@@ -39,7 +39,7 @@ from reference_rt.textures.lookup import Textures, textures_operations
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
-INTEGRATORS_OF = (rt.Path(), rt.Direct(), rt.Whitted(), rt.RayCast())
+INTEGRATORS_OF = (rt.Path(), rt.Direct(light_samples=2), rt.Whitted(), rt.RayCast())
 FILES = sorted(SCENES.glob("*.yaml"))
 
 
