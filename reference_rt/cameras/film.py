@@ -3,7 +3,7 @@
 Filter importance sampling: film points are drawn from a density made of the filter.  A pixel is the
 integral of radiance times the filter around its centre.  Each pixel draws its own
 points from the filter (Ernst et al. 2006): pixels share no samples, so that any tiling and any
-number of threads give the same bits.  Where a filter is negative, points are drawn from its
+number of threads give the same bits.  Where a filter is negative, points are drawn from about its
 absolute value and have negative weights; the mean is unbiased, since samples are not divided by the
 sum of their weights.  Lengths are in pixels.
 
@@ -18,11 +18,11 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import BeforeValidator, Field
 
-from reference_rt.core.arrays import FloatArray
+from reference_rt.core.arrays import FloatArray, IdArray
 from reference_rt.core.model import Description, Positive
 from reference_rt.jit.kernel import ByClass, kernel
 from reference_rt.jit.links import Linkable
-from reference_rt.sampling.distribution import cell_of
+from reference_rt.sampling.distribution import guide, guided_cell_of, running_sums
 
 
 class Filter(Description):
@@ -144,13 +144,20 @@ class WindowedSinc(NamedTuple):
 
 
 class Tabulated(NamedTuple):
-    """A tabulated filter.  It is profile / integral;  edges, cumulative (cells + 1,): a piecewise
-    linear CDF close to that of its absolute value, from which points are drawn."""
+    """A tabulated filter.  It is profile / integral;  starts (cells,): where cells begin, `width`
+    wide, first those where it is negative;  cumulative (cells + 1,): running sums of the cells'
+    probabilities, and guides, see `distribution.guide`."""
 
     profile: Gaussian | Cubics | WindowedSinc
     integral: float
-    edges: FloatArray
+    starts: FloatArray
+    width: float
     cumulative: FloatArray
+    guides: IdArray
+
+
+MOST_NEGATIVE = 0.125
+"""The largest share of points that are drawn where a filter is negative."""
 
 
 @functools.cache
@@ -161,6 +168,13 @@ def _tabulated(
 
     Cells are 1/64 pixel, or 1/32 of a Gaussian's s, wide; four Gauss points integrate a function
     that is smooth inside a cell to below rounding.
+
+    Cells are as probable as the integral of the profile's absolute value, but for one factor for
+    all where it is negative, which come first: together their share is a power of two.  Of n Sobol'
+    points exactly that share is then negative, from n = 1 / share² on in both x and y, so that the
+    weights add up to n, but for their differences within cells.  For Lanczos' filter and 64 points
+    the mean weight has a standard deviation of 0.007 so, and of 0.1 without (measured).  The power
+    is near 1.5 times the share of the absolute value, since fewer points suffice for a larger one.
     """
     edges = np.linspace(-radius, radius, cells + 1)
     nodes, weights = np.polynomial.legendre.leggauss(4)
@@ -168,8 +182,25 @@ def _tabulated(
     x = middle[:, None] + half[:, None] * nodes
     values = np.array([float(_profile(profile, float(at))) for at in x.flat]).reshape(x.shape)
     masses = half * (np.abs(values) @ weights)
-    cumulative = np.concatenate([[0.0], np.cumsum(masses)])
-    return Tabulated(profile, float(half @ (values @ weights)), edges, cumulative / cumulative[-1])
+    masses /= masses.sum()
+    negative = values @ weights < 0.0
+    if negative.any():
+        own = masses[negative].sum()
+        share = min(2.0 ** round(math.log2(1.5 * own)), MOST_NEGATIVE)
+        masses *= np.where(negative, share / own, (1.0 - share) / (1.0 - own))
+    order = np.argsort(~negative, kind="stable")
+    cumulative = running_sums(masses[order])
+    cumulative /= cumulative[-1]
+    if negative.any():
+        cumulative[negative.sum()] = share
+    return Tabulated(
+        profile,
+        float(half @ (values @ weights)),
+        edges[order],
+        2.0 * radius / cells,
+        cumulative,
+        guide(cumulative[None])[0],
+    )
 
 
 @kernel
@@ -229,12 +260,10 @@ def _tent_offset(tent: TentSetup, u: float) -> tuple[float, float]:
 @kernel
 def _tabulated_offset(table: Tabulated, u: float) -> tuple[float, float]:
     """Uniform inside a cell of the table; the weight is the filter over the cell's density."""
-    edges, cumulative = table.edges, table.cumulative
-    cell = cell_of(cumulative, u)
-    low, high = cumulative[cell], cumulative[cell + 1]
-    span = edges[cell + 1] - edges[cell]
-    x = edges[cell] + span * (u - low) / (high - low)
-    return x, _profile(table.profile, x) / table.integral * span / (high - low)
+    cell = guided_cell_of(table.cumulative, table.guides, u)
+    low, high = table.cumulative[cell], table.cumulative[cell + 1]
+    x = table.starts[cell] + table.width * (u - low) / (high - low)
+    return x, _profile(table.profile, x) / table.integral * table.width / (high - low)
 
 
 _offset = ByClass("film_offset")

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import qmc
 
 import reference_rt as rt
 from reference_rt.cameras.film import film_offset
@@ -161,28 +162,48 @@ def test_offsets_stay_inside_and_rise(description):
     setup = description.setup()
     u = np.array([0.0, 2.0**-33, *np.linspace(0.001, 0.999, 999), 1 - 2.0**-33, 1 - 2.0**-53])
     drawn = np.array([film_offset(setup, float(x)) for x in u])
-    assert (np.diff(drawn[:, 0]) >= 0).all()
-    assert (np.diff(drawn[1:-1, 0]) > 0).all()
+    for part in (drawn[drawn[:, 1] < 0], drawn[drawn[:, 1] >= 0]):  # negative weights come first
+        assert (np.diff(part[:, 0]) >= 0).all()
+        assert (np.diff(part[1:-1, 0]) > 0).all()
     assert np.abs(drawn[:, 0]).max() <= radius(description)
     assert np.isfinite(drawn).all()
 
 
 @pytest.mark.parametrize("description", EVERY, ids=str)
-def test_weights_are_even_but_for_the_sign(description):
-    """Drawn from |f|: weights are near ±(integral of |f|) away from where f is 0."""
+def test_weights_are_even_on_either_side_of_zero(description):
+    """Drawn from |f|: weights are near a number where f is positive, and near another where it is
+    negative, away from where f is 0."""
     setup = description.setup()
     if not hasattr(setup, "cumulative"):
         return
     x, w = quadrature(np.linspace(-radius(description), radius(description), 20_001), 1)
     f = np.array([description.value(float(at)) for at in x.flat])
-    size = np.sum(w.ravel() * np.abs(f))
     drawn = np.array([film_offset(setup, float(u)) for u in np.linspace(0.001, 0.999, 999)])
     values = np.array([description.value(float(at)) for at in drawn[:, 0]])
     assert np.array_equal(np.sign(drawn[:, 1]), np.sign(values))
-    large = np.abs(values) > 0.2 * np.abs(f).max()
-    # Half a cell, a 128th of a pixel or a 64th of a Gaussian's s, changes f by at most that times
-    # its slope, which is below 2 of its maximum: 0.016 of it, of at least 0.2.
-    assert np.allclose(np.abs(drawn[large, 1]), size, rtol=0.08)
+    share = 0.0
+    if (f < 0).any():
+        middles = setup.starts + 0.5 * setup.width
+        share = setup.cumulative[sum(description.value(float(at)) < 0 for at in middles)]
+        assert math.log2(share) == round(math.log2(share))
+    for sign, points in ((1, 1.0 - share), (-1, share)):
+        size = np.sum(w.ravel() * np.maximum(sign * f, 0.0))
+        large = sign * values > 0.2 * np.abs(f).max()
+        # Half a cell, a 128th of a pixel or a 64th of a Gaussian's s, changes f by at most that
+        # times its slope, which is below 2 of its maximum: 0.016 of it, of at least 0.2.
+        assert np.allclose(sign * drawn[large, 1], size / max(points, 1e-9), rtol=0.08)
+
+
+@pytest.mark.parametrize("description", EVERY, ids=str)
+def test_as_many_of_sobol_points_are_negative(description):
+    """In each pixel of 256 samples, so that an even picture has no noise."""
+    setup = description.setup()
+    counts = set()
+    for seed in range(20):
+        u = qmc.Sobol(2, rng=np.random.default_rng(seed)).random(256)
+        weights = [film_offset(setup, x)[1] * film_offset(setup, y)[1] for x, y in u.tolist()]
+        counts.add(sum(weight < 0 for weight in weights))
+    assert len(counts) == 1
 
 
 @pytest.mark.cases(2)
