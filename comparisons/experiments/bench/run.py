@@ -22,7 +22,7 @@ from rich.console import Console, RenderableType
 from rich.console import Group as Tables
 from rich.progress import TimeElapsedColumn
 
-from comparisons.experiments.bench import equal, mesh_rays, program, scenes
+from comparisons.experiments.bench import mesh_rays, program, scenes
 from comparisons.experiments.bench.row import LIMIT, Row, Setting, row_from
 from comparisons.report.terminal import fitted
 from comparisons.results.files import write_json
@@ -140,11 +140,11 @@ class Group(NamedTuple):
 
 
 GROUPS = (
-    Group("equal_samples", tuple(equal.VARIANTS), equal.measure_samples),
+    Group("equal_samples", tuple(scenes.VARIANTS), scenes.measure_samples),
     Group(
         "mesh_rays", (*(f"rays_{kind}" for kind in mesh_rays.GOALS), "any_hit"), mesh_rays.measure
     ),
-    Group("threads", ("threads",), equal.measure_threads),
+    Group("threads", ("threads",), scenes.measure_threads),
     Group("cold", ("cold", "cold_median"), program.measure_ever),
     Group("new_kind", ("new_kind", "new_kind_median"), program.measure_new),
     Group("warm_up", ("warm_up", "after_warm_up"), program.measure_warmed),

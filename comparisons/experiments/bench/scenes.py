@@ -1,5 +1,6 @@
 """Every scene of the smoke suite that Mitsuba can render, and kinds of scenes that suites lack:
-seconds at equal samples, and relMSE times seconds, against Mitsuba's default and best sampler.
+seconds at equal samples, and relMSE times seconds, against Mitsuba's default and best sampler; the
+Cornell box on one thread, and against Mitsuba's scalar variant.
 
 relMSE is the variance of independent pictures, relative to their mean: no reference is needed,
 whose own noise would favour the noisier side.  It does not see a bias, which `compare` tests: the
@@ -18,7 +19,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.experiments.bench.mesh_rays import blob, write_ply
-from comparisons.experiments.bench.row import Row, Setting, against, spread
+from comparisons.experiments.bench.row import (
+    Row,
+    Setting,
+    against,
+    alternate,
+    seconds,
+    spread,
+)
 from comparisons.experiments.convergence.methods import (
     CANDIDATES,
     METHODS,
@@ -29,7 +37,10 @@ from comparisons.experiments.convergence.methods import (
 )
 from comparisons.experiments.convergence.store import weights
 from comparisons.suites.suite import Entry, load_suite
+from reference_rt.cameras.film import BoxFilter, Film
+from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import Sobol
 from reference_rt.util.errors import ReferenceUnavailableError
 from reference_rt.util.files import temporary_folder
 
@@ -332,3 +343,88 @@ def lines(rows: Sequence[Row]) -> list[list[str]]:
         line += [f"{row.ratio:.2f}", f"{low:.2f} to {high:.2f}", f"{default:.2f}", f"{best:.2f}"]
         found.append((best, [*line, facts["sampler"] + (", another picture" * is_other(row))]))
     return [line for _, line in sorted(found, key=lambda one: -one[0])]
+
+
+# ---- the Cornell box: variants of Mitsuba, and a second thread ---------------------------------
+
+CORNELL, SIZE = "cornell_box", 256
+
+VARIANTS = {"cornell_llvm": ("llvm_ad_rgb", 0.8), "cornell_scalar": ("scalar_rgb", 0.25)}
+"""Variant of Mitsuba and goal, by row."""
+
+
+def measure_samples(setting: Setting) -> list[Row]:
+    """Both rows.  Raises ReferenceUnavailableError."""
+    return [_samples_row(name, setting) for name in VARIANTS]
+
+
+def cornell_box(setting: Setting) -> Scene:
+    """The scene at the measured size; a quarter of the pixels for a quick run."""
+    size = SIZE // 2 if setting.quick else SIZE
+    film = Film(width=size, height=size, filter=BoxFilter())
+    return setting.load(CORNELL).changed(film=film, sampler=Sobol(spp=SPP))
+
+
+def _samples_row(name: str, setting: Setting) -> Row:
+    from comparisons.mitsuba import scene as mitsuba_scene
+    from comparisons.mitsuba.backend import variant
+    from comparisons.mitsuba.translate import load
+
+    mitsuba_variant, goal = VARIANTS[name]
+    scene = cornell_box(setting)
+    size = scene.film.width
+    with variant(mitsuba_variant):
+        counterpart = load(scene)
+        seeds = iter(range(1, 1000))
+
+        def ours() -> object:
+            return render(scene, tables=scene.tables, threads=setting.threads)
+
+        def theirs() -> object:
+            return mitsuba_scene.picture(counterpart.mi_scene, SPP, next(seeds))
+
+        render(scene, tables=scene.tables, specialised=True), theirs()  # compile
+        times = alternate(
+            {"ours": lambda: seconds(ours), mitsuba_variant: lambda: seconds(theirs)},
+            say=setting.say,
+        )
+    return against(
+        name,
+        f"{CORNELL} {size}x{size}, {SPP} samples per pixel: time / Mitsuba {mitsuba_variant}",
+        times["ours"],
+        (f"Mitsuba {mitsuba_variant}", times[mitsuba_variant]),
+        goal,
+        details={"seconds": times, "threads": setting.threads, "sampler": "sobol / independent"},
+    )
+
+
+# ---- a second thread ----------------------------------------------------------------------------
+
+
+def measure_threads(setting: Setting) -> list[Row]:
+    """Samples per second of two threads against one.
+
+    Raises ReferenceUnavailableError on a machine with one core.
+    """
+    if setting.threads < 2:
+        raise ReferenceUnavailableError("two threads need two cores")
+    scene = cornell_box(setting)
+    samples = scene.film.width * scene.film.height * SPP / 1e6
+
+    def rate(threads: int) -> float:
+        return samples / seconds(lambda: render(scene, tables=scene.tables, threads=threads))
+
+    render(scene, tables=scene.tables, specialised=True)  # compile
+    rates = alternate({"2 threads": lambda: rate(2), "1 thread": lambda: rate(1)}, say=setting.say)
+    return [
+        against(
+            "threads",
+            f"{CORNELL}: samples per second of two threads / of one",
+            rates["2 threads"],
+            ("one thread", rates["1 thread"]),
+            1.9,
+            unit="Msamples/s",
+            better="higher",
+            details={"rates": rates},
+        )
+    ]

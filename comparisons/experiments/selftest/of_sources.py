@@ -118,8 +118,8 @@ OF_KERNELS = (
     ),
     SourceFault(
         "one edge too many", "cornell_box", "integrators/path.py",
-        "    if depth + 1 >= path.max_depth:\n",
-        "    if depth + 1 >= path.max_depth + 1:\n",
+        "    is_last, emits = depth + 1 >= path.max_depth, ",
+        "    is_last, emits = depth >= path.max_depth, ",
     ),
     SourceFault(
         "roulette that compensates too little", "colour_bleeding", "integrators/path.py",
@@ -242,7 +242,8 @@ FAULTS = (
     ),
     SourceFault(
         "sky off by half a texel", SKY, "lights/emitters/environment_map.py",
-        "    across, down = azimuth * width - 0.5,", "    across, down = azimuth * width,",
+        "    across = turns(right, -back) * width - 0.5\n",
+        "    across = turns(right, -back) * width\n",
     ),
     SourceFault(
         "1/pi written as 0.32", BOX, "materials/bsdfs/diffuse.py",
@@ -256,8 +257,8 @@ FAULTS = (
     SourceFault(
         "another probability at the root of the light tree", "many_lights",
         "lights/selection/choice.py",
-        "            u /= left\n            probability *= left\n",
-        "            u /= left\n            probability *= left if i > 1 else 0.9 * left\n",
+        "        probability *= child.probability\n",
+        "        probability *= child.probability * (0.9 if probability == 1.0 else 1.0)\n",
     ),
     SourceFault(
         "lights below a grazing cosine left out", "soft_shadows", "integrators/direct_light.py",
@@ -286,7 +287,7 @@ FAULTS = (
     ),
     SourceFault(
         "a sky clamped at its seam", SKY, "lights/emitters/environment_map.py",
-        "    left, beside = column % width, (column + 1) % width\n",
-        "    left, beside = max(column, 0), min(column + 1, width - 1)\n",
+        "        left += width\n    beside = left + 1 if left + 1 < width else 0\n",
+        "        left = 0\n    beside = min(int(column) + 1, width - 1)\n",
     ),
 )  # fmt: skip

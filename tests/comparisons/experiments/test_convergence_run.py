@@ -25,7 +25,7 @@ from comparisons.experiments.convergence.methods import (
 )
 from comparisons.experiments.convergence.outputs import COLUMNS, write_results, write_table
 from comparisons.experiments.convergence.page import write_page
-from comparisons.experiments.convergence.run import prepared
+from comparisons.experiments.convergence.run import converge, prepared
 from comparisons.experiments.convergence.store import (
     COUNT,
     Settings,
@@ -189,7 +189,7 @@ def counted_time(monkeypatch):
 @pytest.mark.slow
 def test_times_to_an_error(own_cache, counted_time):
     scene = Scene.load(SCENES / "cornell_box.yaml")
-    asked = {"only": ("ours", "mitsuba_llvm"), "starts": False, "crops": False}
+    asked = {"only": ("ours", "mitsuba_llvm"), "crops": False}
     settings = Settings(time_limit=1.0, size=(16, 12), targets=(0.3,), **asked)
     found = converge(scene, settings).findings
     assert "ours" in found

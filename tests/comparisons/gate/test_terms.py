@@ -1,7 +1,6 @@
 """Renderers without shadows, without light that is scattered again, and without highlights are
 recognised, and only those."""
 
-import numpy as np
 import pytest
 
 from comparisons.gate.pictures_in import Picture
@@ -75,11 +74,9 @@ def test_a_part_of_a_term_is_not_named() -> None:
         render(scene.changed(integrator=Direct(shadows=shadows))).colour
         for shadows in (True, False)
     )
-    for wrong in (0.5 * (right + bright), 0.5 * bright, np.maximum(bright - 0.01, 0.0)):
+    for wrong in (0.5 * (right + bright), 0.5 * bright):
         assert "without" not in cause(judged(scene, [wrong]))
-    assert (
-        judged(scene, [right]).verdict == "unchanged" or judged(scene, [right]).verdict == "agree"
-    )
+    assert judged(scene, [right]).verdict in ("unchanged", "agree")
 
 
 def test_a_small_shadow_is_no_bad_tile() -> None:

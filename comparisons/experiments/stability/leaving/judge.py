@@ -56,10 +56,11 @@ def exact_of(placed: Placed, subject: Subject) -> Exact:
 
 
 def row_of(subject: Subject) -> dict[str, Any]:
-    """The columns of a subject's row; a polygon's outline is one of all polygons."""
+    """The columns of a subject's row; a polygon's outline, and what is the same for all triangles,
+    is one of all."""
     columns = subject.table._asdict().items()
     return {
-        name: column if name == "outline" else column[[subject.row]]
+        name: column if name == "outline" or len(column) == 1 else column[[subject.row]]
         for name, column in columns
         if column is not None
     }
