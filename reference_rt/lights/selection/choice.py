@@ -139,8 +139,8 @@ def _chosen(importances: tuple[float, ...], u: float) -> Child:
     total = after_g + h
     x = min(u, _BELOW_ONE) * total  # below the total
     # Sums and choices of values: branches that take either way would cost more than all the rest.
-    number = (x >= after_a) + (x >= after_b) + (x >= after_c) + (x >= after_d)
-    number += (x >= after_e) + (x >= after_f) + (x >= after_g)
+    number = int(x >= after_a) + int(x >= after_b) + int(x >= after_c) + int(x >= after_d)
+    number += int(x >= after_e) + int(x >= after_f) + int(x >= after_g)
     own = b if x >= after_a else a
     own = c if x >= after_b else own
     own = d if x >= after_c else own

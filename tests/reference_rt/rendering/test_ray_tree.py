@@ -67,7 +67,15 @@ def test_a_tree_adds_up_to_the_rendered_sample(case, tmp_path):
     """Bit for bit: the traced contributions, times the filter's weight, are the sum of the sample
     that compiled kernels compute; a ray that is traced alone ends where it ended in the sample."""
     make, changes = CASES[case]
-    scene = make(tmp_path).changed(**changes)
+    check_sums(make(tmp_path).changed(**changes))
+
+
+def test_a_light_tree_adds_up():
+    """Plain Python picks the lights that compiled kernels do, where children are lanes."""
+    check_sums(rt.Scene.load(SCENES / "many_lights.yaml").changed(film=SMALL))
+
+
+def check_sums(scene):
     film, spp = scene.film, 1 if isinstance(scene.integrator, rt.RayCast) else 2
     places = [(x, y, (x + y) % spp) for x in (1, film.width // 2) for y in range(1, film.height, 2)]
     trees, prepared = ray_trees(scene, places), Prepared(scene, threads=1)
