@@ -165,7 +165,7 @@ def _materials(tables: SceneTables, used: Lines, pruned: Lines) -> None:
     if materials.oriented is None:
         pruned.append(("tangents", "no material depends on the directions of u and v"))
     else:
-        used.append(("tangents", "dp/du and dp/dv at every hit"))
+        used.append(("tangents", "dp/du and dp/dv where a material depends on them"))
 
 
 def _layers(layers: FlattenedMaterials | None, used: Lines, pruned: Lines) -> None:

@@ -1,13 +1,13 @@
 """From a hit to the input of the BSDF: the point, its shading frame, its texture lookups."""
 
 from reference_rt.accel.geometry import Geometry, coordinates, tangents
-from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import Hit, Ray, SurfacePoint
 from reference_rt.core.vec3 import Frame, Vec3, frame_from_normal, to_local
 from reference_rt.integrators.scene_tables import SceneTables, surface
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.links import is_absent
-from reference_rt.materials import Shading, prepare, uses_textures
+from reference_rt.materials import Materials, Shading, is_oriented, prepare, uses_textures
 from reference_rt.materials.material import oriented_frame
 from reference_rt.materials.textured import evaluate_textures, lookup_cache_size
 from reference_rt.shapes.shape import Tangents
@@ -31,9 +31,7 @@ def shade_point(
     scene: SceneTables, ray: Ray, hit: Hit, point: SurfacePoint, kept: FloatArray
 ) -> Shading:
     """The same, where the `surface` of the hit is known."""
-    world = _tangents(scene.materials.oriented, scene.geometry, ray, hit)
-    frame = _frame(scene.materials.oriented, point.ns, world)
-    local = Tangents(to_local(frame, world.dpdu), to_local(frame, world.dpdv))
+    frame, local = _frame(scene.materials, scene.geometry, ray, hit, point)
     at = place(scene, point.material, ray, hit)
     looked = evaluate_textures(scene.materials.textured, point.material, at, kept)
     flat_leaves = kept[lookup_cache_size(scene.materials.textured) :]
@@ -62,20 +60,16 @@ def texture_place(textures: Textures | None, geometry: Geometry, ray: Ray, hit: 
 
 
 @kernel
-def _tangents(oriented: IntArray | None, geometry: Geometry, ray: Ray, hit: Hit) -> Tangents:
-    if oriented is None:
-        zero = Vec3(0.0, 0.0, 0.0)
-        return Tangents(zero, zero)
-    if oriented[0] == 0:
-        zero = Vec3(0.0, 0.0, 0.0)
-        return Tangents(zero, zero)
-    return tangents(geometry, ray, hit)
-
-
-@kernel
-def _frame(oriented: IntArray | None, ns: Vec3, world: Tangents) -> Frame:
-    if oriented is None:
-        return frame_from_normal(ns)
-    if oriented[0] == 0:
-        return frame_from_normal(ns)
-    return oriented_frame(ns, world)
+def _frame(
+    materials: Materials, geometry: Geometry, ray: Ray, hit: Hit, point: SurfacePoint
+) -> tuple[Frame, Tangents]:
+    """The shading frame, and the tangents in it, which are 0 for materials that need none: on a
+    floor under a brushed ball they took a tenth of the time (measured)."""
+    zero = Vec3(0.0, 0.0, 0.0)
+    if materials.oriented is None:
+        return frame_from_normal(point.ns), Tangents(zero, zero)
+    if not is_oriented(materials, point.material):
+        return frame_from_normal(point.ns), Tangents(zero, zero)
+    world = tangents(geometry, ray, hit)
+    frame = oriented_frame(point.ns, world)
+    return frame, Tangents(to_local(frame, world.dpdu), to_local(frame, world.dpdv))

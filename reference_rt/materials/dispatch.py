@@ -36,7 +36,7 @@ class Materials(NamedTuple):
     uses_u_lobe (n,): whether `sample` uses `u_lobe`; None if none does.
     behind (n,): whether light from both sides of the surface counts; None if it never does.
     shown (n): the colour for ray casting.
-    oriented (1,): present if any material is anisotropic, or tilted by a texture.
+    oriented (n,): whether it is anisotropic, or tilted by a texture; None if none is.
     asks (n,): whether a texture is used; None if all or none use one.
     textured: None if no colour is textured.
     flat_leaves: None if no material is made of others.
@@ -104,6 +104,12 @@ def uses_textures(materials: Materials, m: int) -> bool:
 def takes_light_from_behind(materials: Materials, m: int) -> bool:
     """Whether light from both sides of the surface may reach the viewer."""
     return _flag(materials.behind, m, False)
+
+
+@kernel
+def is_oriented(materials: Materials, m: int) -> bool:
+    """Whether what the material scatters depends on the directions of dp/du and dp/dv."""
+    return _flag(materials.oriented, m, False)
 
 
 @kernel

@@ -220,7 +220,7 @@ def linked_materials(
         uses_u_lobe=_present(materials.uses_u_lobe, n, 0),
         behind=_present(materials.behind, n, 0),
         shown=_always_textured(materials.shown),
-        oriented=np.array([int(materials.oriented is not None)]),
+        oriented=_present(materials.oriented, n, 0),
         asks=_present(materials.asks, n, int(is_textured)),
         textured=textured,
         flat_leaves=flat,

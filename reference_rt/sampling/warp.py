@@ -77,6 +77,13 @@ def turns(y: float, x: float) -> float:
 
 
 @kernel
+def around(y: float, x: float) -> float:
+    """`turns` from 0 to 1."""
+    angle = turns(y, x)
+    return angle if angle >= 0.0 else angle + 1.0
+
+
+@kernel
 def concentric_disk(u0: float, u1: float) -> tuple[float, float]:
     """A uniform point on the unit disk: concentric squares become circles (Shirley & Chiu 1997, "A
     Low Distortion Map Between Disk and Square").  (1/2, 1/2) maps to the centre exactly.

@@ -340,8 +340,7 @@ def material_tables(scene: SceneModel, palette: Palette, default: bool) -> Mater
     if default or not materials:
         materials[DEFAULT] = Diffuse()
     leaves, flat_leaves = _Leaves(materials, palette), FlattenedBuilder(palette)
-    kinds, rows, traits, shown = [], [], [], []
-    oriented = False
+    kinds, rows, traits, shown, oriented = [], [], [], [], []
     for name in materials:
         try:
             shown.append(palette.colours(_shown(name, materials), np.inf))
@@ -360,7 +359,7 @@ def material_tables(scene: SceneModel, palette: Palette, default: bool) -> Mater
         kinds.append(kind)
         rows.append(row)
         traits.append(_traits(found, materials))
-        oriented = oriented or any(needs_tangents(path, materials) for path in found)
+        oriented.append(int(any(needs_tangents(path, materials) for path in found)))
     smooth, uses_u_lobe, behind = np.ascontiguousarray(np.array(traits, np.int64).T)
     asks = np.array([uses_textures(name, materials) for name in materials], np.int64)
     is_one_table = len(leaves.parts) == 1 and set(kinds) == leaves.parts.keys()
@@ -371,7 +370,7 @@ def material_tables(scene: SceneModel, palette: Palette, default: bool) -> Mater
         uses_u_lobe=uses_u_lobe if uses_u_lobe.any() else None,
         behind=behind if behind.any() else None,
         shown=join(shown),
-        oriented=np.ones(1, np.int64) if oriented else None,
+        oriented=np.array(oriented) if any(oriented) else None,
         asks=asks if asks.any() and not asks.all() else None,
         textured=textured_table(materials, palette),
         flat_leaves=flat_leaves.tables(),

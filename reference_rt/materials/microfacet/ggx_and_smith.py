@@ -23,7 +23,7 @@ from reference_rt.core.arrays import IntArray
 from reference_rt.core.vec3 import Vec3, dot, normalize
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.microfacet.fresnel import Refraction, fresnel
-from reference_rt.sampling.warp import about_normal, on_circle
+from reference_rt.sampling.warp import about_normal, on_circle, turns
 from reference_rt.textures import At, Numbers, Palette, number_at
 from reference_rt.textures.texture import MayBeTexture
 
@@ -82,7 +82,7 @@ def _slope_seen(cosine: float, sine: float, u: float) -> float:
     """
     u = max(u, _LEAST)
     most = cosine / sine if cosine < FAR * sine else FAR
-    grazing = math.atan2(sine, cosine) / (0.5 * math.pi)
+    grazing = 4.0 * turns(sine, cosine)
     x = (1.0 - grazing) * about_normal(u) - grazing * math.sqrt(-math.log(u))
     goal = u * seen(cosine, sine, most)
     return _refined(cosine, sine, most, goal, x if x < most else 0.0)

@@ -19,6 +19,7 @@ from reference_rt.core.vec3 import (
     triple,
 )
 from reference_rt.jit.kernel import kernel
+from reference_rt.sampling.warp import around, turns
 from reference_rt.shapes import placement
 from reference_rt.shapes.box import face_entered, face_left, face_normal, inside, on_face
 from reference_rt.shapes.curved.quadratic import gradient, noise, roots, short, slabs, value
@@ -295,12 +296,9 @@ def uv(quadrics: Quadrics, ray: Ray, hit: Hit) -> tuple[float, float]:
         axis = (code - 1) % 3
         a, b = y if axis == 0 else x, y if axis == 2 else z
         return 0.5 * (a + 1.0), 0.5 * (b + 1.0)
-    phi = math.atan2(y, x)
-    if phi < 0.0:
-        phi += 2.0 * math.pi
     if quadrics.clipped[i, 2] == 0:
-        return phi / (2.0 * math.pi), math.atan2(math.sqrt(x * x + y * y), z) / math.pi
-    return phi / (2.0 * math.pi), 0.5 * (z + 1.0)
+        return around(y, x), 2.0 * turns(math.sqrt(x * x + y * y), z)
+    return around(y, x), 0.5 * (z + 1.0)
 
 
 @kernel

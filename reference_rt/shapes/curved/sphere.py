@@ -12,7 +12,7 @@ from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, at, surface_
 from reference_rt.core.vec3 import Vec3, dot, frame_from_normal, length, normalize, row, to_world
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.simd import larger, select, smaller, square_root, with_sign
-from reference_rt.sampling.warp import on_circle
+from reference_rt.sampling.warp import around, on_circle, turns
 from reference_rt.shapes.curved.quadric import ellipsoid
 from reference_rt.shapes.curved.quadrics import Quadrics
 from reference_rt.shapes.placement import local_vector, owners, world_covector
@@ -169,10 +169,7 @@ def uv(spheres: Spheres, ray: Ray, hit: Hit) -> tuple[float, float]:
     """(phi / 2 pi from local +x, theta / pi from local +z), each in [0, 1]."""
     n = normalize(at(ray, hit.t) - row(spheres.center, hit.row))
     x, y, z = local_vector(spheres, hit.row, n)
-    phi = math.atan2(y, x)
-    if phi < 0.0:
-        phi += 2.0 * math.pi
-    return phi / (2.0 * math.pi), math.atan2(math.sqrt(x * x + y * y), z) / math.pi
+    return around(y, x), 2.0 * turns(math.sqrt(x * x + y * y), z)
 
 
 @kernel

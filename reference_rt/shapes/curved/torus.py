@@ -10,6 +10,7 @@ from reference_rt.core.model import Positive
 from reference_rt.core.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, SurfacePoint, at
 from reference_rt.core.vec3 import Vec3, dot, length, row
 from reference_rt.jit.kernel import kernel, local_floats
+from reference_rt.sampling.warp import around
 from reference_rt.shapes import placement
 from reference_rt.shapes.placement import (
     columns,
@@ -232,10 +233,8 @@ def uv(tori: Tori, ray: Ray, hit: Hit) -> tuple[float, float]:
     upwards)."""
     i = hit.row
     q = local_point(tori, i, at(ray, hit.t))
-    around = math.atan2(q.y, q.x) / (2.0 * math.pi)
     off = math.sqrt(q.x * q.x + q.y * q.y) - tori.major[i]
-    tube = math.atan2(q.z, off) / (2.0 * math.pi)
-    return around if around >= 0.0 else around + 1.0, tube if tube >= 0.0 else tube + 1.0
+    return around(q.y, q.x), around(q.z, off)
 
 
 @kernel

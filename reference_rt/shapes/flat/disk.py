@@ -9,7 +9,7 @@ from reference_rt.core.arrays import Bounds, FloatArray
 from reference_rt.core.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, SurfacePoint, miss
 from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.kernel import kernel
-from reference_rt.sampling.warp import concentric_disk
+from reference_rt.sampling.warp import around, concentric_disk
 from reference_rt.shapes.flat import base
 from reference_rt.shapes.shape import (
     LightPoint,
@@ -66,10 +66,7 @@ surface = base.surface
 @kernel
 def uv(disks: Disks, ray: Ray, hit: Hit) -> tuple[float, float]:
     """(r, phi / 2 pi) of the local x, y; each in [0, 1]."""
-    turns = math.atan2(hit.v, hit.u) / (2.0 * math.pi)
-    if turns < 0.0:
-        turns += 1.0
-    return math.sqrt(hit.u * hit.u + hit.v * hit.v), turns
+    return math.sqrt(hit.u * hit.u + hit.v * hit.v), around(hit.v, hit.u)
 
 
 @kernel

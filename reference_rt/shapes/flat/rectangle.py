@@ -20,6 +20,7 @@ from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, miss
 from reference_rt.core.vec3 import Vec3, dot, row
 from reference_rt.jit.kernel import kernel, reciprocal
 from reference_rt.jit.simd import select
+from reference_rt.sampling.warp import on_circle, turns
 from reference_rt.shapes.flat import base
 from reference_rt.shapes.ray_simd import make_nearer
 from reference_rt.shapes.shape import (
@@ -32,6 +33,8 @@ from reference_rt.shapes.shape import (
     pack,
     solid_angle_pdf,
 )
+
+_TURN = 2.0 * math.pi
 
 
 class SphericalRectangle(NamedTuple):
@@ -48,9 +51,12 @@ class SphericalRectangle(NamedTuple):
 
 
 @kernel
-def _corner(x: float, y: float, h: float) -> float:
-    """G(x, y)."""
-    return math.atan2(x * y, h * math.sqrt(x * x + y * y + h * h))
+def _from_middle(h: float, x: float, y0: float, y1: float) -> float:
+    """G(x, y1) - G(x, y0): the difference of two angles by one arctangent, that of their
+    tangents' sum."""
+    x2, h2 = x * x, h * h
+    r0, r1 = math.sqrt(x2 + y0 * y0 + h2), math.sqrt(x2 + y1 * y1 + h2)
+    return _TURN * turns(x * h * (y1 * r0 - y0 * r1), h2 * (r0 * r1) + x2 * (y0 * y1))
 
 
 @kernel
@@ -58,21 +64,21 @@ def solid_angle_of(h: float, x0: float, x1: float, y0: float, y1: float) -> floa
     """The sum of two triangles, each by tan(omega / 2) = |a b c| / (abc + (a·b) c + (b·c) a +
     (c·a) b) (van Oosterom & Strackee 1983, "The Solid Angle of a Plane Triangle"): the triple
     product is h times twice the area, so that small ones keep their digits, which differences of
-    angles at corners lose."""
+    angles at corners lose.  One arctangent has the sum of both angles, which is below pi."""
     volume, h2 = h * (x1 - x0) * (y1 - y0), h * h
     a, b = math.sqrt(x0 * x0 + y0 * y0 + h2), math.sqrt(x1 * x1 + y0 * y0 + h2)
     c, d = math.sqrt(x1 * x1 + y1 * y1 + h2), math.sqrt(x0 * x0 + y1 * y1 + h2)
     ac = x0 * x1 + y0 * y1 + h2
     ab, bc = x0 * x1 + y0 * y0 + h2, x1 * x1 + y0 * y1 + h2
     ad, dc = x0 * x0 + y0 * y1 + h2, x0 * x1 + y1 * y1 + h2
-    lower = math.atan2(volume, a * b * c + ab * c + bc * a + ac * b)
-    upper = math.atan2(volume, a * d * c + ad * c + dc * a + ac * d)
-    return 2.0 * (lower + upper)
+    lower = a * b * c + ab * c + bc * a + ac * b
+    upper = a * d * c + ad * c + dc * a + ac * d
+    return 2.0 * _TURN * turns(volume * (lower + upper), lower * upper - volume * volume)
 
 
 @kernel
 def project(h: float, x0: float, x1: float, y0: float, y1: float) -> SphericalRectangle:
-    phi = _corner(x0, y1, h) - _corner(x0, y0, h)
+    phi = _from_middle(h, x0, y0, y1)
     return SphericalRectangle(h, x0, x1, y0, y1, phi, solid_angle_of(h, x0, x1, y0, y1))
 
 
@@ -98,7 +104,9 @@ def sample_seen(seen: SphericalRectangle, u0: float, u1: float) -> tuple[float, 
     y: at x the solid angle is uniform in the sine y / sqrt(x² + h² + y²) (Archimedes).
     """
     h, y0, y1 = seen.h, seen.y0, seen.y1
-    half_sine = math.sin(0.5 * (seen.phi + u0 * seen.solid_angle))
+    angle = seen.phi + u0 * seen.solid_angle
+    _, half_sine = on_circle(0.5 / _TURN * abs(angle))
+    half_sine = math.copysign(half_sine, angle)
     half_sine2 = half_sine * half_sine
     lengths = math.sqrt((y0 * y0 + h * h) * (y1 * y1 + h * h))
     inner, outer = y0 * y1 + h * h, h * h - y0 * y1
@@ -138,8 +146,9 @@ _LEAST_SOLID_ANGLE = 2.0**-26
 """A light of a smaller solid angle is sampled by area: points in it are found by differences of
 angles, which round by a few u = 2^-53, so that here half of their digits are left."""
 
-_LEAST_HEIGHT = 2.0**-500
-"""In half diagonals: the square of this is a float64."""
+_LEAST_HEIGHT = 2.0**-200
+"""In half diagonals: its powers in the products of `solid_angle_of`, up to the fourth, are normal
+numbers."""
 
 
 class Rectangle(Shape):

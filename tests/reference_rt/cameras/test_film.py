@@ -157,12 +157,17 @@ def test_weights_are_unbiased(description):
         assert found == pytest.approx(expected, abs=tolerance * radius(description) ** power)
 
 
+ZERO = 1e-9
+"""Where a filter is 0 its weights are polynomials' rounding errors, 1e-14 of its maximum over the
+density of its smallest cells, which is 1e-5 of the largest, of either sign."""
+
+
 @pytest.mark.parametrize("description", EVERY, ids=str)
 def test_offsets_stay_inside_and_rise(description):
     setup = description.setup()
     u = np.array([0.0, 2.0**-33, *np.linspace(0.001, 0.999, 999), 1 - 2.0**-33, 1 - 2.0**-53])
     drawn = np.array([film_offset(setup, float(x)) for x in u])
-    for part in (drawn[drawn[:, 1] < 0], drawn[drawn[:, 1] >= 0]):  # negative weights come first
+    for part in (drawn[drawn[:, 1] < -ZERO], drawn[drawn[:, 1] > ZERO]):  # negative ones come first
         assert (np.diff(part[:, 0]) >= 0).all()
         assert (np.diff(part[1:-1, 0]) > 0).all()
     assert np.abs(drawn[:, 0]).max() <= radius(description)
@@ -180,11 +185,11 @@ def test_weights_are_even_on_either_side_of_zero(description):
     f = np.array([description.value(float(at)) for at in x.flat])
     drawn = np.array([film_offset(setup, float(u)) for u in np.linspace(0.001, 0.999, 999)])
     values = np.array([description.value(float(at)) for at in drawn[:, 0]])
-    assert np.array_equal(np.sign(drawn[:, 1]), np.sign(values))
+    clear = np.abs(drawn[:, 1]) > ZERO
+    assert np.array_equal(np.sign(drawn[clear, 1]), np.sign(values[clear]))
     share = 0.0
     if (f < 0).any():
-        middles = setup.starts + 0.5 * setup.width
-        share = setup.cumulative[sum(description.value(float(at)) < 0 for at in middles)]
+        share = setup.cumulative[sum(description.value(float(at)) < 0 for at in setup.cells[:, 0])]
         assert math.log2(share) == round(math.log2(share))
     for sign, points in ((1, 1.0 - share), (-1, share)):
         size = np.sum(w.ravel() * np.maximum(sign * f, 0.0))
