@@ -14,9 +14,9 @@ from scipy import stats
 
 from comparisons.results.case import FloatArray, Images
 from comparisons.statistics.metrics import LocalErrors, local_errors, relative_squares
+from comparisons.statistics.rare import share_unmet, unmet_variance
 from comparisons.statistics.scales import HALF, TILE, tile_sums
 from comparisons.statistics.sides import side_of
-from comparisons.statistics.unmet import share_unmet, unmet_variance
 
 NOISE_LIMIT = 1.25
 """Largest permitted squared difference of noisy pictures over that of their noise: Mitsuba's
@@ -48,7 +48,7 @@ difference and the bias are judged."""
 
 MOST_UNMET = 0.01
 """Largest share of pixels that differ by more than the spread of their replicates shows, though not
-by more than light does that few replicates met (`unmet.share_unmet`): with more, contrasts of the
+by more than light does that few replicates met (`share_unmet`): with more, contrasts of the
 replicates are smaller than the noise. Measured with 8 and 16 replicates: at most 0.11 % in the
 scenes of the suite, 1.5 to 46 % with small lamps that are found only by scattered rays."""
 

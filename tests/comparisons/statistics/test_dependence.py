@@ -11,7 +11,7 @@ from scipy import stats
 from comparisons.results.case import FloatArray
 from comparisons.rungs.input import input_rung
 from comparisons.statistics import compare
-from comparisons.statistics.dependence import LEVEL, successive
+from comparisons.statistics.ranks import ORDER_LEVEL, successive
 
 Law = Callable[[np.random.Generator, int, int], FloatArray]
 
@@ -119,7 +119,7 @@ def test_independent_replicates_have_no_order(law: str) -> None:
 def test_independent_replicates_have_no_order_in_many_cases(law: str) -> None:
     cases = 500
     found = sum(alarms(law, count, cases) for count in (8, 16))
-    assert found <= stats.binom.isf(1e-4, 2 * cases, LEVEL)
+    assert found <= stats.binom.isf(1e-4, 2 * cases, ORDER_LEVEL)
 
 
 def strata(rng: np.random.Generator, count: int, side: int) -> FloatArray:

@@ -11,9 +11,8 @@ from comparisons.rungs.images import images_rung
 from comparisons.statistics import Known, compare
 from comparisons.statistics.decide import findings
 from comparisons.statistics.metrics import image_metrics
-from comparisons.statistics.rare import met_once, unseen, worse
-from comparisons.statistics.sides import side_of
-from comparisons.statistics.unmet import around, share_unmet
+from comparisons.statistics.rare import around, share_unmet, unseen, worse
+from comparisons.statistics.sides import met_once, side_of
 
 SIDE = 48
 BASE = 0.1
