@@ -27,7 +27,7 @@ T = TypeVar("T")
 
 FIRST = 8
 """Replicates of a side at the first look: the least that gives the rank test of blocks
-(`statistics.uniformity`) enough contrasts."""
+(`statistics.ranks`) enough contrasts."""
 
 PARTS, PARTED = 2, 10
 """Unless it is told otherwise, `compare` divides a scene's samples into so many parts, and takes so

@@ -125,11 +125,15 @@ def write_json(path: Path, document: Any) -> None:
     """Write strict JSON (RFC 8259).  Raises ValueError for a number that is not finite."""
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     with replacing(path) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")
+        # A lone surrogate, from a file name that is not UTF-8, becomes JSON's escape for it.
+        temporary.write_text(text + "\n", encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 @contextmanager
 def csv_file(path: Path) -> Iterator[TextIO]:
     """Open a file for a `csv` writer."""
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+    with (
+        replacing(path) as temporary,
+        temporary.open("w", encoding="utf-8", errors="backslashreplace", newline="") as file,
+    ):
         yield file

@@ -15,10 +15,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from comparisons.results.case import Case, FloatArray, Images
-from comparisons.results.files import plain, sealed, unsealed
+from comparisons.results.files import plain, sealed, unsealed, write_json
 from reference_rt.core.exr import read_exr, write_exr
 from reference_rt.util.errors import ImageError
-from reference_rt.util.files import read_input, read_text, replacing
+from reference_rt.util.files import read_input, read_text
 
 CASE, PICTURES = "case.json", "pictures.exr"
 
@@ -91,10 +91,7 @@ def write_case(folder: Path, case: Case, key: str = "", wall: float = 0.0) -> No
         sizes = _write_pictures(folder / PICTURES, images, {"scene": case.scene, "key": key})
         document["pictures"] = sizes
         document["sha256"] = _digest(folder / PICTURES)
-    text = json.dumps(sealed(document), indent=1, ensure_ascii=False, allow_nan=False)
-    with replacing(folder / CASE) as temporary:
-        # A lone surrogate, from a file name that is not UTF-8, becomes JSON's escape for it.
-        temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+    write_json(folder / CASE, sealed(document))
     if images is None:
         (folder / PICTURES).unlink(missing_ok=True)
 

@@ -11,7 +11,6 @@ import numpy as np
 from scipy import stats
 
 from comparisons.results.case import FloatArray, Images, Metrics, RungResult
-from comparisons.statistics.filtered import excess
 from comparisons.statistics.metric_null import (
     LEVEL,
     NOISE_LIMIT,
@@ -21,9 +20,9 @@ from comparisons.statistics.metric_null import (
     noise_ratio,
 )
 from comparisons.statistics.metrics import decibels, has_flip
+from comparisons.statistics.rare import image_missed
 from comparisons.statistics.shared_noise import excess_by_sharing
-from comparisons.statistics.sides import side_of
-from comparisons.statistics.unmet import image_missed
+from comparisons.statistics.sides import excess_by_filter, side_of
 
 MEAN_BIAS = 0.001
 """Permitted relative bias of a channel's mean: Mitsuba's ray epsilon causes some, as in the
@@ -214,11 +213,11 @@ def _sharing(replicates: tuple[FloatArray, FloatArray]) -> float:
 
 
 def _filtered(images: Images, replicates: tuple[FloatArray, FloatArray] | None) -> float:
-    """As `statistics.filtered.excess`; 0 unless the reference's variance is known."""
+    """As `excess_by_filter`; 0 unless the reference's variance is known."""
     if replicates is None or not is_known(replicates[1]):
         return 0.0
     spread = 0.5 * (replicates[1][0] - replicates[1][1])
-    return excess(images.candidate, images.reference, spread**2)
+    return excess_by_filter(images.candidate, images.reference, spread**2)
 
 
 def _bias(

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from comparisons.results.case import FloatArray, RungResult, Status
-from comparisons.statistics.dependence import successive
 from comparisons.statistics.metrics import nonfinite_pixels, white_level
+from comparisons.statistics.ranks import successive
 from comparisons.statistics.shared_noise import (
     common_noise,
     correlated_pair,

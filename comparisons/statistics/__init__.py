@@ -5,7 +5,7 @@ variance of either side (Welch 1947), at six scales. Each scale is a family of t
 level (Šidák 1967); the levels of all families add up to one false alarm in a thousand cases.
 
 - *image*: the mean of each channel; *tiles*: of each channel of each tile; *pixels*: of each pixel.
-- *lines*, *modes*: of each row and column; of smooth patterns over the picture (`patterns`).
+- *lines*, *modes*: of each row and column; of smooth patterns over the picture (`welch`).
 - *uniformity*: the rank of the difference of small blocks among differences that hold only noise.
 
 Each mean has three standard errors, and a bias is proven only if it is so with each. One comes from
@@ -56,14 +56,13 @@ Contract: pictures are linear radiance, (R, height, width, 3) or (height, width,
 and margins are fractions of the reference's mean. `compare` returns the `statistics` rung. A side
 of a single picture is handled by `single`; a reference with known mean and variance is `Known`. To
 add a scale: a level and a margin in `scales` (the levels must still sum to 1e-3), a test in
-`cells`, its numbers in `wording`, and its verdict in `decide`.
+`welch`, its numbers in `wording`, and its verdict in `decide`.
 """
 
-from comparisons.statistics.advice import noise_free_candidate, shortfall
-from comparisons.statistics.decide import compare, read
-from comparisons.statistics.places import standard_error, worst_regions
+from comparisons.statistics.decide import compare, read, standard_error, worst_regions
 from comparisons.statistics.scales import CHANNELS, Margins
 from comparisons.statistics.sides import Known
+from comparisons.statistics.wording import noise_free_candidate, shortfall
 
 __all__ = [
     "CHANNELS",

@@ -20,7 +20,7 @@ MODE_LEVEL = 0.00005
 PIXEL_LEVEL = 0.0001
 UNIFORMITY_LEVEL = 0.0001
 """The same for the other families: all together, with the test of the replicates' order
-(`dependence`), at most one correct case in a thousand is reported to differ. The image mean has the
+(`ranks`), at most one correct case in a thousand is reported to differ. The image mean has the
 largest share because its interval also states the equivalence."""
 
 POWER = 0.99

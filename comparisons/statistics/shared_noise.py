@@ -72,7 +72,7 @@ def _differing(x: FloatArray) -> list[int]:
 
 
 BLOCK = 4
-"""Side of a block in pixels: larger than a usual filter's radius, as in `uniformity`."""
+"""Side of a block in pixels: larger than a usual filter's radius, as in `ranks`."""
 
 FEWEST_TO_LEAVE_ONE_OUT = 6
 """Fewer do not show how much replicates scatter."""

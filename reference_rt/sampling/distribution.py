@@ -42,8 +42,8 @@ def blended(sums: FloatArray, k: int, s: float, i: int) -> float:
 
 
 def guide(sums: FloatArray) -> IdArray:
-    """Where to begin a search in running sums (m, n + 1), as `bracket` reads it: (m, n + 1) cells,
-    at equal steps of each row's total (Chen and Asau 1974, the method of guide tables)."""
+    """Where to begin a search in running sums (m, n + 1), as `bracket` reads it: (m, n // 4 + 2)
+    cells, at equal steps of each row's total (Chen and Asau 1974, the method of guide tables)."""
     steps, last = sums.shape[1] // 4 + 1, sums.shape[1] - 2
     found = np.empty((len(sums), steps + 1), np.int32)
     for row, cells in zip(sums, found, strict=True):

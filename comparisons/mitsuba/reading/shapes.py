@@ -48,10 +48,11 @@ def _shapes(reading: Reading, node: Node, in_group: bool = False) -> list[Shape]
 
 def _is_nothing(node: Node) -> bool:
     """Whether 'to_world' leaves nothing of a shape that Mitsuba hits."""
-    matrix = getattr(node.properties.get("to_world", None), "matrix", np.eye(4))
-    linear = np.array(matrix, np.float64)[:3, :3]
-    if not np.isfinite(linear).all():
+    # Mitsuba's points and vectors have a `matrix` too: six numbers.
+    matrix = np.array(getattr(node.properties.get("to_world"), "matrix", np.eye(4)), np.float64)
+    if matrix.shape != (4, 4) or not np.isfinite(matrix[:3, :3]).all():
         return False  # which is an error of the shape's own reader
+    linear = matrix[:3, :3]
     rank = np.linalg.matrix_rank(linear)
     if node.plugin in ("rectangle", "disk"):
         return bool(np.linalg.matrix_rank(linear[:, :2]) < 2)

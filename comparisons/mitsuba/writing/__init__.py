@@ -5,8 +5,8 @@ reads it to a scene with the same picture, to the same bits where Mitsuba has th
 materials.  Numbers have all their digits; transforms are the steps that the scene has.  Where
 Mitsuba has no plugin, ours is named, or a mesh stands in: notes say so.
 
-To write another type: a case in `views` (cameras, lights), in `surfaces` (textures) or in `shapes`;
-materials are those of `comparisons.mitsuba.translate`.
+To write another type: a case in `elements` (cameras, lights, textures) or in `Shapes`; materials
+are those of `comparisons.mitsuba.translate`.
 """
 
 from pathlib import Path
@@ -19,9 +19,10 @@ from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.hits import Plugin
 from comparisons.mitsuba.translate.materials import is_textured
 from comparisons.mitsuba.translate.shapes import Site, translate_shape
-from comparisons.mitsuba.translate.shapes.site import is_round
+from comparisons.mitsuba.translate.shapes.primitives import is_round
 from comparisons.mitsuba.translate.textures import UntranslatableError
-from comparisons.mitsuba.writing import views
+from comparisons.mitsuba.writing import elements
+from comparisons.mitsuba.writing.elements import OURS, Surfaces, transform_steps
 from comparisons.mitsuba.writing.files import (
     ATTRIBUTE,
     Element,
@@ -34,8 +35,6 @@ from comparisons.mitsuba.writing.files import (
     ply,
     write_files,
 )
-from comparisons.mitsuba.writing.surfaces import OURS, Surfaces
-from comparisons.mitsuba.writing.views import transform_steps
 from reference_rt.core import transform
 from reference_rt.materials import Emissive
 from reference_rt.rendering.scene import Scene
@@ -291,11 +290,11 @@ def write_xml(scene: Scene, path: Path) -> tuple[int, list[str]]:
     def text(files: Files) -> str:
         surfaces = Surfaces(scene, files)
         shapes = Shapes(surfaces).elements()
-        integrator = views.integrator(scene, surfaces)
-        lights = views.lights(scene, surfaces)
-        elements = [
+        integrator = elements.integrator(scene, surfaces)
+        lights = elements.lights(scene, surfaces)
+        parts = [
             integrator,
-            views.sensor(scene, surfaces),
+            elements.sensor(scene, surfaces),
             *surfaces.textures.values(),
             *surfaces.elements.values(),
             *shapes,
@@ -303,7 +302,7 @@ def write_xml(scene: Scene, path: Path) -> tuple[int, list[str]]:
         ]
         notes.extend(surfaces.notes)
         head = [f"<!-- {' '.join(_plain(line).split())} -->" for line in _comments(scene, notes)]
-        body = ["    " + line for element in elements for line in element.lines()]
+        body = ["    " + line for part in parts for line in part.lines()]
         return "\n".join([*head, f'<scene version="{VERSION}">', *body, "</scene>", ""])
 
     try:

@@ -14,16 +14,22 @@ from comparisons.geometry import affine
 from comparisons.geometry.affine import Affine
 from comparisons.geometry.flatten import Leaf, Tree, copies_of
 from comparisons.mitsuba.translate.shapes.meshes import Soup, polygon_soup
-from comparisons.mitsuba.translate.shapes.native import box_of_triangles, sphere_surface
-from comparisons.mitsuba.translate.shapes.quadrics import (
+from comparisons.mitsuba.translate.shapes.primitives import (
     around_z,
+    box_of_triangles,
     quadric_surface,
     side_surface,
+    sphere_surface,
     torus_surface,
 )
 from comparisons.mitsuba.translate.shapes.stand_ins import measured_error
-from comparisons.mitsuba.translate.shapes.surfaces import Box as Limits
-from comparisons.mitsuba.translate.shapes.surfaces import Implicit, Patch, cap_faces, meshed
+from comparisons.mitsuba.translate.shapes.surfaces import (
+    Implicit,
+    Limits,
+    Patch,
+    cap_faces,
+    meshed,
+)
 from comparisons.mitsuba.writing.files import Files, check_name, ply, write_files
 from reference_rt.cameras import Orthographic, Pinhole, ThinLens
 from reference_rt.cameras.view_rectangle import CentralCamera

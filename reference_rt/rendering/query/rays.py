@@ -2,6 +2,7 @@
 
 import math
 import os
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
@@ -141,8 +142,11 @@ def in_blocks(
         run()
         return
     with ThreadPoolExecutor(helpers) as pool:
-        helping = [pool.submit(run) for _ in range(helpers)]
-        run()
+        try:
+            helping = [pool.submit(run) for _ in range(helpers)]
+            run()
+        finally:  # after Ctrl-C the helpers, which the pool waits for, begin no further block
+            deque(waiting, maxlen=0)
         for helper in helping:
             helper.result()
 

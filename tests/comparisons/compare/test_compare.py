@@ -67,7 +67,8 @@ def test_scenes_agree(tmp_path: Path) -> None:
     assert [case["verdict"] for case in found["cases"]] == ["agree", "agree"]
     case = found["cases"][0]
     assert set(case) >= {"scene", "verdict", "reason", "tiers", "metrics", "seconds"}
-    assert list(case["tiers"]) == ["input", "geometry", "direct", "whitted", "statistics", "images"]
+    of_light = ["direct", "whitted", "statistics", "images"]
+    assert list(case["tiers"]) == ["input", "files", "geometry", *of_light]
     assert set(case["metrics"]) >= {"ssim", "flip", "psnr", "rmse", "relmse", "mean_bias"}
     geometry = case["tiers"]["geometry"]
     assert (geometry["decided_ours"], geometry["undecided"]) == (0, 0)

@@ -98,6 +98,7 @@ REFUSED = {
     shape("", "instance"): "has no shape group",
     shape("", "shapegroup"): "has no shapes",
     shape(map_of('<scale x="0"/>')): "flat",
+    shape('<vector name="to_world" x="1" y="2" z="3"/>'): "'to_world' is no transform",
     shape(map_of('<rotate x="1" y="1" angle="30"/>')): "no unit vector",
     shape(map_of('<scale x="1" y="2" z="1"/>')): "makes it an ellipsoid",
     on_sphere('type="twosided">'): "has 0 nested BSDFs",

@@ -7,8 +7,8 @@ from scipy import stats
 
 from comparisons.results.case import FloatArray
 from comparisons.statistics import Margins, compare
-from comparisons.statistics.patterns import ORDERS, line_test, mode_test, named_line, named_mode
 from comparisons.statistics.sides import side_of
+from comparisons.statistics.welch import ORDERS, line_test, mode_test, named_line, named_mode
 
 HEIGHT, WIDTH = 48, 64
 

@@ -11,9 +11,8 @@ from comparisons.rungs.images import images_rung
 from comparisons.statistics import Known, compare
 from comparisons.statistics.decide import findings
 from comparisons.statistics.metrics import image_metrics
-from comparisons.statistics.rare import met_once, unseen, worse
-from comparisons.statistics.sides import side_of
-from comparisons.statistics.unmet import around, share_unmet
+from comparisons.statistics.rare import around, share_unmet, unseen, worse
+from comparisons.statistics.sides import met_once, side_of
 
 SIDE = 48
 BASE = 0.1
@@ -253,14 +252,20 @@ def uneven(rng: np.random.Generator, count: int, chance: float, gain: float = 1.
 @pytest.mark.parametrize("runs", [12, pytest.param(500, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("chance", [1e-3, 1e-2])
 def test_rare_light_of_uneven_brightness_does_not_differ(chance: float, runs: int) -> None:
-    """Against a precise reference: an event on the lamp is larger than any that was met."""
+    """Against a precise reference: an event on the lamp is larger than any that was met.
+
+    The statistics' level is one false alarm in a thousand; measured: 2 of 4,500 with the chance
+    1e-2.  So 12 runs have none, and 500 at most two.
+    """
+    alarms = 0
     for seed in range(runs):
         rng = np.random.default_rng([seed, 7])
         sides = uneven(rng, 8, chance), scene() * (1.0 + 0.01 * rng.standard_normal((16, 1, 1, 1)))
-        assert compare(*sides).status == "inconclusive"
+        alarms += compare(*sides).status != "inconclusive"
         means = Images(*(side.mean(axis=0) for side in sides))
         found = images_rung(means, image_metrics(means), sides)
         assert found.status == "agree", found.reason
+    assert alarms <= stats.binom.isf(0.02, runs, 1e-3)
 
 
 def test_a_gain_amid_light_that_is_met_often() -> None:

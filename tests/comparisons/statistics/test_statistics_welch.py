@@ -8,10 +8,9 @@ from planted import HEIGHT, LAMP, MARGINS, NONE, WIDTH, replicates, scene
 from scipy import stats
 
 from comparisons.statistics import Known, compare
-from comparisons.statistics.advice import _known
+from comparisons.statistics.ranks import uniformity
 from comparisons.statistics.scales import IMAGE_LEVEL
 from comparisons.statistics.sides import known_side, side_of
-from comparisons.statistics.uniformity import uniformity
 from comparisons.statistics.welch import (
     BiasTest,
     Error,
@@ -25,6 +24,7 @@ from comparisons.statistics.welch import (
     tile_test,
     welch_errors,
 )
+from comparisons.statistics.wording import _known
 
 # ---- Welch's test itself -------------------------------------------------------------------------
 

@@ -1,6 +1,8 @@
 """Queries with arrays: their shapes, their errors, and that rendering uses the same code."""
 
 import math
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from camera_checks import rays
 from query_scene import LIT
 
 import reference_rt as rt
+from reference_rt.rendering.query.rays import in_blocks
 
 VIEW = """
 camera: {type: thin_lens, eye: [0.3, 0.5, 4], target: [0, 0, -1], fov: 40, aperture_radius: 0.1}
@@ -153,6 +156,23 @@ def test_threads_change_nothing(scene):
     assert_same(one, two)
     assert_same(scene.first_hits(o, d), one, NAMES[:5])
     assert np.array_equal(scene.occluded(o, d), one.hit)
+
+
+def test_after_ctrl_c_no_thread_begins_another_block():
+    """The block that a helper of the interrupted thread is at ends, the other seven stay."""
+    helping, helped = threading.Event(), []
+
+    def trace(block):
+        if threading.current_thread() is threading.main_thread():
+            helping.wait()
+            raise KeyboardInterrupt
+        helping.set()
+        helped.append(block)
+        time.sleep(0.1)
+
+    with pytest.raises(KeyboardInterrupt):
+        in_blocks(trace, 10, threads=2, least=1)
+    assert len(helped) < 4
 
 
 # ---- the camera and radiance ------------------------------------------------------------------

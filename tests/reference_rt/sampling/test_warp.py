@@ -78,18 +78,25 @@ def _turns(points, out):
 
 
 def test_turns():
-    """Against the library's atan2 in long double, over all octants and near their borders."""
+    """Against the library's atan2 in long double, over all octants and near their borders.
+
+    The error is largest just beyond pi/8, where the angle is an eighth of a turn less half of it.
+    To first order, that of difference and sum is at most 1.9 u there, of the quotient 0.6 u, of the
+    series 3.4 u and its polynomial 0.6 u, of the product 0.5 u, and of the last sum 1 u.
+    """
     rng = np.random.default_rng(73)
-    angles = np.concatenate([rng.uniform(-math.pi, math.pi, 3000), np.arange(1, 9) * math.pi / 8])
+    worst = rng.uniform(1, 1.06, 500_000) * rng.choice([-1, 1], 500_000)
+    eighths = np.concatenate([rng.uniform(-8, 8, 500_000), worst, np.arange(1, 9)])
+    angles = eighths * (math.pi / 8)
     sizes = 10.0 ** rng.uniform(-150, 150, len(angles))
-    near_axes = rng.normal(size=(400, 2)) * [1.0, 1e-9]
+    near_axes = rng.normal(size=(10_000, 2)) * [1.0, 1e-9]
     around = np.column_stack([np.sin(angles), np.cos(angles)]) * sizes[:, None]
     points = np.concatenate([around, near_axes, near_axes[:, ::-1]])
     found = np.empty(len(points))
     _turns(points, found)
     y, x = points.T.astype(np.longdouble)
     exact = np.arctan2(y, x) / (2 * np.longdouble("3.14159265358979323846264338327950288"))
-    assert np.abs(found / exact - 1).max() <= 4 * U  # what its docstring promises
+    assert np.abs(found / exact - 1).max() <= 8 * U  # what its docstring promises
     corners = [(0, 0), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-0.0, -1)]
     at_corners = [turns(float(a), float(b)) for a, b in corners]
     assert at_corners == [0, 0, 0.125, 0.25, 0.375, 0.5, -0.375, -0.25, -0.5]

@@ -6,13 +6,13 @@ from functools import partial
 import numpy as np
 
 from comparisons.mitsuba.hits import BoolArray
-from comparisons.mitsuba.translate.shapes.surfaces import Box, Patch
+from comparisons.mitsuba.translate.shapes.surfaces import Limits, Patch
 from reference_rt.core.arrays import FloatArray, IntArray
 
 CURVED = (768, 384)
 STRAIGHT = (2048, 4)
 """Cells of a patch that is curved along u and v, and of one that is straight along v: see
-`quadrics.SIDE` for why that has more than one."""
+`primitives.SIDE` for why that has more than one."""
 
 ZERO = 1e-12
 """A slope below this fraction of the largest counts as 0."""
@@ -25,7 +25,7 @@ Coordinates = tuple[FloatArray, FloatArray, FloatArray]
 Shape = Callable[[FloatArray, FloatArray], Coordinates]
 
 
-def patches_of(matrix: FloatArray, linear: FloatArray, constant: float, box: Box) -> list[Patch]:
+def patches_of(matrix: FloatArray, linear: FloatArray, constant: float, box: Limits) -> list[Patch]:
     """Patches of x^T M x + l x + c = 0 that cover its part in a box; they may reach beyond it."""
     middle = 0.5 * (box[0] + box[1])
     constant = constant + float(middle @ matrix @ middle + linear @ middle)
@@ -64,7 +64,7 @@ MOST_CELLS = 300_000
 """Most cells of a patch that are tested for being near a box."""
 
 
-def narrowed(patch: Patch, box: Box) -> Patch | None:
+def narrowed(patch: Patch, box: Limits) -> Patch | None:
     """The patch, limited to parameters near the box; None if it does not come near.
 
     The cells of the patch that are near are split until most of their parts are near, too.  Of a
@@ -92,7 +92,7 @@ def narrowed(patch: Patch, box: Box) -> Patch | None:
     return Patch(point, patch.cells)
 
 
-def _near(patch: Patch, cells: FloatArray, size: float, box: Box) -> BoolArray:
+def _near(patch: Patch, cells: FloatArray, size: float, box: Limits) -> BoolArray:
     """Which of the cells, from (u, v) to (u, v) + size, may come near the box."""
     halves = 0.5 * size * np.arange(3.0)
     u, v = (

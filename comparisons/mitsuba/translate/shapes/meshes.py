@@ -1,11 +1,13 @@
-"""Shapes that are exact as triangles: meshes and polygons; infinite planes as large finite meshes.
+"""`translate_shape`, the translation of a shape by its type; `Site`, the placement of a leaf;
+shapes that are exact as triangles: meshes and polygons; infinite planes as large finite meshes.
 
 A mesh has the triangles of its file, as a second reader reads it, in the order of the file, so that
 Mitsuba's prim_index tells our face number.  Triangles without area are left out.
 """
 
+from functools import singledispatch
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import manifold3d
 import numpy as np
@@ -13,18 +15,97 @@ import numpy as np
 from comparisons.geometry import affine
 from comparisons.geometry.sizes import heights_of
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.hits import Extent, Plugin, same_uv
+from comparisons.mitsuba.hits import Extent, Plugin, ShapeGroup, same_uv
 from comparisons.mitsuba.second import described
-from comparisons.mitsuba.translate.shapes.site import (
-    Site,
-    instance_of,
-    translate_shape,
-    with_mesh_light,
+from comparisons.mitsuba.translate.textures import (
+    VERTEX_COLOUR,
+    VERTEX_LUMINANCE,
+    UntranslatableError,
 )
-from comparisons.mitsuba.translate.textures import VERTEX_COLOUR, VERTEX_LUMINANCE
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.shapes import Mesh, Plane, Polygon, Triangle
+from reference_rt.shapes.shape import TabulationContext
+
+
+class Site(NamedTuple):
+    """The placement and the material of a leaf.
+
+    place: the maps of its solid and its instance, applied after its own transform;  parts: the BSDF
+    and, if it is emissive, the emitter;  coloured: the same for a mesh with vertex colours;
+    textured: whether the material depends on uv or tangents;  oriented: on tangents;  material: its
+    name;  copies: the number of copies of the leaf;  shared: data shared by the leaves of one
+    scene, by key (a group, the triangles of a file);  reach: about the largest coordinate of the
+    scene;  native: whether Mitsuba's own materials are used.
+    """
+
+    place: TabulationContext
+    parts: dict[str, Any]
+    coloured: dict[str, Any]
+    textured: bool
+    oriented: bool
+    material: str | None
+    copies: int
+    shared: dict[Any, Any]
+    reach: float
+    native: bool = False
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether its solids and its instance mirror space: triangles then keep their front, but
+        reverse their corners."""
+        return bool(np.linalg.det(self.place.outer[:, :3]) < 0.0)
+
+
+def to_world(linear: FloatArray, offset: FloatArray) -> Any:
+    """p -> linear p + offset, in float64; Mitsuba rounds it when it makes the shape."""
+    matrix = np.eye(4)
+    matrix[:3] = np.column_stack([linear, offset])
+    return mitsuba().ScalarTransform4d(matrix)
+
+
+def with_mesh_light(site: Site, normals: bool = False, stands_in: bool = False) -> Site:
+    """The site with our plugin `comparisons.mitsuba.plugins.mesh_area` for a mesh that emits, where
+    Mitsuba's own emitter is not exact: with a texture, or with vertex normals.  stands_in: whether
+    these are a curved surface's."""
+    if "emitter" not in site.parts:
+        return site
+    more = {"type": "mesh_area", "by_normals": stands_in}
+
+    def exact(parts: dict[str, Any]) -> dict[str, Any]:
+        emitter = parts["emitter"]
+        plain = emitter["radiance"]["type"] == "rgb" and not normals
+        return parts if plain else {**parts, "emitter": {**emitter, **more}}
+
+    return site._replace(parts=exact(site.parts), coloured=exact(site.coloured))
+
+
+def instance_of(name: str, member: Any, m: affine.Affine, site: Site) -> Plugin:
+    """A Mitsuba shape (see `ShapeGroup.member`) under any affine map: an instance of a group of its
+    own, one for each `name` and material."""
+    if "emitter" in site.parts:
+        raise UntranslatableError("emissive material of an instance", "material")
+    key = (name, site.material)
+    if key not in site.shared:
+        if isinstance(member, dict):
+            member = {**member, **site.parts}
+        site.shared[key] = ShapeGroup(f"group_{len(site.shared)}", member)
+    group: ShapeGroup = site.shared[key]
+    reference = {"type": "ref", "id": group.name}
+    value = {"type": "instance", "to_world": to_world(m[:, :3], m[:, 3]), "group": reference}
+    return Plugin(value, group=group)
+
+
+@singledispatch
+def translate_shape(shape: Any, site: Site) -> list[Plugin]:
+    """The Mitsuba shapes that represent one of ours, in order.
+
+    Raises UntranslatableError, and ValueError for a file that cannot be used.
+    """
+    raise UntranslatableError(shape, "shape")
+
+
+# ---- triangles -----------------------------------------------------------------------------------
 
 MOST_TRIANGLES = 4_000_000
 """Most triangles of all copies of a mesh together, 0.3 kB each.  With more Mitsuba gets instances,

@@ -16,11 +16,12 @@ from comparisons.mitsuba.plugins.exact_coordinates import Coordinates, derivativ
 from comparisons.mitsuba.translate.shapes.meshes import (
     MOST_INSTANCES,
     MOST_TRIANGLES,
+    Site,
     Soup,
     placed,
+    with_mesh_light,
 )
-from comparisons.mitsuba.translate.shapes.site import Site, with_mesh_light
-from comparisons.mitsuba.translate.shapes.surfaces import Box, Implicit, Patch, meshed
+from comparisons.mitsuba.translate.shapes.surfaces import Implicit, Limits, Patch, meshed
 from comparisons.mitsuba.translate.textures import UntranslatableError
 from reference_rt.core.arrays import FloatArray
 from reference_rt.shapes.shape import Shape
@@ -61,7 +62,7 @@ def measured_error(soup: Soup, surface: Implicit, m: affine.Affine) -> tuple[flo
     return float(sag), float(turn)
 
 
-def measured_slip(soup: Soup, patch: Patch, box: Box | None) -> float:
+def measured_slip(soup: Soup, patch: Patch, box: Limits | None) -> float:
     """The largest distance, in the shape's own coordinates, between a point of the mesh and the one
     of the surface that has its interpolated uv: of a patch with these uv, or of a surface around
     the z axis of a box."""
@@ -173,7 +174,7 @@ def stand_in(
     shape: Shape,
     patches: Sequence[Patch],
     surface: Implicit,
-    box: Box | None,
+    box: Limits | None,
     site: Site,
     of: Coordinates,
     with_uv: Callable[[Soup], Soup] | None = None,

@@ -67,12 +67,12 @@ def _zero(at0: FloatArray, middle: FloatArray, at1: FloatArray) -> FloatArray:
 # ---- parametric surfaces -------------------------------------------------------------------------
 
 
-Box = tuple[FloatArray, FloatArray]
+Limits = tuple[FloatArray, FloatArray]
 
 
 FEWEST = 4
 """Fewest cells along the side of a patch, unless it asks for less itself: hits slide along
-triangles that are long and thin (see `quadrics.SIDE`)."""
+triangles that are long and thin (see `primitives.SIDE`)."""
 
 
 class Patch(NamedTuple):
@@ -94,7 +94,9 @@ class Implicit(NamedTuple):
     gradient: Callable[[FloatArray], FloatArray]
 
 
-def meshed(patches: Sequence[Patch], surface: Implicit, box: Box | None, fineness: float) -> Soup:
+def meshed(
+    patches: Sequence[Patch], surface: Implicit, box: Limits | None, fineness: float
+) -> Soup:
     """Patches as triangles that face where f grows, with f's normals, clipped to a box;  fineness:
     factor on the numbers of cells."""
     positions, normals, uvs, faces = [], [], [], []
@@ -143,7 +145,7 @@ def _grid_faces(a: int, b: int) -> IntArray:
 
 
 def clipped(
-    positions: FloatArray, normals: FloatArray, faces: IntArray, box: Box
+    positions: FloatArray, normals: FloatArray, faces: IntArray, box: Limits
 ) -> tuple[FloatArray, FloatArray, IntArray]:
     """Triangles clipped to a box."""
     data = np.hstack([positions, normals])
@@ -175,7 +177,7 @@ between larger and smaller squares."""
 Form = Callable[[FloatArray], FloatArray]
 
 
-def cap_faces(value: Form, box: Box) -> tuple[Soup, IntArray]:
+def cap_faces(value: Form, box: Limits) -> tuple[Soup, IntArray]:
     """Outward triangles of all six faces, with normals, and uv from 0 to 1 across each face; and
     our face numbers: 1 + the axis, + 3 on the positive side."""
     positions, normals, uvs, numbers = [], [], [], []
@@ -204,7 +206,7 @@ def heights_over_uv(soup: Soup, m: affine.Affine) -> FloatArray:
     return np.asarray(np.divide(heights, sides, out=np.zeros_like(heights), where=sides > 0.0))
 
 
-def _on_face(xy: FloatArray, box: Box, axis: int, side: int) -> FloatArray:
+def _on_face(xy: FloatArray, box: Limits, axis: int, side: int) -> FloatArray:
     """Points (..., 3) of a face of the box; x, y (..., 2) from 0 to 1."""
     across = [k for k in range(3) if k != axis]
     p = np.empty((*xy.shape[:-1], 3))
@@ -213,7 +215,7 @@ def _on_face(xy: FloatArray, box: Box, axis: int, side: int) -> FloatArray:
     return p
 
 
-def _cap(value: Form, box: Box, axis: int, side: int) -> FloatArray:
+def _cap(value: Form, box: Limits, axis: int, side: int) -> FloatArray:
     """Outward triangles (n, 3, 2) of the solid's part of a face."""
 
     def on_face(xy: FloatArray) -> FloatArray:

@@ -1,4 +1,11 @@
-"""Cylinders, which Mitsuba has; cones, tori and other quadrics, for which meshes stand in."""
+"""Spheres, boxes, rectangles, disks and cylinders, which Mitsuba has too, made from the float64
+numbers of the descriptions; cones, tori and other quadrics, for which meshes stand in.
+
+Under a mirroring transform Mitsuba's rectangles, cubes and spheres turn inside out, or are
+inconsistent (a rectangle's geometric normal follows the winding, its shading normal the transform);
+ours keep their outward side.  So these get no mirroring transform.  Mitsuba's disks are right under
+every affine map, its spheres only under similarities.
+"""
 
 from collections.abc import Callable
 from functools import partial
@@ -6,24 +13,25 @@ from functools import partial
 import numpy as np
 
 from comparisons.geometry import affine
+from comparisons.geometry.frame import UNIT_ROUNDOFF
 from comparisons.geometry.sizes import heights_of
-from comparisons.mitsuba.hits import Plugin, same_uv
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.hits import CURVED, Plugin, same_uv
 from comparisons.mitsuba.plugins.exact_coordinates import Round, of_cone, of_quadric
 from comparisons.mitsuba.translate.shapes.canonical import patches_of
-from comparisons.mitsuba.translate.shapes.meshes import Soup, placed
-from comparisons.mitsuba.translate.shapes.site import (
+from comparisons.mitsuba.translate.shapes.meshes import (
     Site,
-    curved_instance,
-    in_float32,
-    is_round,
+    Soup,
+    instance_of,
+    placed,
     to_world,
     translate_shape,
     with_mesh_light,
 )
 from comparisons.mitsuba.translate.shapes.stand_ins import stand_in
 from comparisons.mitsuba.translate.shapes.surfaces import (
-    Box,
     Implicit,
+    Limits,
     Patch,
     cap_faces,
     cut_away,
@@ -31,12 +39,158 @@ from comparisons.mitsuba.translate.shapes.surfaces import (
     region,
 )
 from reference_rt.core.arrays import FloatArray
-from reference_rt.shapes import Cone, Cylinder, Quadric, Torus
+from reference_rt.shapes import Box, Cone, Cylinder, Disk, Quadric, Rectangle, Sphere, Torus
+
+ELLIPSOID_CELLS = (384, 192)
+"""Around a thin ellipsoid's axis and along it."""
+
+CUBE_FACES = (1, 4, 3, 5, 0, 2)
+"""Our face numbers of the faces of Mitsuba's cube, which are -y +y +x +z -x -z, two triangles each
+(src/shapes/cube.cpp)."""
+
+
+@translate_shape.register
+def _(shape: Sphere, site: Site) -> list[Plugin]:
+    m = affine.map_in(shape, site.place)
+    if not affine.is_similarity(m[:, :3]):
+        m = m @ np.vstack([np.column_stack([shape.radius * np.eye(3), shape.center]), [0, 0, 0, 1]])
+        least = float(np.linalg.svd(m[:, :3], compute_uv=False)[-1])
+        thin = in_float32(least) > 0.0 and CURVED * UNIT_ROUNDOFF * site.reach**2 > least**2
+        # The error of Mitsuba's own sphere would exceed its thickness, and its instances do not
+        # emit.
+        if thin or "emitter" in site.parts:
+            return [_ellipsoid(shape, site)]
+        return [curved_instance("sphere", m, site)._replace(uv=same_uv)]
+    center = affine.apply_points(m, np.array([shape.center]))[0]
+    rotation = m[:, :3]
+    plugin = {
+        "type": "sphere",
+        "to_world": to_world(rotation * shape.radius, center),
+        # A mirrored sphere keeps its mirrored uv; flipping makes its normals point outwards.
+        "flip_normals": bool(np.linalg.det(rotation) < 0.0),
+        **site.parts,
+    }
+    return [Plugin(plugin, uv=same_uv)]
+
+
+def _ellipsoid(shape: Sphere, site: Site) -> Plugin:
+    """A thin ellipsoid as a mesh: float32 is more exact for its corners than for its quadratic."""
+    patches, surface = sphere_surface(shape)
+    of = Round(shape.center, 0.0, is_sphere=True)
+    return stand_in(shape, patches, surface, None, site, of)
+
+
+def sphere_surface(shape: Sphere) -> tuple[list[Patch], Implicit]:
+    """The surface in its own coordinates."""
+    center, radius = np.array(shape.center), shape.radius
+
+    def point(u: FloatArray, v: FloatArray) -> FloatArray:
+        phi, theta = 2.0 * np.pi * u, np.pi * v
+        s = np.sin(theta)
+        unit = np.stack([s * np.cos(phi), s * np.sin(phi), np.cos(theta)], axis=-1)
+        return np.asarray(center + radius * unit)
+
+    surface = Implicit(
+        value=lambda p: np.asarray(np.linalg.norm(p - center, axis=-1) - radius),
+        gradient=lambda p: np.asarray(p - center),
+    )
+    return [Patch(point, ELLIPSOID_CELLS, has_uv=True)], surface
+
+
+@translate_shape.register
+def _(shape: Rectangle, site: Site) -> list[Plugin]:
+    m = affine.map_in(shape, site.place)
+    mirrored = bool(np.linalg.det(m[:, :3]) < 0.0)
+    # The third column has no effect but on orientation.
+    columns = np.column_stack([m[:, 0], m[:, 1], -m[:, 2] if mirrored else m[:, 2]])
+    plugin = {
+        "type": "rectangle",
+        "to_world": to_world(columns, m[:, 3]),
+        "flip_normals": mirrored,
+        **site.parts,
+    }
+    return [Plugin(plugin, faces=np.zeros(2, np.int64), uv=same_uv)]  # two triangles
+
+
+@translate_shape.register
+def _(shape: Disk, site: Site) -> list[Plugin]:
+    m = affine.map_in(shape, site.place)
+    return [
+        Plugin({"type": "disk", "to_world": to_world(m[:, :3], m[:, 3]), **site.parts}, uv=same_uv)
+    ]
+
+
+@translate_shape.register
+def _(shape: Box, site: Site) -> list[Plugin]:
+    m = affine.map_in(shape, site.place)
+    if site.textured:
+        return [_box_of_triangles(m, site)]
+    edges = m[:, :3].copy()
+    faces = np.array(CUBE_FACES)
+    if np.linalg.det(edges) < 0.0:
+        # Mirror it along an axis: the same box.  As a Whitted light its point is in the middle of
+        # this axis, and does not move (see comparisons.mitsuba.plugins.whitted).
+        turned = _middle_axis(edges)
+        edges[:, turned] *= -1.0
+        faces = np.where(faces % 3 == turned, (faces + 3) % 6, faces)
+    plugin = {"type": "cube", "to_world": to_world(edges, m[:, 3]), **site.parts}
+    return [Plugin(plugin, faces=np.repeat(faces, 2))]
+
+
+def _box_of_triangles(m: affine.Affine, site: Site) -> Plugin:
+    """A box with our uv."""
+    soup = box_of_triangles(m)
+    mesh = soup.mesh(with_mesh_light(site).parts)
+    return Plugin(mesh, faces=np.repeat(np.arange(6), 2), uv=same_uv)
+
+
+def box_of_triangles(m: affine.Affine) -> Soup:
+    """The box under a map, with our uv: on each face the two other coordinates in the order x, y,
+    z, from 0 to 1."""
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    positions, faces = np.empty((6, 4, 3)), []
+    for face in range(6):
+        axis, sign = face % 3, 1.0 if face >= 3 else -1.0
+        a, b = (k for k in range(3) if k != axis)
+        positions[face][:, [a, b]] = 2.0 * square - 1.0
+        positions[face][:, axis] = sign
+        triangles = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * face
+        # a, b and the outward normal are right-handed for +x, -y, +z; a mirroring map reverses all.
+        outward = sign * (-1.0 if axis == 1 else 1.0) * np.linalg.det(m[:, :3])
+        faces.append(triangles if outward > 0.0 else triangles[:, ::-1])
+    uvs = np.tile(square, (6, 1))
+    return Soup(
+        affine.apply_points(m, positions.reshape(-1, 3)), uvs=uvs, faces=np.concatenate(faces)
+    )
+
+
+def _middle_axis(edges: FloatArray) -> int:
+    areas = np.linalg.norm(np.cross(edges.T[[1, 2, 0]], edges.T[[2, 0, 1]]), axis=1)
+    return 1 if areas[2] >= areas[0] + areas[1] else 2
+
+
+def curved_instance(name: str, m: affine.Affine, site: Site) -> Plugin:
+    """Mitsuba's unit shape of type `name`, with a quadratic equation, under any affine map.
+
+    The group contains a scaled shape: ray directions in it must not be longer than 1, or hits in
+    llvm variants are inexact (for a sphere a tenth as large as the group's: 1e-2 at distance 10).
+    """
+    least = np.linalg.svd(m[:, :3], compute_uv=False)[-1]
+    scale = 2.0 ** np.floor(np.log2(least))
+    member = {"type": name, "to_world": to_world(scale * np.eye(3), np.zeros(3))}
+    map_ = np.column_stack([m[:, :3] / scale, m[:, 3]])
+    return instance_of(f"{name} {scale}", member, map_, site)._replace(curved=in_float32(least))
+
+
+def in_float32(radius: float) -> float:
+    """`Plugin.curved` of a surface with this radius; 0 in scalar variants, which solve its equation
+    in float64."""
+    return 0.0 if mitsuba().variant().startswith("scalar") else float(radius)
+
 
 # ---- tori ----------------------------------------------------------------------------------------
 
-
-CELLS = (768, 384)
+TORUS_CELLS = (768, 384)
 """Around the axis and around the tube."""
 
 
@@ -67,7 +221,7 @@ def torus_surface(shape: Torus) -> tuple[list[Patch], Implicit]:
         value=lambda p: from_tube(p)[1] - minor,
         gradient=lambda p: from_tube(p)[0] / from_tube(p)[1][..., None],
     )
-    return [Patch(point, CELLS, has_uv=True)], surface
+    return [Patch(point, TORUS_CELLS, has_uv=True)], surface
 
 
 # ---- texture coordinates of a quadric's mesh: the angle around z, and z --------------------------
@@ -75,7 +229,7 @@ def torus_surface(shape: Torus) -> tuple[list[Patch], Implicit]:
 # the mesh is cut along the seam, and each triangle has corners of its own.
 
 
-def around_z(soup: Soup, box: Box) -> Soup:
+def around_z(soup: Soup, box: Limits) -> Soup:
     """The mesh with uv: in coordinates where the box is the cube [-1, 1]³, the angle from +x over
     2 pi, and z from 0 to 1."""
     assert soup.normals is not None
@@ -103,7 +257,6 @@ def around_z(soup: Soup, box: Box) -> Soup:
 
 
 # ---- cylinders, cones and quadrics ---------------------------------------------------------------
-
 
 SIDE = (4096, 8)
 """Cells around a cone and along its side.  That is straight, but Mitsuba's hit on a triangle of
@@ -145,6 +298,13 @@ def _(shape: Cylinder, site: Site) -> list[Plugin]:
         found.append(_disk(m, r, shape.z_min, BOTTOM, r, site))
         found.append(_disk(m, r, shape.z_max, TOP, r, site))
     return found
+
+
+def is_round(linear: FloatArray) -> bool:
+    """Whether a map (3, 3) takes circular cylinders along z to circular ones, of any height."""
+    x, y, z = linear.T
+    z = z * np.linalg.norm(x) / np.linalg.norm(z)
+    return affine.is_similarity(np.column_stack([x, y, z]))
 
 
 def _followed(m: affine.Affine, scale: FloatArray, z: float) -> affine.Affine:
@@ -260,7 +420,7 @@ def _(shape: Quadric, site: Site) -> list[Plugin]:
     return found
 
 
-def quadric_surface(shape: Quadric) -> tuple[list[Patch], Implicit, Box]:
+def quadric_surface(shape: Quadric) -> tuple[list[Patch], Implicit, Limits]:
     """The surface in its own coordinates, and the box that it is clipped to."""
     matrix, linear = _matrix(shape)
     j = shape.coefficients[9]
