@@ -32,7 +32,7 @@ def nearest_of_leaf(
 ) -> Hit:
     """The closest of hit j and all hits of ray j of a block in a leaf without instances; it becomes
     hit j.  seen (PROJECTION_FLOATS,) is scratch."""
-    closest = hit_of(hits, j)
+    closest = before = hit_of(hits, j)
     if is_triangle_leaf(leaf):
         closest = nearest_of_triangle_leaf(bvh.corners, bvh, shapes, leaf, shear, seen, -1, closest)
     else:
@@ -40,7 +40,8 @@ def nearest_of_leaf(
         for k in range(first, first + size_of(leaf)):
             kind, row = kind_of(bvh, k), row_of(bvh, k)
             closest = nearer_primitive(bvh, shapes, solids, kind, row, ray, shear, -1, closest)
-    put_hit(hits, j, closest)
+    if closest.row != before.row or closest.kind != before.kind:
+        put_hit(hits, j, closest)
     return closest
 
 

@@ -16,12 +16,13 @@ from reference_rt.accel.array_query import (
     Primitives,
     TraceScratch,
     closest_one_by_one,
+    rows_width,
     trace_packet,
 )
 from reference_rt.accel.crossing_order import nothing_at
 from reference_rt.accel.geometry import Geometry, coordinates, owner, surface
 from reference_rt.accel.next_crossing import next_crossing
-from reference_rt.accel.packet import PACKET_SIZE
+from reference_rt.accel.packet import PACKET_SIZE, TILE
 from reference_rt.core.arrays import FloatArray, IdArray, IntArray
 from reference_rt.core.ray import (
     BLOCK,
@@ -221,15 +222,36 @@ def closest(
     for k in range(RAY_FLOATS):
         work.rays.numbers[k] = 1.0  # lanes without a ray are traced too
     waiting, filled = 0, 0
-    for begin in range(0, len(o), PACKET_SIZE):
-        for i in range(begin, min(begin + PACKET_SIZE, len(o))):
-            _put_miss(out, i)
+    n, rows = len(o), rows_width(o, d)
+    # As many rays as can be, TILE rows of them after another, are in packets of TILE rows.
+    tiled = n // (rows * TILE) * (rows * TILE)
+    for k in range(0, n, PACKET_SIZE):
+        begin, width = k, TILE
+        if k < tiled:
+            band, column = k // (rows * TILE), k % (rows * TILE) // TILE
+            begin, width = band * (rows * TILE) + column, rows
+        if k % (width * TILE) == 0:
+            _put_misses(out, k, min(k + width * TILE, n))
+        count = min(PACKET_SIZE, n - k)
         if filled > len(numbers) - MOST_ADDED:
             filled = 0
         first = filled
-        waiting, filled = trace_packet(geometry, o, d, begin, work, waiting, found, numbers, filled)
-        for k in range(first, filled):
-            _describe(geometry, o, d, numbers[k], t_max, found, k, out, numbers[k])
+        waiting, filled = trace_packet(
+            geometry,
+            o,
+            d,
+            begin,
+            width,
+            count,
+            k + PACKET_SIZE >= n,
+            work,
+            waiting,
+            found,
+            numbers,
+            filled,
+        )
+        for i in range(first, filled):
+            _describe(geometry, o, d, numbers[i], t_max, found, i, out, numbers[i])
     return filled
 
 
@@ -304,6 +326,19 @@ def _describe(
     whose = owner(geometry, hit)
     out.t[i], out.shape[i], out.primitive[i] = t, whose.shape, whose.face
     out.part[i], out.instance[i] = whose.part, whose.instance
+
+
+@kernel
+def _put_misses(out: HitArrays, begin: int, end: int) -> None:
+    """Rows begin to end, array after array: LLVM writes several rows at once."""
+    for i in range(np.uint64(begin), np.uint64(end)):
+        out.t[i] = math.inf
+    for column in (out.shape, out.primitive, out.part, out.instance):
+        for i in range(np.uint64(begin), np.uint64(end)):
+            column[i] = -1
+    if len(out.p) > 0:
+        for i in range(begin, end):
+            _put_miss(out, i)
 
 
 @kernel
