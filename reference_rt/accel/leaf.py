@@ -29,12 +29,15 @@ def nearest_of_leaf(
     shear: Shear,
     seen: FloatArray,
     hits: HitBlock,
+    any_hit: bool,
 ) -> Hit:
-    """The closest of hit j and all hits of ray j of a block in a leaf without instances; it becomes
-    hit j.  seen (PROJECTION_FLOATS,) is scratch."""
+    """The closest of hit j and all hits of ray j of a block in a leaf without instances, or with
+    any_hit any of them; it becomes hit j.  seen (PROJECTION_FLOATS,) is scratch."""
     closest = before = hit_of(hits, j)
     if is_triangle_leaf(leaf):
-        closest = nearest_of_triangle_leaf(bvh.corners, bvh, shapes, leaf, shear, seen, -1, closest)
+        closest = nearest_of_triangle_leaf(
+            bvh.corners, bvh, shapes, leaf, shear, seen, -1, closest, any_hit
+        )
     else:
         ray, first = ray_of(rays, j), first_of(leaf)
         for k in range(first, first + size_of(leaf)):
@@ -77,9 +80,11 @@ def nearest_of_triangle_leaf(
     seen: FloatArray,
     instance: int,
     closest: Hit,
+    any_hit: bool,
 ) -> Hit:
-    """The closest of `closest` and the hits with a leaf of triangles, tested VECTOR_WIDTH at once.
-    seen (PROJECTION_FLOATS,) is scratch."""
+    """The closest of `closest` and the hits with a leaf of triangles, tested VECTOR_WIDTH at once;
+    with any_hit any of them, if `closest` is none, in any row.  seen (PROJECTION_FLOATS,) is
+    scratch."""
     if corners is None:
         return closest
     first, size = first_of(node), size_of(node)
@@ -88,8 +93,10 @@ def nearest_of_triangle_leaf(
         lane = lowest(met)
         met &= met - 1
         found = triangle.intersect_lane(corners, first, size, lane, shear, seen)
-        row = row_of(bvh, first + lane)
+        row = 0 if any_hit else row_of(bvh, first + lane)  # often not in the cache
         closest = _nearer(shapes, found, TRIANGLE, row, instance, closest)
+        if any_hit and closest.kind >= 0:
+            return closest
     return closest
 
 
