@@ -159,7 +159,7 @@ def _traverse(geometry: Geometry, ray: Ray, any_hit: bool, counts: IntArray | No
             if counts is not None:
                 counts[1] += size_of(node)
             closest = nearest_of_triangle_leaf(
-                bvh.corners, bvh, shapes, node, local.shear, seen, instance, closest, False
+                bvh.corners, bvh, shapes, node, local.shear, seen, instance, closest
             )
         else:
             first = first_of(node)

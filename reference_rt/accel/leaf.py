@@ -29,22 +29,18 @@ def nearest_of_leaf(
     shear: Shear,
     seen: FloatArray,
     hits: HitBlock,
-    any_hit: bool,
 ) -> Hit:
-    """The closest of hit j and all hits of ray j of a block in a leaf without instances, or with
-    any_hit any of them; it becomes hit j.  seen (PROJECTION_FLOATS,) is scratch."""
-    closest = before = hit_of(hits, j)
+    """The closest of hit j and all hits of ray j of a block in a leaf without instances; it becomes
+    hit j.  seen (PROJECTION_FLOATS,) is scratch."""
+    closest = hit_of(hits, j)
     if is_triangle_leaf(leaf):
-        closest = nearest_of_triangle_leaf(
-            bvh.corners, bvh, shapes, leaf, shear, seen, -1, closest, any_hit
-        )
+        closest = nearest_of_triangle_leaf(bvh.corners, bvh, shapes, leaf, shear, seen, -1, closest)
     else:
         ray, first = ray_of(rays, j), first_of(leaf)
         for k in range(first, first + size_of(leaf)):
             kind, row = kind_of(bvh, k), row_of(bvh, k)
             closest = nearer_primitive(bvh, shapes, solids, kind, row, ray, shear, -1, closest)
-    if closest.row != before.row or closest.kind != before.kind:
-        put_hit(hits, j, closest)
+    put_hit(hits, j, closest)
     return closest
 
 
@@ -80,11 +76,9 @@ def nearest_of_triangle_leaf(
     seen: FloatArray,
     instance: int,
     closest: Hit,
-    any_hit: bool,
 ) -> Hit:
-    """The closest of `closest` and the hits with a leaf of triangles, tested VECTOR_WIDTH at once;
-    with any_hit any of them, if `closest` is none, in any row.  seen (PROJECTION_FLOATS,) is
-    scratch."""
+    """The closest of `closest` and the hits with a leaf of triangles, tested VECTOR_WIDTH at once.
+    seen (PROJECTION_FLOATS,) is scratch."""
     if corners is None:
         return closest
     first, size = first_of(node), size_of(node)
@@ -93,10 +87,8 @@ def nearest_of_triangle_leaf(
         lane = lowest(met)
         met &= met - 1
         found = triangle.intersect_lane(corners, first, size, lane, shear, seen)
-        row = 0 if any_hit else row_of(bvh, first + lane)  # often not in the cache
+        row = row_of(bvh, first + lane)
         closest = _nearer(shapes, found, TRIANGLE, row, instance, closest)
-        if any_hit and closest.kind >= 0:
-            return closest
     return closest
 
 

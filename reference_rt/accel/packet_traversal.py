@@ -361,8 +361,7 @@ def _nearest_of_leaf(
             entered &= entered - 1
             any_entered = True
             shear = shear_in(packet, rays, j, per_ray)
-            shapes, solids = geometry.shapes, geometry.solids
-            nearest_of_leaf(bvh, shapes, solids, leaf, rays, j, shear, seen, hits, False)
+            nearest_of_leaf(bvh, geometry.shapes, geometry.solids, leaf, rays, j, shear, seen, hits)
     return any_entered
 
 

@@ -197,6 +197,11 @@ CROSSING = ("next_crossing",)
 """Those of `cross`."""
 
 
+TOGETHER = 1 << 10
+"""Misses that are written before rays are traced, where these are not in bands: a multiple of
+PACKET_SIZE, few enough to stay in the cache until hits replace them."""
+
+
 @entry_kernel
 def closest(
     geometry: Geometry,
@@ -221,17 +226,19 @@ def closest(
     )
     for k in range(RAY_FLOATS):
         work.rays.numbers[k] = 1.0  # lanes without a ray are traced too
-    waiting, filled = 0, 0
-    n, rows = len(o), rows_width(o, d)
-    # As many rays as can be, TILE rows of them after another, are in packets of TILE rows.
-    tiled = n // (rows * TILE) * (rows * TILE)
+    waiting, filled, written = 0, 0, 0
+    n, width = len(o), rows_width(o, d)
+    # Bands of TILE rows are traced in packets of TILE rows, and the rays after the last one in
+    # their order.
+    band = width * TILE
+    in_bands = n // band * band if width > TILE else 0
     for k in range(0, n, PACKET_SIZE):
-        begin, width = k, TILE
-        if k < tiled:
-            band, column = k // (rows * TILE), k % (rows * TILE) // TILE
-            begin, width = band * (rows * TILE) + column, rows
-        if k % (width * TILE) == 0:
-            _put_misses(out, k, min(k + width * TILE, n))
+        begin, across = k, TILE
+        if k < in_bands:
+            begin, across = k // band * band + k % band // TILE, width
+        if k == written:
+            written = min(k + (band if k < in_bands else TOGETHER), n)
+            _put_misses(out, k, written)
         count = min(PACKET_SIZE, n - k)
         if filled > len(numbers) - MOST_ADDED:
             filled = 0
@@ -241,7 +248,7 @@ def closest(
             o,
             d,
             begin,
-            width,
+            across,
             count,
             k + PACKET_SIZE >= n,
             work,
