@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from reference_rt.accel.block_query import any_hits, closest_hits, hit_of
 from reference_rt.accel.geometry import Geometry, closest_hit, occluded
-from reference_rt.accel.packet import PACKET_SIZE
+from reference_rt.accel.packet import PACKET_SIZE, TILE, may_be_coherent, ray_number
 from reference_rt.accel.packet_traversal import FOUND, INCOHERENT, closest_of_packet
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import (
@@ -24,7 +24,7 @@ from reference_rt.core.ray import (
     ray_of,
     scaled,
 )
-from reference_rt.core.vec3 import row
+from reference_rt.core.vec3 import max_abs, row
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 
 
@@ -58,42 +58,70 @@ def trace_packet(
     o: FloatArray,
     d: FloatArray,
     begin: int,
+    width: int,
+    count: int,
+    is_last: bool,
     work: TraceScratch,
     waiting: int,
     found: Primitives,
     numbers: IntArray,
     filled: int,
 ) -> tuple[int, int]:
-    """Closest hits of the PACKET_SIZE rays begin, begin + 1, ... with origins o (n, 3) and
-    directions d (n, 3): as a packet where they are coherent, else queued until there is a block of
-    them.
+    """Closest hits of the first `count` rays of a packet, see `ray_number`, with origins o (n, 3)
+    and directions d (n, 3): together where they are PACKET_SIZE coherent ones, else queued until
+    there is a block of them.
 
-    waiting: rays in the queue;  filled: hits in `found`, whose rays' indices are in `numbers`.
-    Returns both as they are afterwards.  Hits come in any order, misses are left out; the call for
-    the last of the n rays empties the queue.
+    waiting: rays in the queue, which is emptied with is_last;  filled: hits in `found`, whose rays'
+    indices are in `numbers`.  Returns both as they are afterwards.  Hits come in any order, misses
+    are left out.
     """
-    end = min(begin + PACKET_SIZE, len(o))
     outcome = INCOHERENT
-    if end == begin + PACKET_SIZE:
-        outcome = closest_of_packet(geometry, o, d, begin, work.packet, work.hits)
+    if count == PACKET_SIZE:
+        outcome = closest_of_packet(geometry, o, d, begin, width, work.packet, work.hits)
     if outcome == FOUND:
         for j in range(PACKET_SIZE):
             hit = hit_of(geometry, ray_of(work.packet, j), work.hits, j)
-            filled = _add_hit(found, numbers, filled, hit, begin + j)
+            filled = _add_hit(found, numbers, filled, hit, ray_number(begin, width, j))
     elif outcome == INCOHERENT:
-        for i in range(begin, end):
+        for j in range(count):
+            i = ray_number(begin, width, j)
             ray, _, valid = scaled(row(o, i), row(d, i), math.inf)
             if valid:
                 put_ray(work.rays, waiting, ray)
                 work.numbers[waiting] = i
                 waiting += 1
-    if waiting > BLOCK - PACKET_SIZE or end == len(o):
+    if waiting > BLOCK - PACKET_SIZE or is_last:
         closest_hits(geometry, work.rays, work.hits, waiting)
         for j in range(waiting):
             hit = hit_of(geometry, ray_of(work.rays, j), work.hits, j)
             filled = _add_hit(found, numbers, filled, hit, work.numbers[j])
         waiting = 0
     return waiting, filled
+
+
+@kernel
+def rows_width(o: FloatArray, d: FloatArray) -> int:
+    """How many rays are in a row, a multiple of TILE, if rays are in the order of a picture's
+    pixels, at least 8 rows of them; else TILE.
+
+    A row ends where a ray differs from the one before it by more than JUMP times what any in the
+    row does.  Any number is correct: rays of a wrong one are not coherent.
+    """
+    if len(o) < PACKET_SIZE or not may_be_coherent(row(d, 0), row(d, TILE)):
+        return TILE
+    end, widest = -1, 0.0
+    for i in range(1, len(o) // 4):
+        step = max_abs(row(d, i) - row(d, i - 1)) + max_abs(row(o, i) - row(o, i - 1))
+        if i < TILE or not step > JUMP * widest:
+            widest = max(widest, step)
+        elif end < 0:
+            end = i
+        else:
+            return i - end if (i - end) % TILE == 0 else TILE
+    return TILE
+
+
+JUMP = 8.0
 
 
 @kernel

@@ -1,7 +1,9 @@
 """Ray packets: intervals of the origins and inverse directions of neighbouring rays, and the test
 whether the rays are coherent."""
 
+import functools
 import math
+import operator
 from typing import Any, NamedTuple
 
 from reference_rt.accel.bvh import CENTER, Bvh
@@ -9,12 +11,22 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import SHORT, surface_error
 from reference_rt.core.vec3 import Vec3, component, max_abs
 from reference_rt.jit.kernel import kernel, reciprocal
-from reference_rt.jit.simd import VECTOR_WIDTH, larger, simd_kernel, smaller
+from reference_rt.jit.simd import (
+    LANES,
+    VECTOR_WIDTH,
+    lanes_where,
+    larger,
+    least,
+    select,
+    simd_kernel,
+    smaller,
+)
 
-PACKET_SIZE = 16
-"""Rays in a packet.  Measured on the bunny, camera rays along rows of 1024 pixels, at a time when
-every number was computed for each ray: 8 take 38 ns per ray, 16 take 30, 32 take 31, 64 take
-40."""
+TILE = 4
+PACKET_SIZE = TILE * TILE
+"""Rays in a packet: TILE side by side in each of TILE rows.  Measured on the bunny, camera rays of
+a picture 1024 pixels wide, per ray: 16 in a row 24.6 ns, 2 x 8 23.0, 4 x 4 21.1; 32 as 4 x 8 21.4;
+64 as 8 x 8 22.5."""
 
 NARROW = 96.0
 """The largest width of a coherent packet within the tree's box: NARROW / sqrt(references) times
@@ -24,8 +36,7 @@ Chosen between gain and loss on spheres of triangles, 40 degrees of view.  Time 
 time without: 300 triangles 0.78 at 64 pixels a row and 1.31 at 32; 5,292 triangles 0.73 at 128 and
 1.30 at 64; 69,312 triangles 0.80 at 256 and 1.32 at 128; a million 0.70 at 1024 and 1.12 at 512."""
 
-_TURNS = 3 * VECTOR_WIDTH
-SPAN_FLOATS = 4 * _TURNS + VECTOR_WIDTH
+SPAN_FLOATS = 13 * VECTOR_WIDTH
 
 
 class RayPacket(NamedTuple):
@@ -59,58 +70,67 @@ def may_be_coherent(first: Vec3, last: Vec3) -> bool:
     return abs(off.x) <= length and abs(off.y) <= length and abs(off.z) <= length
 
 
+@kernel
+def ray_number(begin: int, width: int, j: int) -> int:
+    """The number of ray j of a packet: it has TILE rays from ray `begin` on, and as many in each of
+    the following rows, `width` rays further on; TILE is the width of rays that are in no rows."""
+    return begin + (j // TILE) * width + j % TILE
+
+
 @simd_kernel
-def _span(o: Any, d: Any, first: Any, boxes: Any, span: Any) -> Any:
+def _span(o: Any, d: Any, first: Any, across: Any, boxes: Any, span: Any) -> Any:
     """Componentwise bounds of PACKET_SIZE origins and directions, from float `first` of their
-    arrays on.
+    arrays on, rows `across` floats apart.
 
-    Into span (SPAN_FLOATS,): the smallest numbers of o and d, then the largest, each as 3
-    VECTOR_WIDTH numbers that are x, y, z in turn and still to be reduced; then how far each child
-    of the root reaches beyond the tree's centre.  Returns the mask of lanes whose numbers are all
-    finite.
+    Into span (SPAN_FLOATS,), each VECTOR_WIDTH times: the smallest x, y and z of o, the largest,
+    and those of d; then how far each child of the root reaches beyond the tree's centre.  Returns
+    the mask of lanes in which the sum of all numbers is finite.
     """
-    is_finite = boxes.load(0) <= float("inf")
-    for place, vectors in ((0, o), (_TURNS, d)):
-        for begin in range(0, 3 * VECTOR_WIDTH, VECTOR_WIDTH):
-            low = high = vectors.load(first + begin)
-            for more in range(0, 3 * PACKET_SIZE, 3 * VECTOR_WIDTH):
-                x = vectors.load(first + (begin + more))
-                is_finite = is_finite & (abs(x) < float("inf"))
-                low, high = smaller(low, x), larger(high, x)
-            span.store(place + begin, low)
-            span.store(2 * _TURNS + place + begin, high)
+    sums = []
+    # The coordinates x, y, z in turn of TILE rays are two vectors, which overlap.
+    starts = 0, 3 * TILE - VECTOR_WIDTH
+    for place, vectors in ((0, o), (6 * VECTOR_WIDTH, d)):
+        lows, highs = [], []
+        for start in starts:
+            rows = [vectors.load(first + (across * row + start)) for row in range(TILE)]
+            sums.append(functools.reduce(operator.add, rows))
+            lows.append(functools.reduce(smaller, rows))
+            highs.append(functools.reduce(larger, rows))
+        for axis in range(3):
+            low, high = math.inf, -math.inf
+            for start, some_low, some_high in zip(starts, lows, highs, strict=True):
+                here = lanes_where([(start + k) % 3 == axis for k in LANES], some_low)
+                low, high = select(here, some_low, low), select(here, some_high, high)
+            span.store(place + axis * VECTOR_WIDTH, least(low))
+            span.store(place + (3 + axis) * VECTOR_WIDTH, -least(-high))
     upper = larger(boxes.load(3 * VECTOR_WIDTH), boxes.load(4 * VECTOR_WIDTH))
-    span.store(4 * _TURNS, larger(upper, boxes.load(5 * VECTOR_WIDTH)))
-    return is_finite
+    span.store(12 * VECTOR_WIDTH, larger(upper, boxes.load(5 * VECTOR_WIDTH)))
+    return abs(functools.reduce(operator.add, sums)) < math.inf
 
 
 @kernel
-def _lowest(span: FloatArray, place: int) -> Vec3:
-    """The smallest x, y and z of the 3 VECTOR_WIDTH numbers of `_span` at `place`."""
-    low = Vec3(span[place], span[place + 1], span[place + 2])
-    for j in range(place + 3, place + _TURNS, 3):
-        low = Vec3(min(low.x, span[j]), min(low.y, span[j + 1]), min(low.z, span[j + 2]))
-    return low
+def _bound(span: FloatArray, k: int) -> Vec3:
+    """x, y and z of the bounds number k of `_span`."""
+    at = 3 * VECTOR_WIDTH * k
+    return Vec3(span[at], span[at + VECTOR_WIDTH], span[at + 2 * VECTOR_WIDTH])
 
 
 @kernel
-def _highest(span: FloatArray, place: int) -> Vec3:
-    """The largest, as `_lowest`."""
-    high = Vec3(span[place], span[place + 1], span[place + 2])
-    for j in range(place + 3, place + _TURNS, 3):
-        high = Vec3(max(high.x, span[j]), max(high.y, span[j + 1]), max(high.z, span[j + 2]))
-    return high
-
-
-@kernel
-def packet_of(bvh: Bvh, o: FloatArray, d: FloatArray, begin: int, span: FloatArray) -> RayPacket:
-    """The packet of the PACKET_SIZE rays begin, begin + 1, ...; span (SPAN_FLOATS,) is scratch."""
-    is_coherent = _span(o, d, 3 * begin, bvh.boxes, span) == (1 << VECTOR_WIDTH) - 1
-    o_low, d_low = _lowest(span, 0), _lowest(span, _TURNS)
-    o_high, d_high = _highest(span, 2 * _TURNS), _highest(span, 3 * _TURNS)
+def packet_of(
+    bvh: Bvh, o: FloatArray, d: FloatArray, begin: int, width: int, span: FloatArray
+) -> RayPacket:
+    """The packet of PACKET_SIZE rays, see `ray_number`; span (SPAN_FLOATS,) is scratch."""
+    finite = _span(o, d, 3 * begin, 3 * width, bvh.boxes, span)
+    is_coherent = finite == (1 << VECTOR_WIDTH) - 1
+    o_low, o_high, d_low, d_high = (
+        _bound(span, 0),
+        _bound(span, 1),
+        _bound(span, 2),
+        _bound(span, 3),
+    )
     reach = 0.0
     for lane in range(VECTOR_WIDTH):
-        reach = max(reach, span[4 * _TURNS + lane])
+        reach = max(reach, span[12 * VECTOR_WIDTH + lane])
     steep = Vec3(
         _least_abs(d_low.x, d_high.x),
         _least_abs(d_low.y, d_high.y),
@@ -134,12 +154,15 @@ def packet_of(bvh: Bvh, o: FloatArray, d: FloatArray, begin: int, span: FloatArr
     o_low, o_high = o_low - center, o_high - center
     length = component(steep, axis)
     is_coherent = is_coherent and SHORT <= length <= 1.0 / SHORT
-    slope = (max(max_abs(o_low), max_abs(o_high)) + reach) / length
-    widest = reach * min(1.0, NARROW / math.sqrt(len(bvh.references)))
+    # Times `length`, and squared, which spares a division and a square root.
+    far = max(max_abs(o_low), max_abs(o_high)) + reach
+    widest = reach * length
     for k in range(3):
         low, high = component(d_low, k), component(d_high, k)
-        width = component(o_high, k) - component(o_low, k) + (high - low) * slope
-        is_coherent = is_coherent and width <= widest and (low > 0.0 or high < 0.0 or low == high)
+        extent = (component(o_high, k) - component(o_low, k)) * length + (high - low) * far
+        is_narrow = extent * extent * len(bvh.references) <= NARROW * NARROW * widest * widest
+        is_coherent = is_coherent and is_narrow and extent <= widest
+        is_coherent = is_coherent and (low > 0.0 or high < 0.0 or low == high)
         # Along `axis` within the range of lengths that `scaled` does not change.
         longest = max(abs(low), abs(high))
         is_coherent = is_coherent and (longest <= 1.0 / SHORT if k == axis else longest < length)

@@ -18,6 +18,7 @@ from reference_rt.accel.packet import (
     RayPacket,
     may_be_coherent,
     packet_of,
+    ray_number,
 )
 from reference_rt.accel.single_ray import can_be_nearer, push_sorted
 from reference_rt.core.arrays import FloatArray, IntArray
@@ -244,18 +245,26 @@ Vectors = Annotated[FloatArray, 2]
 
 @geometries.operation
 def closest_of_packet(
-    geometry: Geometry, o: Vectors, d: Vectors, begin: int, rays: RayBlock, hits: HitBlock
+    geometry: Geometry,
+    o: Vectors,
+    d: Vectors,
+    begin: int,
+    width: int,
+    rays: RayBlock,
+    hits: HitBlock,
 ) -> int:
-    """`closest_hit` of the PACKET_SIZE rays begin, begin + 1, ... with origins o (n, 3) and
-    directions d (n, 3).
+    """`closest_hit` of PACKET_SIZE of the rays with origins o (n, 3) and directions d (n, 3): those
+    of `ray_number`.
 
     Returns INCOHERENT: nothing is done (they are not coherent, or the scene has no BVH or has
     instances);  MISSED: no ray hits anything;  FOUND: the rays and their hits, some of them misses,
     are the first ones of `rays` and `hits`.
     """
-    if not may_be_coherent(row(d, begin), row(d, begin + PACKET_SIZE - 1)):
+    if not may_be_coherent(row(d, begin), row(d, ray_number(begin, width, PACKET_SIZE - 1))):
         return INCOHERENT
-    return _closest_of_packet(geometry.bvh, geometry.instances, geometry, o, d, begin, rays, hits)
+    return _closest_of_packet(
+        geometry.bvh, geometry.instances, geometry, o, d, begin, width, rays, hits
+    )
 
 
 @kernel
@@ -266,6 +275,7 @@ def _closest_of_packet(
     o: FloatArray,
     d: FloatArray,
     begin: int,
+    width: int,
     rays: RayBlock,
     hits: HitBlock,
 ) -> int:
@@ -273,7 +283,7 @@ def _closest_of_packet(
         return INCOHERENT
     if instances is not None:  # each of which changes the rays' origins and directions
         return INCOHERENT
-    return _traverse(bvh, geometry, o, d, begin, rays, hits)
+    return _traverse(bvh, geometry, o, d, begin, width, rays, hits)
 
 
 @kernel
@@ -283,11 +293,12 @@ def _traverse(
     o: FloatArray,
     d: FloatArray,
     begin: int,
+    width: int,
     rays: RayBlock,
     hits: HitBlock,
 ) -> int:
     span, per_ray = local_floats(SPAN_FLOATS), local_floats(PER_RAY_FLOATS)
-    packet = packet_of(bvh, o, d, begin, span)
+    packet = packet_of(bvh, o, d, begin, width, span)
     if not packet.is_coherent:
         return INCOHERENT
     stack, waiting = local_integers(STACK), local_floats(STACK)
@@ -308,7 +319,8 @@ def _traverse(
             if outcome == MISSED:
                 outcome = FOUND
                 for j in range(PACKET_SIZE):
-                    ray = Ray(row(o, begin + j), row(d, begin + j), math.inf)
+                    i = ray_number(begin, width, j)
+                    ray = Ray(row(o, i), row(d, i), math.inf)
                     put_ray(rays, j, ray)
                     put_hit(hits, j, no_hit(ray))
                 prepare_rays(bvh, packet, rays, per_ray)

@@ -14,7 +14,7 @@ function callable from kernels."""
 import functools
 import inspect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -93,8 +93,8 @@ class SimdVector:
         undefined = ir.Constant(F64_VECTOR, ir.Undefined)
         return SimdVector(self.builder, self.builder.shuffle_vector(self.value, undefined, which))
 
-    def first_lanes(self, n: int) -> Mask:
-        bits = ir.Constant(ir.VectorType(ir.IntType(1), VECTOR_WIDTH), [k < n for k in LANES])
+    def lanes_where(self, chosen: Sequence[bool]) -> Mask:
+        bits = ir.Constant(ir.VectorType(ir.IntType(1), VECTOR_WIDTH), chosen)
         return Mask(self.builder, bits)
 
     def compared(self, how: str, other: Any) -> Mask:
@@ -134,9 +134,9 @@ def select(condition: Any, a: Any, b: Any) -> Any:
     return a if condition else b
 
 
-def first_lanes(x: Any, n: int) -> Any:
-    """The condition that holds in the first n lanes of the vector x."""
-    return x.first_lanes(n) if isinstance(x, SimdVector) else np.array(LANES) < n
+def lanes_where(chosen: Sequence[bool], x: Any) -> Any:
+    """The condition that holds in the chosen lanes of the vector x."""
+    return x.lanes_where(chosen) if isinstance(x, SimdVector) else np.array(chosen)
 
 
 def smaller(a: Any, b: Any) -> Any:

@@ -45,8 +45,8 @@ def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
     for code, field, _, module in TABLES:
         tables[field] = None
         if work.tables[code]:  # popped, so that a large mesh is never held twice
+            work.check_finite(work.tables[code])
             table = tables[field] = _concatenate(work.tables.pop(code))
-            work.check_finite(table)
             bounds[code] = module.bounds(table)
             del table
     if work.solids:
@@ -107,15 +107,14 @@ class _Assembly:
         self.tables[code].append(table)
         return TableRows(code, np.arange(first, self.rows[code]))
 
-    def check_finite(self, table: Any) -> None:
-        """Raise SceneError for a shape whose numbers have overflowed."""
-        for column in table:
-            if column is not None and not np.all(np.isfinite(column)):
-                finite = np.isfinite(column.reshape(len(column), -1)).all(axis=1)
-                owner = table.owner[~finite][0] if len(finite) == len(table.owner) else 0
+    def check_finite(self, parts: Sequence[Any]) -> None:
+        """Raise SceneError for a shape, whose table is one of these, with numbers that have
+        overflowed."""
+        for part in parts:
+            if not all(np.isfinite(column).all() for column in part if column is not None):
                 raise self.scene.error(
                     "its coordinates overflow; expected finite numbers",
-                    *self.path_of(int(owner)),
+                    *self.path_of(int(part.owner[0])),
                 )
 
     def member(self, shape: Shape, owner: int, material: str | None) -> TableRows:

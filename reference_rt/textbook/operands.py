@@ -99,7 +99,7 @@ def _spans(shapes: Shapes, kind: int, o: FloatArray, d: FloatArray, t: FloatArra
 def _mesh_crossing(triangles: Triangles, i: int, shear: Shear) -> tuple[float, int]:
     """t, of any sign, at which the line crosses triangle i, and +1 for entering, -1 for leaving, 0
     for a miss."""
-    seen = project(triangles.vertices, i, shear)
+    seen = project(triangles.points, triangles.corners, i, shear)
     return on_line(seen, shear).t, seen.side
 
 
@@ -108,7 +108,7 @@ def _count(triangles: Triangles, o: FloatArray, d: FloatArray, count: IntArray) 
     for i in range(len(o)):
         shear = shear_of(ray_of(o, d, i))
         for k in range(len(triangles.face)):
-            if project(triangles.vertices, k, shear).side != 0:
+            if project(triangles.points, triangles.corners, k, shear).side != 0:
                 count[i] += 1
 
 

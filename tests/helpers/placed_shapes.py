@@ -7,7 +7,7 @@ from builders import shapes_in_order, unit_vectors
 from drivers import probe
 
 import reference_rt as rt
-from comparisons.geometry.exact import KINDS, first_hit
+from comparisons.geometry.exact import KINDS, columns_of, first_hit
 from comparisons.geometry.exact.dyadic import NEVER, Dyadic, nearest
 from reference_rt.core.transform import Matrix
 from reference_rt.shapes import TABLES
@@ -66,7 +66,7 @@ class Placed:
             for code, field, _, module in TABLES
             if getattr(self.tables, field) is not None
         )
-        self.row = table._asdict()
+        self.row = columns_of(table)
         self.table = table
         self.lower, self.upper = (side[0] for side in module.bounds(table))
         lower, upper = self.lower, self.upper

@@ -84,7 +84,7 @@ def _count(
 ) -> None:
     for i in range(len(o)):
         shear = shear_of(Ray(row(o, i), row(d, i), np.inf))
-        for k in range(len(triangles.vertices)):
+        for k in range(len(triangles.face)):
             if triangle.intersect(triangles, k, shear).t < np.inf:
                 crossings[i] += 1
                 balance[i] += triangle.enters(triangles, k, shear)

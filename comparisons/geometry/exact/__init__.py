@@ -1,8 +1,8 @@
 """Ray-primitive intersections in exact arithmetic, which decide which tracer is right.
 
 The numbers of rays and of table rows are floats, that is, exact rationals.  For one row of a table
-of `reference_rt.shapes`, as a mapping of its columns (`table._asdict()`, of one row, or of as many
-as there are rays), and rays (n, 3) with directions of any length:
+of `reference_rt.shapes`, as a mapping of its columns (`columns_of(table)`, one row, or as many as
+there are rays), and rays (n, 3) with directions of any length:
 
     hits = first_hit("spheres", row, origins, directions)
     hits.t          # (n,) the float nearest to the exact smallest t > 0, inf for a miss
@@ -20,7 +20,7 @@ ray; FLINT solves the quartics of tori, about 100 µs a ray.  To add a shape: it
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,17 @@ import numpy.typing as npt
 from comparisons.geometry.exact import crossings
 from comparisons.geometry.exact.crossings import Crossings, IntArray, Row
 from comparisons.geometry.exact.dyadic import NEVER, BoolArray, Dyadic, Fixed, FloatArray, nearest
+
+
+def columns_of(table: Any) -> dict[str, Any]:
+    """The columns of a shape's table by name; of triangles the vertices (n, 9), in place of points
+    that triangles share."""
+    columns: dict[str, Any] = table._asdict()
+    if "corners" in columns:
+        del columns["points"], columns["corners"]
+        columns["vertices"] = table.vertices
+    return columns
+
 
 KINDS: dict[str, Callable[[Row, Dyadic, Dyadic], Crossings]] = {
     "spheres": crossings.spheres,

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from comparisons.geometry.exact import KINDS
+from comparisons.geometry.exact import KINDS, columns_of
 from comparisons.geometry.exact.crossings import Crossings, IntArray
 from comparisons.geometry.exact.dyadic import (
     CERTAIN,
@@ -151,7 +151,7 @@ def crossings_of(
     leaf: LeafSizes, rays: tuple[FloatArray, FloatArray], exact: tuple[Dyadic, Dyadic]
 ) -> Lists:
     """All crossings of a leaf, over all t, in order."""
-    row = leaf.table._asdict()
+    row = columns_of(leaf.table)
     n = len(rays[0])
     lists: list[list[tuple[int, int, bool]]] = [[] for _ in range(n)]
     touching = np.zeros(n, bool)

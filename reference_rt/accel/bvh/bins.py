@@ -8,8 +8,9 @@ from reference_rt.accel.bvh.nodes import REF_FLOATS, aligned, clear, half_area
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.jit.kernel import kernel, local_floats
 from reference_rt.jit.simd import (
+    LANES,
     VECTOR_WIDTH,
-    first_lanes,
+    lanes_where,
     larger,
     lowest,
     select,
@@ -79,7 +80,7 @@ def bin_of(x: float, low: float, scale: float) -> int:
 
 def _grown(box: Any, by: Any) -> Any:
     """The box around two, each the first six lanes of a vector; a generic function."""
-    return select(first_lanes(box, 3), smaller(box, by), larger(box, by))
+    return select(lanes_where([k < 3 for k in LANES], box), smaller(box, by), larger(box, by))
 
 
 @simd_kernel

@@ -16,12 +16,13 @@ from reference_rt.accel.array_query import (
     Primitives,
     TraceScratch,
     closest_one_by_one,
+    rows_width,
     trace_packet,
 )
 from reference_rt.accel.crossing_order import nothing_at
 from reference_rt.accel.geometry import Geometry, coordinates, owner, surface
 from reference_rt.accel.next_crossing import next_crossing
-from reference_rt.accel.packet import PACKET_SIZE
+from reference_rt.accel.packet import PACKET_SIZE, TILE
 from reference_rt.core.arrays import FloatArray, IdArray, IntArray
 from reference_rt.core.ray import (
     BLOCK,
@@ -196,6 +197,11 @@ CROSSING = ("next_crossing",)
 """Those of `cross`."""
 
 
+TOGETHER = 1 << 10
+"""Misses that are written before rays are traced, where these are not in bands: a multiple of
+PACKET_SIZE, few enough to stay in the cache until hits replace them."""
+
+
 @entry_kernel
 def closest(
     geometry: Geometry,
@@ -220,16 +226,39 @@ def closest(
     )
     for k in range(RAY_FLOATS):
         work.rays.numbers[k] = 1.0  # lanes without a ray are traced too
-    waiting, filled = 0, 0
-    for begin in range(0, len(o), PACKET_SIZE):
-        for i in range(begin, min(begin + PACKET_SIZE, len(o))):
-            _put_miss(out, i)
+    waiting, filled, written = 0, 0, 0
+    n, width = len(o), rows_width(o, d)
+    # Bands of TILE rows are traced in packets of TILE rows, and the rays after the last one in
+    # their order.
+    band = width * TILE
+    in_bands = n // band * band if width > TILE else 0
+    for k in range(0, n, PACKET_SIZE):
+        begin, across = k, TILE
+        if k < in_bands:
+            begin, across = k // band * band + k % band // TILE, width
+        if k == written:
+            written = min(k + (band if k < in_bands else TOGETHER), n)
+            _put_misses(out, k, written)
+        count = min(PACKET_SIZE, n - k)
         if filled > len(numbers) - MOST_ADDED:
             filled = 0
         first = filled
-        waiting, filled = trace_packet(geometry, o, d, begin, work, waiting, found, numbers, filled)
-        for k in range(first, filled):
-            _describe(geometry, o, d, numbers[k], t_max, found, k, out, numbers[k])
+        waiting, filled = trace_packet(
+            geometry,
+            o,
+            d,
+            begin,
+            across,
+            count,
+            k + PACKET_SIZE >= n,
+            work,
+            waiting,
+            found,
+            numbers,
+            filled,
+        )
+        for i in range(first, filled):
+            _describe(geometry, o, d, numbers[i], t_max, found, i, out, numbers[i])
     return filled
 
 
@@ -304,6 +333,19 @@ def _describe(
     whose = owner(geometry, hit)
     out.t[i], out.shape[i], out.primitive[i] = t, whose.shape, whose.face
     out.part[i], out.instance[i] = whose.part, whose.instance
+
+
+@kernel
+def _put_misses(out: HitArrays, begin: int, end: int) -> None:
+    """Rows begin to end, array after array: LLVM writes several rows at once."""
+    for i in range(np.uint64(begin), np.uint64(end)):
+        out.t[i] = math.inf
+    for column in (out.shape, out.primitive, out.part, out.instance):
+        for i in range(np.uint64(begin), np.uint64(end)):
+            column[i] = -1
+    if len(out.p) > 0:
+        for i in range(begin, end):
+            _put_miss(out, i)
 
 
 @kernel

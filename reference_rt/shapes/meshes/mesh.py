@@ -14,7 +14,7 @@ from reference_rt.core.transform import IDENTITY, Affine
 from reference_rt.shapes.meshes.files import MeshData, read_mesh
 from reference_rt.shapes.meshes.files.data import RawMesh, checked
 from reference_rt.shapes.meshes.topology import smooth_normals
-from reference_rt.shapes.meshes.triangle_table import Triangles, facing, have_area, soup
+from reference_rt.shapes.meshes.triangle_table import Triangles, facing, have_area, table_of
 from reference_rt.shapes.shape import Shape, TabulationContext
 
 _MOST_NAMED = 12
@@ -97,23 +97,26 @@ class Mesh(Shape):
         name = "the mesh" if self.file is None else f"mesh {context.folder / self.file}"
         if data.ignored:
             context.warn(context.owner, f"{name}: {_ignored_message(data.ignored)}")
-        vertices = transform.apply_points(m, data.vertices)[data.faces].reshape(-1, 9)
+        points = transform.apply_points(m, data.vertices)
         # Triangles without area have no normal, and rays meet them by rounding alone: left out.
-        has_area = have_area(vertices)
+        has_area = have_area(points, data.faces)
         if not has_area.any():
             raise ValueError(f"{name}: no triangle has any area; expected one that has")
         faces, numbers = data.faces, None
         if not has_area.all():
             numbers = np.flatnonzero(has_area)
-            vertices, faces = vertices[has_area], faces[has_area]
+            faces = faces[has_area]
             context.warn(
                 context.owner,
                 f"{name}: {len(has_area) - len(numbers):,} of {len(has_area):,} triangles have no "
                 "area, or one that float64 cannot hold, and are left out (the others keep their "
                 "numbers); expected triangles with an area",
             )
-        triangles = soup(
-            np.ascontiguousarray(vertices),
+        is_used = np.zeros(len(points), bool)
+        is_used[faces] = True
+        triangles = table_of(
+            np.ascontiguousarray(points[is_used]),
+            (np.cumsum(is_used) - 1)[faces],
             context,
             normals=self._normals(data, faces, m),
             uvs=_at_corners(data.uv, faces),

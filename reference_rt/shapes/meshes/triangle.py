@@ -1,7 +1,7 @@
 """Triangle: three vertices, watertight along shared edges."""
 
 import math
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -17,9 +17,17 @@ from reference_rt.core.ray import (
     miss,
     surface_error,
 )
-from reference_rt.core.vec3 import Vec3, cross, dot, max_abs, normalize, triple
+from reference_rt.core.vec3 import Vec3, cross, dot, max_abs, normalize, row, triple
 from reference_rt.jit.kernel import kernel
-from reference_rt.shapes.meshes.triangle_table import Triangles, align, areas, bounds, facing, soup
+from reference_rt.shapes.meshes.triangle_table import (
+    RAGGED,
+    Triangles,
+    align,
+    areas,
+    bounds,
+    facing,
+    table_of,
+)
 from reference_rt.shapes.meshes.watertight import (
     Projection,
     Shear,
@@ -54,7 +62,7 @@ class Triangle(Shape):
     def tabulate(self, context: TabulationContext) -> "Triangles":
         m = self.map_in(context)
         vertices = transform.apply_points(m, np.array([self.v0, self.v1, self.v2]))
-        triangles = facing(m, soup(vertices.reshape(1, 9), context))
+        triangles = facing(m, table_of(vertices, np.arange(3)[None], context))
         if areas(triangles)[0] == 0.0:
             raise ValueError("the triangle has no area; expected three points not on a line")
         return triangles
@@ -63,7 +71,7 @@ class Triangle(Shape):
 @kernel
 def intersect(triangles: Triangles, i: int, shear: Shear) -> Crossing:
     """Where the ray meets triangle i; u, v are the barycentrics of v1 and v2."""
-    return _crossing(project(triangles.vertices, i, shear), shear)
+    return _crossing(project(triangles.points, triangles.corners, i, shear), shear)
 
 
 @kernel
@@ -96,13 +104,35 @@ def on_line(seen: Projection, shear: Shear) -> Crossing:
 def enters(triangles: Triangles, i: int, shear: Shear) -> int:
     """+1 if the ray comes to triangle i from the front, -1 if it comes from behind, 0 for a
     miss."""
-    return project(triangles.vertices, i, shear).side
+    return project(triangles.points, triangles.corners, i, shear).side
+
+
+class Vertices(NamedTuple):
+    """The vertices of a triangle."""
+
+    v0: Vec3
+    v1: Vec3
+    v2: Vec3
+
+
+@kernel
+def vertices_of(triangles: Triangles, i: int) -> Vertices:
+    points, corners, r = triangles.points, triangles.corners, np.uint64(i)
+    return Vertices(
+        row(points, corners[r, 0]), row(points, corners[r, 1]), row(points, corners[r, 2])
+    )
+
+
+@kernel
+def _between(of: Vertices, u: float, v: float) -> Vec3:
+    """(1 - u - v) v0 + u v1 + v v2."""
+    return of.v0 * (1.0 - u - v) + of.v1 * u + of.v2 * v
 
 
 @kernel
 def interpolate(array: FloatArray, i: int, u: float, v: float) -> Vec3:
     """(1 - u - v) a0 + u a1 + v a2 of the three vectors in row i."""
-    return triple(array, i, 0) * (1.0 - u - v) + triple(array, i, 1) * u + triple(array, i, 2) * v
+    return _between(Vertices(triple(array, i, 0), triple(array, i, 1), triple(array, i, 2)), u, v)
 
 
 @kernel
@@ -113,8 +143,8 @@ def normal(triangles: Triangles, i: int) -> Vec3:
     their angle: for sines below 1/4 the products are made exact.  Otherwise a ray along a sliver
     that starts off it by `SurfacePoint.error` could meet it again.
     """
-    v0 = triple(triangles.vertices, i, 0)
-    a, b = triple(triangles.vertices, i, 1) - v0, triple(triangles.vertices, i, 2) - v0
+    v0, v1, v2 = vertices_of(triangles, i)
+    a, b = v1 - v0, v2 - v0
     n = cross(a, b)
     if dot(n, n) < 0.0625 * (dot(a, a) * dot(b, b)):
         x, _ = exact_edge_function(a.y, a.z, b.y, b.z)
@@ -132,8 +162,7 @@ def error_at(triangles: Triangles, i: int, p: Vec3) -> float:
     at most the longest edge, and the error of the point that it meets is `CANCELLED` u + 4 u times
     that: twice the edge in `surface_error`, which adds the rounding of p itself.
     """
-    v = triangles.vertices
-    v0, v1, v2 = triple(v, i, 0), triple(v, i, 1), triple(v, i, 2)
+    v0, v1, v2 = vertices_of(triangles, i)
     longest = max(max_abs(v1 - v0), max(max_abs(v2 - v0), max_abs(v2 - v1)))
     return surface_error(p, v0, 2.0 * longest)
 
@@ -141,8 +170,7 @@ def error_at(triangles: Triangles, i: int, p: Vec3) -> float:
 @kernel
 def lift_of(triangles: Triangles, i: int, p: Vec3) -> float:
     """See `shape.lift`."""
-    v = triangles.vertices
-    a, b, c = triple(v, i, 0), triple(v, i, 1), triple(v, i, 2)
+    a, b, c = vertices_of(triangles, i)
     lower = Vec3(min(a.x, b.x, c.x), min(a.y, b.y, c.y), min(a.z, b.z, c.z))
     upper = Vec3(max(a.x, b.x, c.x), max(a.y, b.y, c.y), max(a.z, b.z, c.z))
     middle = lower * 0.5 + upper * 0.5
@@ -163,7 +191,7 @@ def shading_normal(normals: FloatArray | None, i: int, u: float, v: float, n: Ve
 @kernel
 def surface(triangles: Triangles, ray: Ray, hit: Hit) -> SurfacePoint:
     i = hit.row
-    p = interpolate(triangles.vertices, i, hit.u, hit.v)
+    p = _between(vertices_of(triangles, i), hit.u, hit.v)
     n = normal(triangles, i)
     ns = shading_normal(triangles.normals, i, hit.u, hit.v, n)
     material, light = in_column(triangles.material, i), in_column(triangles.light, i)
@@ -175,7 +203,7 @@ def sample(triangles: Triangles, i: int, area: float, p: Vec3, u0: float, u1: fl
     """A point uniform over the area, as a light for `p` (Turk 1990: the square root warp)."""
     root = math.sqrt(u0)
     u, v = root * (1.0 - u1), root * u1
-    q = interpolate(triangles.vertices, i, u, v)
+    q = _between(vertices_of(triangles, i), u, v)
     n = normal(triangles, i)
     density = solid_angle_pdf(p, q, n, area, lift_of(triangles, i, p))
     return LightPoint(q, n, error_at(triangles, i, q), density, u, v)
@@ -206,8 +234,8 @@ def _interpolated_uv(uvs: FloatArray | None, hit: Hit) -> tuple[float, float]:
 def tangents(triangles: Triangles, ray: Ray, hit: Hit) -> Tangents:
     """Any tangents if the triangle has no area in texture coordinates."""
     i = hit.row
-    v0 = triple(triangles.vertices, i, 0)
-    a, b = triple(triangles.vertices, i, 1) - v0, triple(triangles.vertices, i, 2) - v0
+    v0, v1, v2 = vertices_of(triangles, i)
+    a, b = v1 - v0, v2 - v0
     return _tangents_of_uv(triangles.uvs, i, a, b, normal(triangles, i))
 
 
@@ -253,6 +281,7 @@ def face_of(triangles: Triangles, hit: Hit) -> int:
 
 
 __all__ = [
+    "RAGGED",
     "Triangle",
     "Triangles",
     "align",

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from reference_rt.core.arrays import FloatArray
+from reference_rt.core.arrays import FloatArray, IdArray
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import component
 from reference_rt.jit.kernel import kernel
@@ -73,9 +73,10 @@ class Projection(NamedTuple):
 
 
 @kernel
-def project(vertices: FloatArray, i: int, shear: Shear) -> Projection:
-    """The triangle in row i of `vertices` (n, 9), in ray space."""
-    return _project(vertices.reshape(-1), 9 * i, 1, shear)
+def project(points: FloatArray, corners: IdArray, i: int, shear: Shear) -> Projection:
+    """The triangle whose vertices are the points (m, 3) in the rows corners[i], in ray space."""
+    a, b, c = int(corners[i, 0]), int(corners[i, 1]), int(corners[i, 2])
+    return _project(points.reshape(-1), 3 * a, 3 * b, 3 * c, 1, shear)
 
 
 @kernel
@@ -93,29 +94,30 @@ def load_projection(
             seen[5 * VECTOR_WIDTH + lane],
         )
         return Projection(side, e0, e1, e2, depths[0], depths[1], depths[2])
-    return _project(corners, 9 * first + lane, size, shear)
+    a = 9 * first + lane
+    return _project(corners, a, a + 3 * size, a + 6 * size, size, shear)
 
 
 @kernel
-def _project(v: FloatArray, start: int, stride: int, shear: Shear) -> Projection:
-    """The triangle whose nine coordinates are v[start], v[start + stride], ... (Woop, Benthin &
-    Wald 2013).
+def _project(v: FloatArray, a: int, b: int, c: int, stride: int, shear: Shear) -> Projection:
+    """The triangle whose vertices have the coordinates v[a], v[a + stride] and v[a + 2 stride], and
+    so on from b and from c (Woop, Benthin & Wald 2013).
 
     The projection of a vertex does not depend on the triangle, and the edge functions of two
     neighbours differ only in sign.  Products round monotonically: a difference that is not 0 has
     the right sign.  Where it is 0, `exact_edge_function` decides: a ray through a shared edge or
     vertex meets exactly those of the triangles around it that it would meet a hair beside it.
     """
-    x, y, z = start + stride * shear.x, start + stride * shear.y, start + stride * shear.z
-    a_z = v[z] - shear.o_z
-    b_z = v[z + 3 * stride] - shear.o_z
-    c_z = v[z + 6 * stride] - shear.o_z
-    a_x = v[x] - shear.o_x - shear.s_x * a_z
-    b_x = v[x + 3 * stride] - shear.o_x - shear.s_x * b_z
-    c_x = v[x + 6 * stride] - shear.o_x - shear.s_x * c_z
-    a_y = v[y] - shear.o_y - shear.s_y * a_z
-    b_y = v[y + 3 * stride] - shear.o_y - shear.s_y * b_z
-    c_y = v[y + 6 * stride] - shear.o_y - shear.s_y * c_z
+    x, y, z = stride * shear.x, stride * shear.y, stride * shear.z
+    a_z = v[a + z] - shear.o_z
+    b_z = v[b + z] - shear.o_z
+    c_z = v[c + z] - shear.o_z
+    a_x = v[a + x] - shear.o_x - shear.s_x * a_z
+    b_x = v[b + x] - shear.o_x - shear.s_x * b_z
+    c_x = v[c + x] - shear.o_x - shear.s_x * c_z
+    a_y = v[a + y] - shear.o_y - shear.s_y * a_z
+    b_y = v[b + y] - shear.o_y - shear.s_y * b_z
+    c_y = v[c + y] - shear.o_y - shear.s_y * c_z
     left0, right0 = c_x * b_y, c_y * b_x
     left1, right1 = a_x * c_y, a_y * c_x
     left2, right2 = b_x * a_y, b_y * a_x

@@ -14,6 +14,7 @@ from comparisons.experiments.stability.harness import meshes
 from comparisons.experiments.stability.harness.core import OURS, Draw, U
 from comparisons.experiments.stability.slivers.judge import DISTANCES, RING, Judge, Question
 from comparisons.experiments.stability.watertight import crossings
+from comparisons.geometry.exact import columns_of
 
 # Cases have triangles without area on purpose: what a mesh leaves out is no news here.
 pytestmark = pytest.mark.filterwarnings("ignore::reference_rt.util.errors.SceneWarning")
@@ -135,7 +136,7 @@ def test_moved_rays_are_the_band_away():
 def test_distances_of_other_shapes(kind):
     """From a unit shape: a point 0.25 beside it, one 0.25 off it, one on it."""
     shape = {"rectangles": rt.Rectangle(), "disks": rt.Disk(), "boxes": rt.Box()}[kind]
-    row = getattr(rt.build_tables(rt.Scene(shapes=(shape,))).geometry.shapes, kind)._asdict()
+    row = columns_of(getattr(rt.build_tables(rt.Scene(shapes=(shape,))).geometry.shapes, kind))
     top = 1.0 if kind == "boxes" else 0.0
     p = np.array([[1.25, 0.0, 0.0], [0.5, 0.0, top + 0.25], [1.0, 0.0, top]], np.longdouble)
     assert DISTANCES[kind](row, p).tolist() == [0.25, 0.25, 0.0]

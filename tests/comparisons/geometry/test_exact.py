@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from comparisons.geometry.exact import all_hits, first_hit
+from comparisons.geometry.exact import all_hits, columns_of, first_hit
 from comparisons.geometry.exact.dyadic import NEVER, Dyadic, dot, nearest, quotient, roots, tied
 from comparisons.geometry.sizes import LeafSizes, ShapeSizes
 from reference_rt.rendering.scene import Scene
@@ -20,7 +20,7 @@ def leaf(shape: str) -> LeafSizes:
 
 def first(shape: str, o: object, d: object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     found = leaf(shape)
-    hit = first_hit(found.field, found.table._asdict(), o, d)
+    hit = first_hit(found.field, columns_of(found.table), o, d)
     return hit.t, hit.code, hit.touching
 
 
@@ -186,7 +186,7 @@ def test_crossings_alternate_and_do_not_depend_on_where_a_ray_begins(shape: str,
     """Of a solid a line enters as often as it leaves, in turns; a ray that begins further along
     finds the same crossings, exactly that much earlier."""
     found = leaf(shape)
-    row = found.table._asdict()
+    row = columns_of(found.table)
     rng = np.random.default_rng(3)
     # Floats of few bits, so that o + 2 d is exact.
     o = rng.integers(-(2**20), 2**20, (rays, 3)) * 2.0**-19
@@ -211,7 +211,7 @@ def test_crossings_alternate_and_do_not_depend_on_where_a_ray_begins(shape: str,
 def test_scales_do_not_matter(shape: str) -> None:
     """A power of two of everything leaves t as it is, and of the direction alone divides it."""
     found = leaf(shape)
-    row = dict(found.table._asdict())
+    row = dict(columns_of(found.table))
     rng = np.random.default_rng(4)
     o = rng.uniform(-2.0, 2.0, (100, 3))
     d = rng.uniform(-1.0, 1.0, (100, 3)) - o

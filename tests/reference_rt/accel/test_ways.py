@@ -10,9 +10,10 @@ from builders import SCENES as FILES
 from builders import cube, icosphere, random_shape, unit_vectors
 
 import reference_rt as rt
+from reference_rt.accel.array_query import rows_width
 from reference_rt.accel.block_query import any_hits, closest_hits, hit_of
 from reference_rt.accel.geometry import closest_hit, occluded
-from reference_rt.accel.packet import PACKET_SIZE, SPAN_FLOATS, packet_of
+from reference_rt.accel.packet import PACKET_SIZE, SPAN_FLOATS, TILE, packet_of
 from reference_rt.accel.packet_traversal import enter_packet
 from reference_rt.accel.single_ray import enter, slab_ray_of
 from reference_rt.core import transform
@@ -160,7 +161,7 @@ def cones(rng, count, aims, width, apart=0.0):
 def _go_together(bvh, o, d, together):
     span = local_floats(SPAN_FLOATS)
     for i in range(len(together)):
-        together[i] = packet_of(bvh, o, d, i * PACKET_SIZE, span).is_coherent
+        together[i] = packet_of(bvh, o, d, i * PACKET_SIZE, TILE, span).is_coherent
 
 
 def share_together(scene, o, d):
@@ -256,6 +257,31 @@ def test_coherent_rays(of):
     # What ends at the point itself as well; others pass by outlines.
     ends = rng.choice([math.inf, 1.0], len(o))
     assert same_by_every_way(scene, o, d, ends, TREES).hit.mean() > 0.9
+
+
+@entry_kernel
+def _width(o, d):
+    return rows_width(o, d)
+
+
+def test_pictures_are_traced_in_tiles():
+    """Rays in the order of pixels, beginning within a row, and more of them than whole tiles."""
+    scene = rt.Scene(shapes=(mesh(icosphere(3)),), hierarchy="sah")
+    y, x = np.meshgrid(np.linspace(-1, 1, 100), np.linspace(-1, 1, 72), indexing="ij")
+    flat = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
+    behind = np.broadcast_to([0.0, 0.0, -4.0], flat.shape)
+    for o, d in ((behind, flat - behind), (flat + behind, -behind)):
+        o, d = np.ascontiguousarray(o)[30:-5], np.ascontiguousarray(d)[30:-5]
+        assert _width(o, d) == 72
+        assert _width(o[:400], d[:400]) == TILE  # too few rows for it to pay
+        assert 0.5 < same_by_every_way(scene, o, d, methods=["sah"]).hit.mean() < 0.9
+    o, d = (
+        unit_vectors(np.random.default_rng(4), 10_000),
+        unit_vectors(np.random.default_rng(3), 10_000),
+    )
+    assert _width(o, d) == TILE
+    odd = flat.reshape(100, 72, 3)[:, :70].reshape(-1, 3)
+    assert _width(odd + behind[0], odd - odd[0]) == TILE
 
 
 @pytest.mark.parametrize("axis", range(3))
@@ -371,7 +397,7 @@ def test_brute_force_of_specialised_kernels(name):
 def _entered(bvh, o, d, together, for_all, for_each, distances):
     """The children of each node that a packet enters, and those that its rays enter."""
     span, own = local_floats(SPAN_FLOATS), local_floats(VECTOR_WIDTH)
-    packet = packet_of(bvh, o, d, 0, span)
+    packet = packet_of(bvh, o, d, 0, TILE, span)
     together[0] = packet.is_coherent
     for node in range(len(for_all)):
         for_all[node] = enter_packet(bvh, node, packet, math.inf, own)

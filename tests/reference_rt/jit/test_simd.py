@@ -61,7 +61,9 @@ def _met(corners, size, origins, directions, maybe, met, seen_now, seen_again):
         shear = shear_of(Ray(row(origins, i), row(directions, i), math.inf))
         maybe[i] = watertight.project_leaf(corners, 0, size, shear, seen)
         for lane in range(size):
-            alone = watertight._project(corners, lane, size, shear)
+            alone = watertight._project(
+                corners, lane, lane + 3 * size, lane + 6 * size, size, shear
+            )
             if alone.side != 0:
                 met[i] |= 1 << lane
             if maybe[i] >> lane & 1 != 0:

@@ -16,7 +16,7 @@ from comparisons.experiments.stability.leaving.shapes import (
     Subject,
     scene_of,
 )
-from comparisons.geometry.exact import all_hits, first_of
+from comparisons.geometry.exact import all_hits, columns_of, first_of
 from comparisons.geometry.exact.dyadic import NEVER, BoolArray, nearest
 from comparisons.geometry.exact.referee import Referee
 from comparisons.geometry.sizes import ShapeSizes
@@ -58,7 +58,7 @@ def exact_of(placed: Placed, subject: Subject) -> Exact:
 def row_of(subject: Subject) -> dict[str, Any]:
     """The columns of a subject's row; a polygon's outline, and what is the same for all triangles,
     is one of all."""
-    columns = subject.table._asdict().items()
+    columns = columns_of(subject.table).items()
     return {
         name: column if name == "outline" or len(column) == 1 else column[[subject.row]]
         for name, column in columns

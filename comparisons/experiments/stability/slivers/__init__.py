@@ -51,6 +51,7 @@ from comparisons.experiments.stability.slivers.judge import (
     needle,
     thin_triangle,
 )
+from comparisons.geometry.exact import columns_of
 from comparisons.geometry.exact.dyadic import BoolArray
 from reference_rt import textbook
 from reference_rt.rendering import query
@@ -107,7 +108,7 @@ def answers(trial: Trial, mitsuba: bool) -> tuple[Question, dict[str, FloatArray
         shapes=(trial.shape,), hierarchy="sah" if trial.kind == "triangles" else "auto"
     )
     tables = rt.build_tables(scene)
-    row = getattr(tables.geometry.shapes, trial.kind)._asdict()
+    row = columns_of(getattr(tables.geometry.shapes, trial.kind))
     found = {OURS: query.first_hits(tables, trial.o, trial.d).t}
     if mitsuba:
         found[MITSUBA] = traced(scene, trial.o, trial.d).t
