@@ -46,7 +46,7 @@ def compare(
     spp: Annotated[
         int | None,
         typer.Option(
-            help="Samples per pixel of each replicate. (default: half of the scene's; "
+            help="Samples per pixel of each replicate. (default: a quarter of the scene's; "
             "with --replicates or --fixed all)"
         ),
     ] = None,
@@ -59,7 +59,7 @@ def compare(
         typer.Option(
             min=2,
             help="Independent pictures by each renderer (path tracing) at the first look. "
-            "(default: 10; with --spp 8, with --fixed 16)",
+            "(default: 12; with --spp 8, with --fixed 16)",
         ),
     ] = None,
     time_limit: TimeLimit = None,
@@ -96,7 +96,8 @@ def compare(
         budget = Budget(replicates=PARTED, parts=PARTS, seconds=time_limit or SECONDS)
     else:
         budget = Budget(replicates=replicates or FIRST, seconds=time_limit or SECONDS)
-    plan = plan_of_files(scenes, changes, budget.model_copy(update={"witness": witness}))
+    budget = budget.model_copy(update={"reference_sampler": "multijitter", "witness": witness})
+    plan = plan_of_files(scenes, changes, budget)
     given = {
         "replicates": replicates,
         "time-limit": time_limit,

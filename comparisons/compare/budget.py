@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from comparisons.renderers import WitnessName
+from comparisons.renderers import ReferenceSampler, WitnessName
 from reference_rt.core.model import Description
 
 PixelSize = tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]]
@@ -20,8 +20,13 @@ class Budget(Description):
     spp: Annotated[int, Field(ge=1)] | None = None
     """Samples per pixel of each replicate; None: the scene's own, or a part of them."""
     reference_spp: Annotated[int, Field(ge=1)] | None = None
-    """Samples per pixel of Mitsuba's replicates; None: as many as ours.  Its samples are cheaper
-    and, being independent, noisier: with more of them the difference has the least noise."""
+    """Samples per pixel of Mitsuba's replicates; None: as many as ours.  Independent ones are
+    cheaper and noisier than ours: with more of them the difference has the least noise."""
+    reference_sampler: ReferenceSampler = "independent"
+    """How Mitsuba draws the samples of a pixel.  `multijitter` stratifies them: on the Cornell box
+    16 have the noise of 64 independent ones.  Pixels and replicates stay independent of each other,
+    which is what the statistics need.  Suites keep `independent`, for which their budgets were
+    measured."""
     parts: Annotated[int, Field(ge=1)] = 1
     """Without `spp`: each replicate has this part of the scene's own samples, at least LEAST."""
     size: Annotated[PixelSize, Field(strict=False)] | None = None

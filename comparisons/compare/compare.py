@@ -252,9 +252,9 @@ def _gather(
     if subject.reference is not None:
         _, _, theirs = with_float32_vertices(budgeted(subject.reference, budget))
     judged_by = theirs()
-    own = _own_file(judged_by)
+    own = _own_file(judged_by, budget)
     try:
-        counterpart = load(judged_by)
+        counterpart = load(judged_by, sampler=budget.reference_sampler)
     except UntranslatableError as error:
         rung = RungResult("geometry", "not-comparable", str(error))
         if own is None:
@@ -329,12 +329,12 @@ _OWN_FILE = (
 )
 
 
-def _own_file(scene: Scene) -> Any:
+def _own_file(scene: Scene, budget: Budget) -> Any:
     """Mitsuba's scene of the user's own file; None for other scenes, and where nothing is drawn at
     random."""
     if file_of(scene) is None or scene.integrator.deterministic:
         return None
-    return own_scene(scene)
+    return own_scene(scene, budget.reference_sampler)
 
 
 def _left_out(scene: Scene, tables: SceneTables) -> tuple[str, ...]:
@@ -412,17 +412,22 @@ def _pictures(
     first, numbers = budget.replicates, 3 * scene.film.width * scene.film.height
     most = looks.most_kept(first, numbers)
     of_both = pictures.Replicates(
-        scene, tables, counterpart, budget.reference_spp, threads, first if decided else most
+        scene, tables, counterpart, budget, threads, first if decided else most
     )
     if budget.seconds is None or decided:
         of_both.grow(first)
         say(f"{first} + {first} pictures ({time.perf_counter() - start:.1f} s)")
         return of_both.rendered(), None
 
+    rendered: Rendered | None = None
+
     def look(level: float) -> RungResult:
+        nonlocal rendered
         rendered = of_both.rendered()
         if level == looks.level_of(1):
-            return picture_rungs(rendered, budget.limit, level)[-1]
+            checked, *_, last = picture_rungs(rendered, budget.limit, level)
+            rendered = replace(rendered, checked=checked)
+            return last
         # The input is checked again at the end: each check has its own chance of a false alarm.
         assert rendered.replicates is not None
         return statistics.compare(*rendered.replicates, limit=budget.limit, level=level)
@@ -435,4 +440,5 @@ def _pictures(
         step=lambda count: looks.group_of(count, most),
         say=lambda line: say(f"{line} ({time.perf_counter() - start:.1f} s)"),
     )
-    return of_both.rendered(), found
+    assert rendered is not None
+    return rendered, found

@@ -39,12 +39,14 @@ explains it; renders pictures."""
 @dataclass(frozen=True)
 class Rendered:
     """images: the two pictures;  seconds: wall clock by side and step;  replicates: for noisy
-    pictures, the replicates (replicates, height, width, 3) of each side whose means they are."""
+    pictures, the replicates (replicates, height, width, 3) of each side whose means they are;
+    checked: the rung `input` of these, if a look has it already."""
 
     images: Images
     seconds: dict[str, dict[str, float]] = field(default_factory=dict)
     replicates: tuple[FloatArray, FloatArray] | None = None
     notes: tuple[str, ...] = ()
+    checked: RungResult | None = None
 
 
 def of_replicates(
@@ -151,7 +153,7 @@ def picture_rungs(
             checked,
             RungResult("statistics", "not-applicable", "deterministic: there is no noise"),
         ]
-    checked = input_rung(*rendered.replicates)
+    checked = rendered.checked or input_rung(*rendered.replicates)
     if checked.status == "invalid":
         return [checked, *despite(*rendered.replicates, limit)]
     if looks is not None:

@@ -29,12 +29,13 @@ FIRST = 8
 """Replicates of a side at the first look: the least that gives the rank test of blocks
 (`statistics.ranks`) enough contrasts."""
 
-PARTS, PARTED = 2, 10
+PARTS, PARTED = 4, 12
 """Unless it is told otherwise, `compare` divides a scene's samples into so many parts, and takes so
 many replicates of one part each at the first look.  More degrees of freedom make Student's
-quantiles smaller: of the Cornell box 8 replicates of 64 samples take 12.7 s and would show a bias
-of 0.36 % of the image, 7.2 % of half of the tiles and 154 % of half of the pixels; 10 of 32 samples
-take 8.4 s and show 0.37 %, 7.0 % and 143 %; 20 of 16 take 9.2 s and show 0.43 %, 7 % and 89 %."""
+quantiles smaller.  Of the Cornell box 10 replicates of 32 samples, Mitsuba's independent, take 16
+CPU seconds and would show a bias of 0.37 % of the image, 5.7 % of half of the tiles and 102 % of
+half of the pixels.  With Mitsuba's `multijitter` 12 of 16 samples take 10 and show 0.33 %, 5.5 %
+and 94 %."""
 
 SECONDS = 600.0
 """Default time limit: replicates are not added beyond it."""

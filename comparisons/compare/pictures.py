@@ -4,6 +4,7 @@ import time
 
 import numpy as np
 
+from comparisons.compare.budget import Budget
 from comparisons.compare.judge import Rendered, of_replicates
 from comparisons.compare.looks import Pool, mean_picture
 from comparisons.geometry.sizes import ShapeSizes
@@ -119,15 +120,16 @@ class Replicates:
         scene: Scene,
         tables: SceneTables,
         counterpart: Counterpart,
-        reference_spp: int | None,
+        budget: Budget,
         threads: int | None,
         most: int,
     ) -> None:
-        """reference_spp: samples per pixel of Mitsuba's, None: as many as ours;  threads: ours;
-        most: see `comparisons.compare.looks.Pool`."""
+        """budget: has Mitsuba's samples and their sampler, which `counterpart` has, too;  threads:
+        ours;  most: see `comparisons.compare.looks.Pool`."""
         self._scene, self._tables, self._counterpart = scene, tables, counterpart
         self._threads, self._sampler = threads, scene.resolved_sampler
-        self._reference_spp = reference_spp or self._sampler.spp
+        self._reference_spp = budget.reference_spp or self._sampler.spp
+        self._reference_sampler = budget.reference_sampler
         self._sides = Pool(most, mean_picture), Pool(most, mean_picture)
         self._times: list[dict[str, float]] = []
         self._mitsuba_times: list[float] = []
@@ -150,6 +152,7 @@ class Replicates:
                 min(_BATCH, count - begun),
                 self._reference_spp,
                 first + begun - made,
+                self._reference_sampler,
             )
             for other in found.pictures:
                 theirs.add(other)

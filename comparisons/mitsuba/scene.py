@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.renderers import Replicates
+from comparisons.renderers import ReferenceSampler, Replicates
 from reference_rt.core.arrays import FloatArray, IntArray
 
 _SHAPE = "shape_"
@@ -149,21 +149,37 @@ def _decoded(mi_scene: Any, ids: Mapping[str, int], numbers: npt.NDArray[Any]) -
     return np.asarray(ours[numbers])
 
 
-def render(mi_scene: Any, replicates: int, spp: int, seed: int = 0) -> Replicates:
-    """Pictures with the seeds seed, seed + 1, ...
+SPREAD = 0x9E3779B1
+"""2^32 over the golden ratio: the multiples of it, modulo 2^32, are as far apart as so many numbers
+can be.  The permutation of samples that `multijitter` gives to a pixel depends on the seed plus the
+pixel's number times the samples per pixel.  So a replicate whose seed is larger by these samples
+has the permutations of its neighbour, moved by a pixel: their correlation is 0.4."""
+
+
+def render(
+    mi_scene: Any,
+    replicates: int,
+    spp: int,
+    seed: int = 0,
+    sampler: ReferenceSampler = "independent",
+) -> Replicates:
+    """Pictures with the seeds seed, seed + 1, ..., those of `multijitter` times SPREAD;  sampler:
+    the scene's.
 
     A small picture is rendered first and discarded: it compiles the kernels, which the measured
     time must not include.
     """
-    mi = mitsuba()
-    if not mi.variant().startswith("scalar"):
+    scalar = mitsuba().variant().startswith("scalar")
+    # Scalar variants multiply seeds by the number of pixels themselves.
+    factor = SPREAD if sampler == "multijitter" and not scalar else 1
+    if not scalar:
         # Dr.Jit divides by powers of two in another way, and then compiles another kernel.
         warm_up_spp = 1 if spp & (spp - 1) == 0 else 3
-        picture(mi_scene, warm_up_spp, seed + replicates)
+        picture(mi_scene, warm_up_spp, factor * (seed + replicates))
     pictures, seconds = [], []
     for k in range(replicates):
         start = time.perf_counter()
-        pictures.append(picture(mi_scene, spp, seed + k))
+        pictures.append(picture(mi_scene, spp, factor * (seed + k)))
         seconds.append(time.perf_counter() - start)
     return Replicates(np.stack(pictures), np.array(seconds), spp)
 

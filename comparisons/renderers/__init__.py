@@ -63,6 +63,9 @@ class Renderer(Protocol):
 PLACES = {"mitsuba": "comparisons.mitsuba.native", "cycles": "comparisons.cycles.backend"}
 """The modules of the other renderers, by name.  Imported when one is needed."""
 
+ReferenceSampler = Literal["independent", "multijitter"]
+"""Mitsuba's samplers of a comparison, see `comparisons.compare.budget`."""
+
 WitnessName = Literal["cycles"]
 """Those that are no party to a comparison, and may be asked who is right."""
 

@@ -21,6 +21,7 @@ from comparisons.mitsuba.translate.lights import (
     in_place_of,
 )
 from comparisons.mitsuba.translate.textures import TranslationContext, UntranslatableError
+from comparisons.renderers import ReferenceSampler
 from reference_rt.materials import (
     Blend,
     Bump,
@@ -187,9 +188,9 @@ def file_of(scene: Scene) -> Path | None:
     return path if path is not None and path.suffix.lower() == ".xml" else None
 
 
-def own_scene(scene: Scene) -> Any:
+def own_scene(scene: Scene, sampler: ReferenceSampler = "independent") -> Any:
     """Mitsuba's scene of the file that `scene` was read from, for pictures of the size that `scene`
-    has, with a box filter and independent samples.
+    has, with a box filter and this sampler.
 
     Raises SceneError, UntranslatableError for a size that the film's window cannot have,
     ReferenceUnavailableError for a file that Mitsuba does not load.
@@ -207,8 +208,8 @@ def own_scene(scene: Scene) -> Any:
         state.nodes[film].props[name] = value
     box = _child(mi, state, film, mi.ObjectType.ReconstructionFilter, "box")
     state.nodes[box].props = mi.Properties("box")
-    sampler = _child(mi, state, sensor, mi.ObjectType.Sampler, "independent")
-    state.nodes[sampler].props = mi.Properties("independent")
+    drawn = _child(mi, state, sensor, mi.ObjectType.Sampler, sampler)
+    state.nodes[drawn].props = mi.Properties(sampler)
     _child(mi, state, 0, mi.ObjectType.Integrator, "path")
     _without_moments(mi, state)
     if counts_lights_often(scene):

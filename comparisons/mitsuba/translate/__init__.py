@@ -46,7 +46,9 @@ from comparisons.mitsuba.translate.moved import frame_of, moved
 from comparisons.mitsuba.translate.shapes import Site, translate_shape
 from comparisons.mitsuba.translate.shapes.meshes import MOST_INSTANCES
 from comparisons.mitsuba.translate.textures import TranslationContext, UntranslatableError
+from comparisons.renderers import ReferenceSampler
 from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import Grid
 
 # Without this Embree drops rays that hit a shared edge (Mitsuba issue 1149).
 ROBUST = {"embree_use_robust_intersections": True}
@@ -71,13 +73,18 @@ def to_mitsuba(scene: Scene, native: bool = False) -> dict[str, Any]:
     return {**_groups(found.mi_shapes), **found.plain}
 
 
-def load(scene: Scene, frame: Frame | None = None) -> Counterpart:
+def load(
+    scene: Scene, frame: Frame | None = None, sampler: ReferenceSampler = "independent"
+) -> Counterpart:
     """The scene's counterpart in Mitsuba, its shapes not merged, in the coordinates that suit
-    float32 best, or in `frame`.  Raises as `to_mitsuba` does."""
+    float32 best, or in `frame`;  sampler: of samples that are not a grid.  Raises as `to_mitsuba`
+    does."""
     frame = frame_of(scene) if frame is None else frame
     found = _translated(moved(scene, frame))
     instanced_group = _instanced_group(found)
     plain = {**_groups(found.mi_shapes), **found.plain}
+    if not isinstance(scene.resolved_sampler, Grid):
+        plain["sensor"]["sampler"]["type"] = sampler
     solids = tuple(found.solids)
     ours = in_place_of(scene, bool(solids))
     if ours is not None:

@@ -61,7 +61,6 @@ def translate_sampler(sampler: Any) -> dict[str, Any]:
     """A sampler's dict.  Raises UntranslatableError."""
     match sampler:
         case Sobol(spp=spp) | Independent(spp=spp):
-            # For both: the statistics of a comparison need independent samples.
             return {"type": "independent", "sample_count": spp}
         case Grid(spp=spp):
             return {"type": "stratified", "jitter": False, "sample_count": spp}

@@ -4,7 +4,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -15,7 +15,9 @@ import comparisons.compare.compare
 import comparisons.mitsuba.translate
 from comparisons.compare.budget import Budget
 from comparisons.compare.pictures import layers
-from comparisons.mitsuba.translate import UntranslatableError
+from comparisons.mitsuba import scene as mitsuba_scene
+from comparisons.mitsuba.translate import UntranslatableError, load
+from comparisons.renderers import ReferenceSampler
 from comparisons.results.case import Case, exit_code
 from reference_rt.cli.main import app
 from reference_rt.rendering.scene import Scene
@@ -153,3 +155,28 @@ def test_without_mitsuba_exit_code_4(tmp_path: Path) -> None:
     assert run.returncode == 4, run.stderr
     assert "pip install" in run.stderr
     assert "Traceback" not in run.stderr
+
+
+def test_stratified_pictures_of_mitsuba_are_independent_and_unbiased():
+    """The permutations of `multijitter` are seeded by the seed plus the pixel's number times the
+    samples per pixel: with successive seeds a picture would be that of so many seeds before, moved
+    by a pixel, with a correlation of 0.4."""
+    spp, count = 16, 48
+    film = {"width": 24, "height": 24}
+    box = Scene.load(SCENES / "cornell_box.yaml")
+    scene = box.changed(film=box.film.model_copy(update=film))
+    drawn = {}
+    for sampler in get_args(ReferenceSampler):
+        counterpart = load(scene, sampler=sampler)
+        pictures = mitsuba_scene.render(counterpart.mi_scene, count, spp, 0, sampler).pictures
+        assert sampler in str(counterpart.mi_scene.sensors()[0].sampler()).lower()
+        drawn[sampler] = pictures
+    a, b = drawn["independent"], drawn["multijitter"]
+    noise = [x.mean(axis=(1, 2)).std(axis=0, ddof=1) / np.sqrt(count) for x in (a, b)]
+    assert (np.abs(a.mean(axis=(0, 1, 2)) - b.mean(axis=(0, 1, 2))) < 5.0 * np.hypot(*noise)).all()
+    assert b.var(axis=0).mean() < 0.5 * a.var(axis=0).mean()
+    deviation = (b - b.mean(axis=0)).mean(axis=-1)
+    z = deviation / deviation.std(axis=0)
+    moved = z[spp:, :, :-1] * z[:-spp, :, 1:]
+    # The mean of as many products of independent numbers.
+    assert abs(moved.mean()) < 5.0 / np.sqrt(moved.size)
