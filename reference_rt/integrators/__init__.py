@@ -41,24 +41,18 @@ def setup_of(integrator: Whitted | Direct | Path, has_numbers: bool) -> Any:
     return integrator.setup()
 
 
-_of_one = ByClass("radiance")
-_of_one.register(DirectSetup, direct.radiance)
-_of_one.register(WhittedSetup, whitted.radiance)
-_radiance = _of_one.function
-
-
 @kernel
 def _one_by_one(
     setup: Any, scene: SceneTables, samplers: Samplers, n: int, scratch: Scratch
 ) -> None:
     for j in range(n):
         ray, sampler = ray_of(scratch.rays, j), sampler_of(samplers, j)
-        put_vector(scratch.totals, 0, j, _radiance(setup, scene, ray, sampler))
+        put_vector(scratch.totals, 0, j, whitted.radiance(setup, scene, ray, sampler))
 
 
 _radiances = ByClass("radiances")
 _radiances.register(PathSetup, path.radiances)
-_radiances.register(DirectSetup, _one_by_one)
+_radiances.register(DirectSetup, direct.radiances)
 _radiances.register(WhittedSetup, _one_by_one)
 radiances = _radiances.function
 """radiances(setup, scene, samplers, n, scratch): estimates of the radiance along the first n of

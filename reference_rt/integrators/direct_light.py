@@ -5,7 +5,7 @@ from typing import NamedTuple
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt.accel.block_query import closest_hits, hit_of
-from reference_rt.accel.geometry import closest_hit, occluded
+from reference_rt.accel.geometry import occluded
 from reference_rt.core.ray import Hit, HitBlock, Ray, RayBlock, put_ray, ray_from, ray_of
 from reference_rt.core.vec3 import Vec3, is_black, to_local
 from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
@@ -35,17 +35,9 @@ def onward(scene: SceneTables, ray: Ray, hit: Hit) -> Onward:
 
 
 @kernel
-def behind_lamps(scene: SceneTables, ray: Ray) -> Ray:
-    """The rest of a ray behind the area lights that it meets before any other surface."""
-    going = Onward(True, ray)
-    while going.is_lamp:
-        going = onward(scene, going.ray, closest_hit(scene.geometry, going.ray))
-    return going.ray
-
-
-@kernel
 def pass_lamps(scene: SceneTables, rays: RayBlock, hits: HitBlock, n: int) -> None:
-    """The same for the first n rays of a block."""
+    """Replace the first n rays of a block by the rest of each behind the area lights that it meets
+    before any other surface."""
     is_going = True
     while is_going:
         closest_hits(scene.geometry, rays, hits, n)
@@ -110,10 +102,9 @@ def fixed_lights(
     shading: Shading,
     u0: float,
     u1: float,
-    shadows: bool,
 ) -> Vec3:
     """Direct light without random numbers: of every point, spot and directional light, and of the
-    point (u0, u1) of every area light.  shadows: whether surfaces block it."""
+    point (u0, u1) of every area light."""
     total = Vec3(0.0, 0.0, 0.0)
     if choice is None:
         return total
@@ -121,10 +112,7 @@ def fixed_lights(
     for k in range(len(choice.kind)):
         if choice.kind[k] != ENVIRONMENT and choice.probability[k] > 0.0:
             light = any_light.sample_fixed(scene.lights, k, shapes, scene.textures, p, u0, u1)
-            if shadows:
-                sample = direct_from(scene, shading, light)
-            else:
-                sample = unshadowed(scene, shading, light)
+            sample = direct_from(scene, shading, light)
             if sample.light.pdf > 0.0:
                 total = total + sample.contribution * (1.0 / sample.light.pdf)
     return total

@@ -8,19 +8,19 @@ where y is what the ray from x along w_i hits first.  A path estimates the integ
 direction at each surface.  Its throughput is the product of f |cos| / pdf along the way.  Each edge
 of the path takes three steps:
 
-1. `_environment_emission` or `_hit_emission`: throughput times L_e of what the ray has hit.
-2. `_next_event_estimation`: throughput f |cos| L_e / pdf of one sampled point on a light, if its
+1. `environment_emission` or `hit_emission`: throughput times L_e of what the ray has hit.
+2. `next_event_estimation`: throughput f |cos| L_e / pdf of one sampled point on a light, if its
    shadow ray is not occluded.
-3. `_scatter`: the BSDF samples the next direction; Russian roulette may end the path.
+3. `scatter`: the BSDF samples the next direction; Russian roulette may end the path.
 
-Step 2 and the next edge's step 1 estimate the same direct light.  `_mis_weight` weights them so
+Step 2 and the next edge's step 1 estimate the same direct light.  `mis_weights` weight them so
 that it is counted once (multiple importance sampling, Veach 1997).
 
 `_edge` takes these steps.  `radiances` does so for a block of paths, edge by edge, so that the rays
 of all paths are traced together.
 """
 
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import Field
 
@@ -53,8 +53,8 @@ from reference_rt.integrators.direct_light import (
 )
 from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
 from reference_rt.integrators.shading import shade_point
-from reference_rt.jit.kernel import kernel
-from reference_rt.lights import shadow_ray
+from reference_rt.jit.kernel import ByClass, kernel
+from reference_rt.lights import LightSample, Pick, shadow_ray
 from reference_rt.materials import Shading
 from reference_rt.sampling import Sample, Samplers, draw_pair, sampler_of
 
@@ -150,8 +150,8 @@ is infinite from albedo² = cap on.  Mitsuba's cap of 0.95 reaches that at an al
 mean does not depend on the cap.
 """
 
-_LIGHT_SAMPLING, _BSDF_SAMPLING, _BOTH = range(3)
-_STRATEGIES = {"lights": _LIGHT_SAMPLING, "bsdf": _BSDF_SAMPLING}
+LIGHT_SAMPLING, BSDF_SAMPLING, _BOTH = range(3)
+_STRATEGIES = {"lights": LIGHT_SAMPLING, "bsdf": BSDF_SAMPLING}
 
 
 class Path(Description):
@@ -186,7 +186,7 @@ class Path(Description):
 
 
 class PathSetup(NamedTuple):
-    """strategy: the only sampling strategy for direct light, `_LIGHT_SAMPLING` or `_BSDF_SAMPLING`;
+    """strategy: the only sampling strategy for direct light, `LIGHT_SAMPLING` or `BSDF_SAMPLING`;
     None for both with multiple importance sampling, which compiles to no branch;  `_BOTH` for both
     in kernels that do not depend on it;  hides_lamps: see `Path.hide_emitters`."""
 
@@ -242,7 +242,7 @@ def _edge(
     if hit.kind < 0:
         if depth == 0 and path.hides_lamps:
             return Edge(nothing, unlit, ended)
-        return Edge(_environment_emission(path, scene, state, ray), unlit, ended)
+        return Edge(environment_emission(path, scene, state, ray), unlit, ended)
     point = surface(scene, ray, hit)
     is_last, emits = depth + 1 >= path.max_depth, any_light.is_area(scene.lights, point)
     if is_last and not emits:
@@ -250,11 +250,11 @@ def _edge(
     shading = shade_point(scene, ray, hit, point, kept)
     emitted = nothing
     if emits:
-        emitted = _hit_emission(path, scene, state, ray, shading)
+        emitted = hit_emission(path, scene, state, ray, shading)
     if is_last:
         return Edge(emitted, unlit, ended)
-    connection = _next_event_estimation(path, scene, state, shading, sampler, depth)
-    return Edge(emitted, connection, _scatter(path, scene, state, shading, sampler, depth))
+    connection = next_event_estimation(path, scene, state, shading, sampler, depth)
+    return Edge(emitted, connection, scatter(path, scene, state, shading, sampler, depth))
 
 
 @kernel
@@ -293,45 +293,45 @@ def radiances(
                 put_ray(rays, alive, edge.step.ray)
                 put_state(scene, scratch, alive, k, edge.step.state)
                 alive += 1
-        any_hits(scene.geometry, shadows, hits, lit)
-        for j in range(lit):
-            if hits.codes[j] < 0:
-                add_vector(scratch.totals, 0, scratch.lit[j], vector_of(scratch.lights, 0, j))
+        add_unoccluded(scene, scratch, lit)
         n = alive
 
 
 @kernel
-def _environment_emission(path: PathSetup, scene: SceneTables, state: State, ray: Ray) -> Vec3:
+def add_unoccluded(scene: SceneTables, scratch: Scratch, n: int) -> None:
+    """Add the lights of the first n shadow rays that are not occluded."""
+    any_hits(scene.geometry, scratch.shadows, scratch.hits, n)
+    for j in range(n):
+        if scratch.hits.codes[j] < 0:
+            add_vector(scratch.totals, 0, scratch.lit[j], vector_of(scratch.lights, 0, j))
+
+
+@kernel
+def environment_emission(setup: Any, scene: SceneTables, state: State, ray: Ray) -> Vec3:
     """Emission of the environment along a ray that hits nothing: throughput L_e, MIS-weighted."""
     lights, weight = scene.lights, 1.0
     emitted: Vec3 = any_light.background(lights, ray.d)
     if state.bsdf_pdf > 0.0:
         light_pdf = any_light.environment_pdf(lights, state.previous, state.normal, emitted)
-        weight = _mis_weight(path.strategy, _BSDF_SAMPLING, state.bsdf_pdf, light_pdf)
+        weight = _mis_weight(setup, BSDF_SAMPLING, state.bsdf_pdf, light_pdf)
     return state.throughput * emitted * weight
 
 
 @kernel
-def _hit_emission(
-    path: PathSetup, scene: SceneTables, state: State, ray: Ray, shading: Shading
-) -> Vec3:
+def hit_emission(setup: Any, scene: SceneTables, state: State, ray: Ray, shading: Shading) -> Vec3:
     """Emission of the area light that the ray has hit: throughput L_e, MIS-weighted."""
     lights, point, weight = scene.lights, shading.point, 1.0
     if state.bsdf_pdf > 0.0:
         shapes = shapes_of(scene)
         light_pdf = any_light.area_pdf(lights, shapes, state.previous, state.normal, point)
-        weight = _mis_weight(path.strategy, _BSDF_SAMPLING, state.bsdf_pdf, light_pdf)
+        weight = _mis_weight(setup, BSDF_SAMPLING, state.bsdf_pdf, light_pdf)
     return state.throughput * any_light.emitted(lights, point, shading.at, -ray.d) * weight
 
 
 @kernel
-def _mis_weight(only: int | None, strategy: int, pdf: float, other: float) -> float:
-    """The weight of a sample that `strategy` drew with density `pdf`, and the other strategy would
-    draw with density `other`.
-
-    With the single strategy `only`, samples of the other count nothing, except where the single
-    one cannot draw them (other = 0).
-    """
+def _weight_of(only: int | None, strategy: int, pdf: float, other: float) -> float:
+    """With the single strategy `only`, samples of the other count nothing, except where the single
+    one cannot draw them (other = 0)."""
     if only is None:
         return power_heuristic(pdf, other)
     if only == _BOTH:
@@ -340,8 +340,21 @@ def _mis_weight(only: int | None, strategy: int, pdf: float, other: float) -> fl
 
 
 @kernel
-def _next_event_estimation(
-    path: PathSetup, scene: SceneTables, state: State, shading: Shading, sampler: Sample, depth: int
+def _weight_of_path(path: PathSetup, strategy: int, pdf: float, other: float) -> float:
+    return _weight_of(path.strategy, strategy, pdf, other)
+
+
+mis_weights = ByClass("mis_weight")
+"""By the class of an integrator's setup: mis_weight(setup, strategy, pdf, other) is the weight of a
+sample that `strategy` drew with density `pdf`, and the other strategy would draw with density
+`other`."""
+mis_weights.register(PathSetup, _weight_of_path)
+_mis_weight = mis_weights.function
+
+
+@kernel
+def next_event_estimation(
+    setup: Any, scene: SceneTables, state: State, shading: Shading, sampler: Sample, depth: int
 ) -> LightConnection:
     """Direct light of one randomly selected light: throughput f |cos| L_e / pdf, MIS-weighted
     against BSDF sampling.  Random numbers that decide nothing are not drawn."""
@@ -359,20 +372,33 @@ def _next_event_estimation(
     u0, u1 = draw_pair(sampler, dimension + sampling.LIGHT_POINT)
     shapes, textures = shapes_of(scene), scene.textures
     light = any_light.sample_one(scene.lights, picked.light, shapes, textures, point.p, u0, u1)
-    sample = unshadowed(scene, shading, light)
-    if is_black(sample.contribution):
-        return nothing
-    pdf = light.pdf * picked.probability
-    weight = 1.0
-    if not light.is_delta:
-        weight = _mis_weight(path.strategy, _LIGHT_SAMPLING, pdf, sample.bsdf_pdf)
-    arriving = sample.contribution * (weight / pdf)
-    return LightConnection(state.throughput * arriving, shadow_ray(point, light))
+    return connect(setup, scene, state, shading, light, picked)
 
 
 @kernel
-def _scatter(
-    path: PathSetup, scene: SceneTables, state: State, shading: Shading, sampler: Sample, depth: int
+def connect(
+    setup: Any,
+    scene: SceneTables,
+    state: State,
+    shading: Shading,
+    light: LightSample,
+    picked: Pick,
+) -> LightConnection:
+    """What a sample of the light that was picked adds, if nothing is between."""
+    sample = unshadowed(scene, shading, light)
+    if is_black(sample.contribution):
+        return LightConnection(sample.contribution, Ray(shading.point.p, shading.point.n, 0.0))
+    pdf = light.pdf * picked.probability
+    weight = 1.0
+    if not light.is_delta:
+        weight = _mis_weight(setup, LIGHT_SAMPLING, pdf, sample.bsdf_pdf)
+    arriving = sample.contribution * (weight / pdf)
+    return LightConnection(state.throughput * arriving, shadow_ray(shading.point, light))
+
+
+@kernel
+def scatter(
+    setup: Any, scene: SceneTables, state: State, shading: Shading, sampler: Sample, depth: int
 ) -> Step:
     """Sample the BSDF at the surface that edge number `depth` has hit; apply Russian roulette."""
     point, dimension = shading.point, sampling.PER_BOUNCE * depth
@@ -386,7 +412,7 @@ def _scatter(
         return ended
     throughput = state.throughput * scattered.weight
     eta = state.eta * scattered.eta
-    if depth + 1 >= path.rr_depth:
+    if depth + 1 >= setup.rr_depth:
         # Radiance changes by 1 / eta² on entering a medium.  eta² undoes that: survival depends on
         # the power that is left.
         survival = min(max_component(throughput) * eta * eta, ROULETTE_CAP)

@@ -94,7 +94,7 @@ def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: Sampl
         total = total + weight * ambient
         if any_material.is_smooth(scene.materials, point.material):
             u0, u1 = whitted.u0, whitted.u1
-            light = fixed_lights(scene, scene.lights.choice, shading, u0, u1, True)
+            light = fixed_lights(scene, scene.lights.choice, shading, u0, u1)
             total = total + weight * light
         if depth == whitted.max_depth:
             continue

@@ -192,14 +192,14 @@ class Linked:
 
 
 class Specialised:
-    """The specialised kernels of some jobs.  The kernel that traces the rays of path tracing is
-    called through a function pointer (`Geometry.tracer`), so that scenes share it."""
+    """The specialised kernels of some jobs.  The kernel that traces the rays of blocks is called
+    through a function pointer (`Geometry.tracer`), so that scenes share it."""
 
     def __init__(
         self, jobs: Sequence[Job], tables: SceneTables, view: Any, film_filter: Any
     ) -> None:
-        is_path = any(job.integrator == "path" for job in jobs)
-        self._tracer = tracer_of(tables.geometry) if is_path else None
+        has_blocks = any(job.integrator in ("path", "direct") for job in jobs)
+        self._tracer = tracer_of(tables.geometry) if has_blocks else None
         if self._tracer is not None:
             geometry = tables.geometry._replace(tracer=np.zeros(1, np.intp))
             tables = tables._replace(geometry=geometry)

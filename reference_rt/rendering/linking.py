@@ -98,7 +98,7 @@ def linked_textures(linker: Linker, textures: Textures | None) -> Link:
 
 def _shapes(linker: Linker, tables: SceneTables, integrator: str) -> Link:
     geometry = tables.geometry
-    blocks = integrator == "path"
+    blocks = integrator in ("path", "direct")
     wanted = {"surface"}
     if integrator == "cost":
         wanted = {"primitive_count", "intersect", "owner", "face"}
@@ -139,8 +139,9 @@ def _geometry(
     is_textured: bool,
     is_oriented: bool,
 ) -> Link:
-    wanted = {"closest_hits", "any_hits"} if integrator == "path" else {"closest_hit"}
-    if integrator in ("direct", "whitted"):
+    blocks = integrator in ("path", "direct")
+    wanted = {"closest_hits", "any_hits"} if blocks else {"closest_hit"}
+    if integrator == "whitted":
         wanted |= {"occluded"}
     if integrator == "cost":
         wanted = {"traversal_cost"}

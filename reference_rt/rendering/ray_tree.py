@@ -36,8 +36,8 @@ import numpy as np
 
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
+from reference_rt.accel import block_query
 from reference_rt.accel import geometry as geometries
-from reference_rt.accel.block_query import any_hits
 from reference_rt.accel.bvh import CENTER, CHILDREN, child_of, size_of
 from reference_rt.accel.leaf import nearer_primitive, nearest_of_triangle_leaf
 from reference_rt.accel.single_ray import enter
@@ -49,6 +49,7 @@ from reference_rt.integrators import (
     direct_light,
     path,
     ray_cast,
+    scene_tables,
     shading,
     whitted,
 )
@@ -159,7 +160,8 @@ def _watch(run: Callable[[], object], handlers: Mapping[Any, Callable[[_Return],
         sys.setprofile(None)
 
 
-_WHITTED, _DIRECT = _code(whitted.radiance), _code(direct.radiance)
+_WHITTED, _DIRECT = _code(whitted.radiance), _code(direct.radiances)
+_OF_SCATTERED = _code(direct._trace)
 _WHOLE = Vec3(1.0, 1.0, 1.0)
 
 
@@ -175,16 +177,20 @@ class _Recorder:
         """By places of Whitted's stack: parent and kind of a ray."""
         self._last: dict[str, _Return] = {}
         """What was returned for the ray that comes next."""
+        self._lights: list[_Return] = []
+        """What was returned for the shadow rays that come next."""
 
     def run(self, kernel: Callable[[], object]) -> None:
         keep = {
             name: functools.partial(self._last.__setitem__, name)
-            for name in ("occluded", "share", "emission", "light", "scatter")
+            for name in ("occluded", "share", "emission", "scatter")
         }
         handlers: dict[Any, Callable[[_Return], Any]] = {
             tiles._camera_film_ray: self._film_ray,
             shading.shade: self._shade,
             geometries.closest_hit: self._closest_hit,
+            block_query._hit_in_geometry: self._hit_of_block,
+            scene_tables.surface: self._point,
             geometries.occluded: keep["occluded"],
             any_light.background: self._emission,
             any_light.emitted: self._emission,
@@ -193,14 +199,12 @@ class _Recorder:
             direct_light.direct_from: self._direct_from,
             whitted._push: self._push,
             direct_light.fixed_lights: self._fixed_lights,
-            direct._light_sample: self._light_sample,
-            direct._bsdf_sample: self._bsdf_sample,
-            path._environment_emission: keep["emission"],
-            path._hit_emission: keep["emission"],
-            path._next_event_estimation: keep["light"],
-            path._scatter: keep["scatter"],
+            path.environment_emission: self._weighted_emission,
+            path.hit_emission: self._weighted_emission,
+            path.connect: self._light_sample,
+            path.scatter: keep["scatter"],
             path._edge: self._edge,
-            any_hits: self._any_hits,
+            block_query.any_hits: self._any_hits,
             ray_cast.cast: self._cast,
         }
         _watch(kernel, handlers)
@@ -225,6 +229,10 @@ class _Recorder:
         if r.caller in (_WHITTED, _DIRECT):
             self.rays[-1]["point"] = r.result.point
 
+    def _point(self, r: _Return) -> None:
+        if r.caller is _OF_SCATTERED:
+            self.rays[-1]["point"] = r.result
+
     # ---- Whitted and direct illumination --------------------------------------------------------
 
     def _push(self, r: _Return) -> None:
@@ -237,10 +245,13 @@ class _Recorder:
         if r.caller is _WHITTED:
             parent, kind = self._waiting[r.outer["top"]]
             self._ray(kind, parent, ray, r.outer["weight"], found=r.result)
-        elif r.caller is _DIRECT:
-            self._ray(CAMERA, None, ray, _WHOLE, found=r.result)
-        elif r.caller is _code(direct._bsdf_sample):
-            self._ray(SCATTERED, 0, ray, r.outer["scattered"].weight, found=r.result)
+
+    def _hit_of_block(self, r: _Return) -> None:
+        if r.caller is _DIRECT:
+            self._ray(CAMERA, None, r.own["ray"], _WHOLE, found=r.result)
+        elif r.caller is _OF_SCATTERED:
+            weight = r.outer["state"].throughput
+            self._ray(SCATTERED, 0, r.own["ray"], weight, found=r.result)
 
     def _emission(self, r: _Return) -> None:
         if r.caller in (_WHITTED, _DIRECT):
@@ -258,25 +269,34 @@ class _Recorder:
 
     def _fixed_lights(self, r: _Return) -> None:
         assert self._surface is not None
-        weight = r.outer.get("weight", _WHOLE)  # Whitted's; `direct` on a grid has none
-        _add(self.rays[self._surface], "direct light", weight * r.result)
+        _add(self.rays[self._surface], "direct light", r.outer["weight"] * r.result)
+
+    # ---- path tracing, and direct illumination by samples ---------------------------------------
 
     def _light_sample(self, r: _Return) -> None:
-        if "sample" in r.own and "selection" not in (numbers := self.rays[-1]["numbers"]):
-            sample = r.own["sample"]
-            numbers |= _of_light(r.own, sample.light, sample)
-            _add(self.rays[-1], "direct light", r.result)
-
-    def _bsdf_sample(self, r: _Return) -> None:
-        if "hit" not in r.own:
+        if is_black(r.result.light):
             return
-        self._surface = 0
-        record, scattered = self.rays[-1], r.own["scattered"]
-        pdf = 0.0 if scattered.is_delta else scattered.pdf
-        record["point"], record["numbers"] = r.own.get("there"), _of_emission(r.own, pdf)
-        _add(record, "emitted" if r.own["hit"].kind >= 0 else "background", r.result)
+        if getattr(r.own["setup"], "shadows", True):
+            self._lights.append(r)
+        else:
+            self.rays[-1]["numbers"] |= _of_light(r.own)
+            _add(self.rays[-1], "direct light", r.result.light)
 
-    # ---- path tracing, ray casting --------------------------------------------------------------
+    def _any_hits(self, r: _Return) -> None:
+        for k, light in enumerate(self._lights):
+            record = self._shadow(light.result.shadow, bool(r.own["hits"].codes[k] >= 0))
+            record["numbers"] = _of_light(light.own)
+            if not record["occluded"]:
+                _add(record, "direct light", light.result.light)
+        self._lights.clear()
+
+    def _weighted_emission(self, r: _Return) -> None:
+        if r.caller is not _OF_SCATTERED:
+            self._last["emission"] = r
+            return
+        record = self.rays[-1]
+        record["numbers"] = _of_emission(r.own)
+        _add(record, "emitted" if record["found"].kind >= 0 else "background", r.result)
 
     def _edge(self, r: _Return) -> None:
         own, state = r.own, r.own["state"]
@@ -285,21 +305,11 @@ class _Recorder:
         if own["hit"].kind >= 0:
             record["point"] = own["point"]
         if (emission := self._last.pop("emission", None)) is not None:
-            record["numbers"] |= _of_emission(emission.own, state.bsdf_pdf)
+            record["numbers"] |= _of_emission(emission.own)
         if (scatter := self._last.pop("scatter", None)) is not None:
             record["numbers"]["sampled pdf"] = scatter.own["scattered"].pdf
             record["numbers"] |= {k: scatter.own[k] for k in ("survival",) if k in scatter.own}
         _add(record, "emitted" if own["hit"].kind >= 0 else "background", r.result.emitted)
-        self._last["edge"] = r
-
-    def _any_hits(self, r: _Return) -> None:
-        if r.own["n"] > 0:
-            connection = self._last.pop("edge").result.connection
-            record = self._shadow(connection.shadow, bool(r.own["hits"].codes[0] >= 0))
-            own = self._last.pop("light").own
-            record["numbers"] = _of_light(own, own["light"], own["sample"])
-            if not record["occluded"]:
-                _add(record, "direct light", connection.light)
 
     def _cast(self, r: _Return) -> None:
         record = self._ray(CAMERA, None, r.own["ray"], _WHOLE, found=r.own["hit"])
@@ -312,17 +322,19 @@ def _add(record: RayRecord, what: str, value: Vec3) -> None:
         record["adds"].append((what, value))
 
 
-def _of_light(own: dict[str, Any], light: Any, sample: Any) -> dict[str, float]:
+def _of_light(own: dict[str, Any]) -> dict[str, float]:
+    light, picked = own["light"], own["picked"]
     return {
-        "light": own["picked"].light,
-        "selection": own["picked"].probability,
+        "light": picked.light,
+        "selection": picked.probability,
         "light pdf": light.pdf,
-        "bsdf pdf": 0.0 if light.is_delta else sample.bsdf_pdf,
-        "MIS weight": own.get("weight", 1.0),
+        "bsdf pdf": 0.0 if light.is_delta else own["sample"].bsdf_pdf,
+        "MIS weight": own["weight"],
     }
 
 
-def _of_emission(own: dict[str, Any], bsdf_pdf: float) -> dict[str, float]:
+def _of_emission(own: dict[str, Any]) -> dict[str, float]:
+    bsdf_pdf = own["state"].bsdf_pdf
     pdfs = {"bsdf pdf": bsdf_pdf, "light pdf": own["light_pdf"]} if bsdf_pdf > 0.0 else {}
     return pdfs | {"MIS weight": own["weight"]}
 

@@ -165,7 +165,7 @@ METAL, SKY = "material_rough_conductor", "environment"
 FAULTS = (
     SourceFault(
         "direct light counted twice", BOX, "integrators/path.py",
-        "        weight = _mis_weight(path.strategy, _BSDF_SAMPLING, state.bsdf_pdf, light_pdf)\n"
+        "        weight = _mis_weight(setup, BSDF_SAMPLING, state.bsdf_pdf, light_pdf)\n"
         "    return state.throughput * any_light.emitted",
         "    return state.throughput * any_light.emitted",
     ),

@@ -286,7 +286,8 @@ def direct_light(
     choice = scene.lights.choice
     if choice is None or choice.probability[light] == 0.0:
         raise ValueError(f"light {light} cannot be sampled; expected one that can be picked")
-    out, found = np.zeros((len(o), 7)), link_to_scene(scene, "direct")
+    # As Whitted's integrator, it traces rays one by one.
+    out, found = np.zeros((len(o), 7)), link_to_scene(scene, "whitted")
     with np.errstate(all="ignore"):
         direct_kernel(found.tables, o, d, light, u[0], u[1], out)
     return DirectLight(target=out[:, 0:3], pdf=out[:, 3], contribution=out[:, 4:7])

@@ -2,6 +2,7 @@
 roundings."""
 
 import math
+import threading
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from PIL import Image
 import reference_rt as rt
 from reference_rt.core import transform
 from reference_rt.core.exr import write_exr
+from reference_rt.rendering.executor import Prepared
+from reference_rt.rendering.units import Unit
 
 GREY = 0.25
 """A reflectance that float32 files, and products with 1, hold exactly."""
@@ -126,3 +129,29 @@ def test_nine_lights_in_one_place():
     expected = 9 * np.array([9, 18, 36]) * 0.5 / math.pi * (2 / 3) / 9
     # The view is 1e-9 wide around the origin.
     assert np.allclose(rt.render(scene).colour, expected, rtol=1e-8)
+
+
+@pytest.mark.parametrize(("n", "m"), [(2, 1), (3, 70), (70, 3)])
+def test_rays_that_wait_change_no_bits(scene, n, m):
+    """`direct` traces rays of many samples together, in blocks of 64: the picture is that of one
+    sample at a time."""
+    film = rt.Film(width=8, height=6)
+    scene = scene.changed(film=film, integrator=rt.Direct(light_samples=n, bsdf_samples=m))
+    together, prepared = rt.render(scene).colour, Prepared(scene, threads=1)
+    colour = np.zeros((48, 3))
+    with prepared.running:
+        for pixel in range(48):
+            for k in range(4):
+                unit, sums = Unit(pixel, pixel + 1, k, k + 1), {"colour": colour[pixel : pixel + 1]}
+                prepared.compute(unit, sums, 64, threading.Event())
+    assert together.any()
+    assert np.array_equal(together.reshape(48, 3), colour / 4)
+
+
+def test_direct_light_is_that_of_paths_of_two_edges(scene, monkeypatch):
+    """With one sample of each kind, to the last bit: `direct` may be rendered as such paths."""
+    scene = scene.changed(integrator=rt.Direct())
+    as_paths = rt.render(scene).colour
+    monkeypatch.setattr(rt.Direct, "as_path", lambda direct: None)
+    assert as_paths.any()
+    assert np.array_equal(rt.render(scene).colour, as_paths)

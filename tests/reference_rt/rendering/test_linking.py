@@ -45,9 +45,7 @@ KERNELS = dict.fromkeys(INTEGRATORS.values(), tiles.render_tile) | {
 
 NEVER = {
     # Blocks of rays without a hierarchy are traced together: `nearest_of_block`.
-    **{name: {"nearest_of_type"} for name in ("path", "closest_hits", "any_hits")},
-    # A light with an extent is refused where nothing is random, and others have no such kernel.
-    "direct": {"_sample_fixed", "sample_fixed"},
+    **{name: {"nearest_of_type"} for name in ("path", "direct", "closest_hits", "any_hits")},
 }
 """Operations that are in the code of an integrator or a query, and that no scene makes it call."""
 
