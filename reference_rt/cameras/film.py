@@ -193,7 +193,7 @@ def _tabulated(filter_of: TabulatedFilter) -> tuple[Tabulated, float]:
     Cells are 1/64 pixel, or 1/32 of a Gaussian's s, wide; four Gauss points integrate a function
     that is smooth inside a cell to below rounding, and so does a polynomial of degree 5 through its
     values at Chebyshev's nodes: to 1e-14 of the filter's maximum.  (Measured: weights
-    from the exponential function took a fifth of the time of a picture.)
+    from the exponential function took a tenth of the time of a picture.)
 
     Cells are as probable as the integral of the profile's absolute value, but for one factor for
     all where it is negative, which come first: together their share is a power of two.  Of n Sobol'
