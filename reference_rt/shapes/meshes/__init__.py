@@ -10,6 +10,6 @@ ray.  A ray through a shared edge or vertex meets exactly those of the triangles
 would meet a hair beside it.  A mesh's triangles are rows with one `owner` (the shape id) and their
 number in the file as `face`; triangles without area are left out when the scene is built.
 
-To add a property of vertices: a column, None if no triangle has any, in `Triangles`, `soup`,
-`facing` and `align`, and an array in `MeshData`.
+To add a property of vertices: a column, None if no triangle has any, in `Triangles`,
+`table_of`, `facing` and `align`, and an array in `MeshData`.
 """
