@@ -22,7 +22,7 @@ neither knows the other.  `by_code.py` shows the caller's side.
 import functools
 import struct
 import typing
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple, TypeVar
@@ -364,10 +364,15 @@ class Linker:
         self._kept: list[Any] = []
 
     def link(
-        self, operations: Mapping[str, Operation], wanted: Iterable[str], tables: Mapping[int, Any]
+        self,
+        operations: Mapping[str, Operation],
+        wanted: Iterable[str],
+        tables: Mapping[int, Any],
+        only: Mapping[str, Collection[int]] | None = None,
     ) -> Link:
-        """A link to tables, by code, with the operations `wanted` of a group's `operations`.  Calls
-        of its other operations stop the process."""
+        """A link to tables, by code, with the operations `wanted` of a group's `operations`;  only:
+        the codes of those tables that need an operation, where not all do.  Calls of other
+        operations stop the process."""
         found = [operations[name] for name in wanted]
         codes = [code for operation in operations.values() for code in operation.rows]
         words = np.zeros(STRIDE * (max([*tables, *codes]) + 1), np.int64)
@@ -380,7 +385,7 @@ class Linker:
             words[STRIDE * code] = content.ctypes.data
             of_table = numba.typeof(table)  # once: it takes up to 1 ms
             for operation in found:
-                if code in operation.rows:
+                if code in operation.rows and code in (only or {}).get(operation.name, tables):
                     call = operation.call_for(code, of_table)
                     place = words, STRIDE * code + operation.number
                     self.calls.setdefault(call, []).append(place)

@@ -13,6 +13,7 @@ from reference_rt.integrators.scene_tables import LinkedScene, SceneTables
 from reference_rt.jit.links import Link, Linker
 from reference_rt.lights import Lights, LightSampler, LinkedLights
 from reference_rt.lights import tables as light_tables
+from reference_rt.lights.emitters.area import Areas
 from reference_rt.lights.selection.choice import light_trees
 from reference_rt.materials import Materials
 from reference_rt.materials.bsdfs import tables as bsdfs
@@ -76,9 +77,10 @@ def linked_scene(linker: Linker, tables: SceneTables, integrator: str) -> Linked
     """A scene behind links.  integrator: `path`, `direct`, `whitted`, `first_hits`, `ray_cast`
     or `cost`: whose kernel takes it."""
     geometry, materials, lights = tables.geometry, tables.materials, tables.lights
-    is_textured, is_oriented = tables.textures is not None, materials.oriented is not None
-    textures = linked_textures(linker, tables.textures)
-    shapes = _shapes(linker, tables, integrator)
+    is_textured = tables.textures is not None and integrator != "cost"
+    is_oriented = materials.oriented is not None and integrator in ("path", "direct", "whitted")
+    textures = linked_textures(linker, tables.textures if is_textured else None, is_oriented)
+    shapes = _shapes(linker, tables, integrator, is_textured, is_oriented)
     return LinkedScene(
         geometry=_geometry(linker, geometry, shapes, integrator, is_textured, is_oriented),
         shapes=shapes,
@@ -89,14 +91,18 @@ def linked_scene(linker: Linker, tables: SceneTables, integrator: str) -> Linked
     )
 
 
-def linked_textures(linker: Linker, textures: Textures | None) -> Link:
-    """Textures behind a link; None has a link to nothing."""
+def linked_textures(linker: Linker, textures: Textures | None, is_oriented: bool) -> Link:
+    """Textures behind a link; None has a link to nothing.  is_oriented: whether materials are,
+    which alone take gradients."""
     if textures is None:
         return Link(0)
-    return linker.link(textures_operations, textures_operations, {0: textures})
+    wanted = {"evaluate", "gradient"} if is_oriented else {"evaluate"}
+    return linker.link(textures_operations, wanted, {0: textures})
 
 
-def _shapes(linker: Linker, tables: SceneTables, integrator: str) -> Link:
+def _shapes(
+    linker: Linker, tables: SceneTables, integrator: str, is_textured: bool, is_oriented: bool
+) -> Link:
     geometry = tables.geometry
     blocks = integrator in ("path", "direct")
     wanted = {"surface"}
@@ -110,25 +116,30 @@ def _shapes(linker: Linker, tables: SceneTables, integrator: str) -> Link:
         wanted |= {"owner"}
     if geometry.solids is not None:
         wanted |= {"spans", "enters", "intersect", "surface"}
-    if tables.textures is not None or integrator == "ray_cast":
+    if is_textured or integrator == "ray_cast":
         wanted |= {"uv", "colour"}
     if integrator == "ray_cast":
         wanted |= {"owner", "face"}
-    if tables.materials.oriented is not None:
+    if is_oriented:
         wanted |= {"tangents"}
     if tables.lights.areas is not None:
         others = {"whitted": {"sample_fixed", "sample"}}
         others |= {name: set() for name in ("ray_cast", "first_hits", "cost")}
         wanted |= others.get(integrator, {"sample", "pdf"})
-    return linked_shapes(linker, geometry.shapes, wanted)
+    return linked_shapes(linker, geometry.shapes, wanted, tables.lights.areas)
 
 
-def linked_shapes(linker: Linker, shapes: Shapes, wanted: Iterable[str]) -> Link:
-    """Shapes behind a link, with the operations `wanted`."""
+def linked_shapes(
+    linker: Linker, shapes: Shapes, wanted: Iterable[str], areas: Areas | None = None
+) -> Link:
+    """Shapes behind a link, with the operations `wanted`.  areas: the area lights, whose types of
+    shape alone are sampled."""
     found = {
         code: table for code, field, _, _ in SHAPES if (table := getattr(shapes, field)) is not None
     }
-    return linker.link(shape_tables.by_code.operations, wanted, found)
+    kinds: set[int] = set() if areas is None else set(areas.kind.tolist())
+    only = dict.fromkeys(("sample", "sample_fixed", "pdf"), kinds)
+    return linker.link(shape_tables.by_code.operations, wanted, found, only)
 
 
 def _geometry(
@@ -143,11 +154,11 @@ def _geometry(
     wanted = {"closest_hits", "any_hits"} if blocks else {"closest_hit"}
     if integrator == "whitted":
         wanted |= {"occluded"}
-    if integrator == "cost":
-        wanted = {"traversal_cost"}
     if integrator == "ray_cast":
         wanted |= {"owner", "coordinates"}
-    if geometry.parts is not None or geometry.instances is not None:
+    if integrator == "cost":
+        wanted = {"traversal_cost"}
+    elif geometry.parts is not None or geometry.instances is not None:
         wanted |= {"surface"}
     if is_textured:
         wanted |= {"coordinates"}
@@ -253,7 +264,7 @@ def linked_lights(linker: Linker, lights: Lights, integrator: str) -> LinkedLigh
     tree = Link(0)
     if lights.tree is None:
         choice = choice._replace(bounded=np.zeros(1))
-    else:
+    elif integrator in ("path", "direct"):  # the others pick no light
         tree = linker.link(light_trees.operations, light_trees.operations, {0: lights.tree})
     ambient = np.zeros((1, 3)) if lights.ambient is None else lights.ambient
     return LinkedLights(emitters, choice, tree, ambient)

@@ -141,7 +141,8 @@ class Bsdf(metaclass=Brief):
 
         def link(linker: Linker) -> Any:
             of_materials = linked_materials(linker, materials, "path", textures is not None)
-            return of_materials, linked_textures(linker, textures)
+            is_oriented = materials.oriented is not None
+            return of_materials, linked_textures(linker, textures, is_oriented)
 
         return linked(self._tables, "bsdf", link, (materials, textures))
 

@@ -199,8 +199,8 @@ def _linked_lights(scene: SceneTables) -> Linked:
         wanted = {"sample", "pdf", "uv", "colour"} if lights.areas is not None else set()
         return (
             linked_lights(linker, lights, "path"),
-            linked_shapes(linker, shapes, wanted),
-            linked_textures(linker, textures),
+            linked_shapes(linker, shapes, wanted, lights.areas),
+            linked_textures(linker, textures, is_oriented=False),
         )
 
     return linked(scene, "lights", link, (lights, shapes, textures))

@@ -18,7 +18,7 @@ from reference_rt.accel.geometry import geometries
 from reference_rt.integrators import INTEGRATORS
 from reference_rt.integrators.scene_tables import LinkedScene
 from reference_rt.jit.kernel import ByClass
-from reference_rt.jit.links import Group, Link, Linkable, Operation
+from reference_rt.jit.links import Group, Link, Linkable, Linker, Operation
 from reference_rt.lights import LinkedLights
 from reference_rt.rendering import query, tiles
 from reference_rt.rendering.linking import linked_scene
@@ -108,7 +108,7 @@ class Asked:
     def __init__(self) -> None:
         self.operations: set[Operation] = set()
 
-    def link(self, operations: Any, wanted: Any, tables: Any) -> Link:
+    def link(self, operations: Any, wanted: Any, tables: Any, only: Any = None) -> Link:
         self.operations |= {operations[name] for name in wanted}
         return Link(1)
 
@@ -142,6 +142,15 @@ def test_a_scene_is_linked_to_all_that_its_integrator_calls(integrator, tables):
     needed = {one for one in called(KERNELS[integrator], integrator) if GROUP[one] in groups}
     assert len(needed) > 5
     assert names(needed - asked.operations) == NEVER.get(integrator, set())
+    assert names(asked.operations - needed) == set()  # each would be compiled
+
+
+def test_only_shapes_that_are_lights_are_sampled(tables):
+    """A sphere in the light of a rectangle."""
+    linker = Linker()
+    linked_scene(linker, tables[0], "path")
+    sampled = {kernel.__name__ for kernel, _ in linker.calls if kernel.__name__.startswith("pdf")}
+    assert sampled == {f"pdf_{tables[0].lights.areas.kind[0]}"}
 
 
 QUERIES = "".join(path.read_text("utf-8") for path in Path(query.__file__).parent.glob("*.py"))
