@@ -5,7 +5,8 @@ integral of radiance times the filter around its centre.  Each pixel draws its o
 points from the filter (Ernst et al. 2006): pixels share no samples, so that any tiling and any
 number of threads give the same bits.  Where a filter is negative, points are drawn from about its
 absolute value and have negative weights; the mean is unbiased, since samples are not divided by the
-sum of their weights.  Lengths are in pixels.
+sum of their weights.  With Sobol' points the samples of each sign are a sequence of their own, see
+`Strata`.  Lengths are in pixels.
 
 To add a filter: its description, a `TabulatedFilter` by default; `AnyFilter`; a translator function
 in `comparisons.mitsuba.translate`; a scene.
@@ -18,11 +19,13 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import BeforeValidator, Field
 
-from reference_rt.core.arrays import FloatArray, IdArray
+from reference_rt.core.arrays import FloatArray, IdArray, IntArray
 from reference_rt.core.model import Description, Positive
 from reference_rt.jit.kernel import ByClass, kernel
 from reference_rt.jit.links import Linkable
+from reference_rt.sampling.blocks import BLOCK_SAMPLES, SINGLY
 from reference_rt.sampling.distribution import guide, guided_cell_of, running_sums
+from reference_rt.sampling.independent import combine
 
 
 class Filter(Description):
@@ -169,17 +172,44 @@ class TentSetup(NamedTuple):
 _DEGREE = 5
 
 
+STRATA = 64
+"""Samples that are shared out among the strata of a filter's signs."""
+
+
+class Strata(NamedTuple):
+    """A pixel's samples by the filter's signs: positive, negative in y alone, in x alone, in both.
+
+    Each stratum has samples of its own pixel's numbers: a sequence that is stratified by itself.
+    With one sequence for all, the difference between positive and negative samples was noise of
+    everything that a path depends on, as if its numbers were independent (measured on a checkered
+    ball, 64 samples: 1.7 to 2.0 times the variance).
+
+    of (BLOCK_SAMPLES, STRATA): the strata of STRATA samples in turn, in orders that shift those of
+    each BLOCK_SAMPLES in all ways;  rank, of the same shape: how many of its stratum are before it;
+    size (4,): how many each stratum has;  weight (4,): the share of a stratum in the filter's
+    points over that.
+    """
+
+    of: IntArray
+    rank: IntArray
+    size: IntArray
+    weight: FloatArray
+
+
 class Tabulated(NamedTuple):
     """A tabulated filter.  cells (n, 9), first those where the filter is negative: the middle of a
     cell; the middle of the numbers that draw it, and the inverse of half their width; coefficients
     of the weight, a polynomial from -1 to 1 in the cell;  half: half the width of a cell;
     cumulative (n + 1,): running sums of the cells' probabilities, and guides, see
-    `distribution.guide`."""
+    `distribution.guide`;  share: of the points where it is negative, 0 if it is nowhere;  strata:
+    empty for none."""
 
     cells: FloatArray
     half: float
     cumulative: FloatArray
     guides: IdArray
+    share: float
+    strata: Strata
 
 
 MOST_NEGATIVE = 0.125
@@ -215,9 +245,11 @@ def _tabulated(filter_of: TabulatedFilter) -> tuple[Tabulated, float]:
     masses = np.abs(values) @ weights
     masses /= masses.sum()
     negative = values @ weights < 0.0
+    share, strata = 0.0, _NO_STRATA
     if negative.any():
         own = masses[negative].sum()
         share = min(2.0 ** round(math.log2(1.5 * own)), MOST_NEGATIVE)
+        strata = _strata(float(own), share)
         masses *= np.where(negative, share / own, (1.0 - share) / (1.0 - own))
     order = np.argsort(~negative, kind="stable")
     cumulative = running_sums(masses[order])
@@ -232,7 +264,32 @@ def _tabulated(filter_of: TabulatedFilter) -> tuple[Tabulated, float]:
     polynomials = polynomials[order] * (half / integral * inverse[:, None])
     middles_of_u = 0.5 * (cumulative[1:] + cumulative[:-1])
     cells = np.column_stack([middles[order], middles_of_u, inverse, polynomials])
-    return Tabulated(cells, half, cumulative, guide(cumulative[None])[0]), float(integral)
+    guides = guide(cumulative[None])[0]
+    return Tabulated(cells, half, cumulative, guides, share, strata), float(integral)
+
+
+_NOTHING = np.zeros((0, STRATA), np.int64)
+_NO_STRATA = Strata(_NOTHING, _NOTHING, np.zeros(0, np.int64), np.zeros(0))
+
+
+def _strata(mass: float, share: float) -> Strata:
+    """mass: of the filter's absolute value along an axis, the part where it is negative.  Strata
+    have about as many samples as mass, which is best for noise that is the same everywhere, and
+    are evenly spread over each BLOCK_SAMPLES samples."""
+    masses = np.outer((1.0 - mass, mass), (1.0 - mass, mass)).ravel()
+    if STRATA * masses[1] < 0.5:
+        return _NO_STRATA
+    size = np.maximum(1, np.round(STRATA * masses)).astype(np.int64)
+    size[0] = STRATA - size[1:].sum()
+    places = np.concatenate([(np.arange(n) + 0.5) / n for n in size])
+    turns = np.repeat(np.arange(4), size)[np.argsort(places, kind="stable")]
+    low = np.arange(BLOCK_SAMPLES)
+    of = turns.reshape(-1, BLOCK_SAMPLES)[:, low ^ low[:, None]].transpose(1, 0, 2)
+    of = of.reshape(BLOCK_SAMPLES, STRATA)
+    is_same = of[:, :, None] == of[:, None, :]
+    rank = np.tril(is_same, -1).sum(axis=2)
+    shares = np.outer((1.0 - share, share), (1.0 - share, share)).ravel()
+    return Strata(of, rank, size, shares * STRATA / size)
 
 
 @kernel
@@ -266,7 +323,7 @@ _offset.register(Tabulated, _tabulated_offset)
 _offset_by = _offset.function
 
 film_filters = Linkable()
-"""The operation `film_offset`, on a filter's setup or on a link to one."""
+"""The operations `film_offset` and `stratum_of`, on a filter's setup or on a link to one."""
 
 
 @film_filters.operation
@@ -275,6 +332,65 @@ def film_offset(setup: Any, u: float) -> tuple[float, float]:
     weight * g(offset) is the filter's integral of g."""
     dx, weight = _offset_by(setup, u)
     return dx, weight
+
+
+class Stratum(NamedTuple):
+    """Which numbers a sample of a pixel takes: those of sample `number` of `pixel`;  part_x,
+    part_y: (begin, length) of the part of [0, 1) in which the film numbers are;  weight: a factor
+    of the sample."""
+
+    pixel: int
+    number: int
+    part_x: tuple[float, float]
+    part_y: tuple[float, float]
+    weight: float
+
+
+@kernel
+def no_stratum(pixel: int, sample: int) -> Stratum:
+    """A sample's own numbers."""
+    return Stratum(pixel, sample, (0.0, 1.0), (0.0, 1.0), 1.0)
+
+
+@kernel
+def _whole(setup: Any, seed: int, pixel: int, sample: int) -> Stratum:
+    return no_stratum(pixel, sample)
+
+
+@kernel
+def _stratum_of_table(table: Tabulated, seed: int, pixel: int, sample: int) -> Stratum:
+    """The order in which a pixel has the strata begins anywhere, by a hash: each sample is in each
+    stratum as often as it should be, so that any number of samples is unbiased."""
+    strata = table.strata
+    if len(strata.of) == 0:
+        return no_stratum(pixel, sample)
+    turn = sample // STRATA
+    key = combine(combine(np.uint64(seed), np.uint64(pixel + 4 * SINGLY)), np.uint64(turn))
+    order = np.int64(key & np.uint64(BLOCK_SAMPLES - 1))
+    at = (sample % STRATA) ^ np.int64((key >> np.uint64(32)) & np.uint64(STRATA - BLOCK_SAMPLES))
+    k = strata.of[order, at]
+    negative, positive = (0.0, table.share), (table.share, 1.0 - table.share)
+    return Stratum(
+        pixel + k * SINGLY,
+        turn * strata.size[k] + strata.rank[order, at],
+        negative if k >= 2 else positive,
+        negative if k % 2 == 1 else positive,
+        strata.weight[k],
+    )
+
+
+_stratum = ByClass("stratum")
+_stratum.register(BoxSetup, _whole)
+_stratum.register(TentSetup, _whole)
+_stratum.register(Tabulated, _stratum_of_table)
+_stratum_by = _stratum.function
+
+
+@film_filters.operation
+def stratum_of(setup: Any, seed: int, pixel: int, sample: int) -> Stratum:
+    """Which numbers a sample with Sobol' points takes."""
+    found: Stratum = _stratum_by(setup, seed, pixel, sample)
+    return found
 
 
 LayerName = Literal[

@@ -339,6 +339,7 @@ _OPERATIONS = {
     "prepare": "weights and frames",
     "sample": "samples",
     "sample_fixed": "light of fixed points",
+    "stratum_of": "signs of filters",
     "surface": "surface points",
     "traversal_cost": "what rays cost",
     "uv": "texture coordinates",

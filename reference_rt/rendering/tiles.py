@@ -9,10 +9,12 @@ another, so that the sums have the same bits however the samples are divided amo
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from reference_rt import sampling
 from reference_rt.accel.geometry import closest_hit, traversal_cost
 from reference_rt.cameras import LENS_CENTRE, VIEWS, camera_ray, lens_sample
-from reference_rt.cameras.film import film_offset
+from reference_rt.cameras.film import Stratum, film_offset, no_stratum, stratum_of
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import (
     BLOCK,
@@ -43,6 +45,9 @@ from reference_rt.sampling import (
     sampler_of,
     start_sample,
 )
+from reference_rt.sampling.grid import GridSetup
+from reference_rt.sampling.independent import IndependentSetup
+from reference_rt.sampling.sobol import SobolSetup
 from reference_rt.textures import colour_at
 
 
@@ -63,22 +68,36 @@ class GivenRays(NamedTuple):
 
 @kernel
 def _given_ray(
-    rays: GivenRays, film_filter: None, sampler: Any, shape: tuple[int, int], x: int, y: int
+    rays: GivenRays,
+    film_filter: None,
+    stratum: Stratum,
+    sampler: Any,
+    shape: tuple[int, int],
+    x: int,
+    y: int,
 ) -> FilmRay:
     return FilmRay(Ray(row(rays.o, x), row(rays.d, x), math.inf), 1.0)
 
 
 @kernel
 def _camera_film_ray(
-    view: Any, film_filter: Any, sampler: Any, shape: tuple[int, int], x: int, y: int
+    view: Any,
+    film_filter: Any,
+    stratum: Stratum,
+    sampler: Any,
+    shape: tuple[int, int],
+    x: int,
+    y: int,
 ) -> FilmRay:
     width, height = shape
     u0, u1 = draw_pair(sampler, sampling.FILM)
+    u0 = stratum.part_x[0] + stratum.part_x[1] * u0
+    u1 = stratum.part_y[0] + stratum.part_y[1] * u1
     dx, weight_x = film_offset(film_filter, u0)
     dy, weight_y = film_offset(film_filter, u1)
     lens = _lens_of(view, sampler)
     ray = camera_ray(_view_of(view), (x + 0.5 + dx) / width, (y + 0.5 + dy) / height, lens)
-    return FilmRay(ray, weight_x * weight_y)
+    return FilmRay(ray, weight_x * weight_y * stratum.weight)
 
 
 class LinkedView(NamedTuple):
@@ -92,11 +111,17 @@ class LinkedView(NamedTuple):
 
 @kernel
 def _linked_film_ray(
-    view: LinkedView, film_filter: Link, sampler: Any, shape: tuple[int, int], x: int, y: int
+    view: LinkedView,
+    film_filter: Link,
+    stratum: Stratum,
+    sampler: Any,
+    shape: tuple[int, int],
+    x: int,
+    y: int,
 ) -> FilmRay:
     if len(view.given.o) > 0:
-        return _given_ray(view.given, None, sampler, shape, x, y)
-    return _camera_film_ray(view, film_filter, sampler, shape, x, y)
+        return _given_ray(view.given, None, stratum, sampler, shape, x, y)
+    return _camera_film_ray(view, film_filter, stratum, sampler, shape, x, y)
 
 
 @kernel
@@ -138,6 +163,56 @@ _film_rays.register(GivenRays, _given_ray)
 for _view in VIEWS:
     _film_rays.register(_view, _camera_film_ray)
 _film_ray = _film_rays.function
+
+
+@kernel
+def _given_stratum(
+    view: GivenRays, film_filter: None, seed: int, pixel: int, sample: int
+) -> Stratum:
+    return no_stratum(pixel, sample)
+
+
+@kernel
+def _camera_stratum(view: Any, film_filter: Any, seed: int, pixel: int, sample: int) -> Stratum:
+    return stratum_of(film_filter, seed, pixel, sample)
+
+
+@kernel
+def _linked_stratum(
+    view: LinkedView, film_filter: Link, seed: int, pixel: int, sample: int
+) -> Stratum:
+    if len(view.given.o) > 0:
+        return no_stratum(pixel, sample)
+    return stratum_of(film_filter, seed, pixel, sample)
+
+
+_view_strata = ByClass("stratum_of_view")
+_view_strata.register(LinkedView, _linked_stratum)
+_view_strata.register(GivenRays, _given_stratum)
+for _view in VIEWS:
+    _view_strata.register(_view, _camera_stratum)
+_stratum_of_view = _view_strata.function
+
+
+@kernel
+def _stratum_of_sobol(
+    setup: SobolSetup, view: Any, film_filter: Any, pixel: int, sample: int
+) -> Stratum:
+    found: Stratum = _stratum_of_view(view, film_filter, np.int64(setup.seed), pixel, sample)
+    return found
+
+
+@kernel
+def _stratum_of_others(setup: Any, view: Any, film_filter: Any, pixel: int, sample: int) -> Stratum:
+    return no_stratum(pixel, sample)
+
+
+_strata = ByClass("stratum_of_sample")
+_strata.register(SobolSetup, _stratum_of_sobol)
+_strata.register(IndependentSetup, _stratum_of_others)
+_strata.register(GridSetup, _stratum_of_others)
+_stratum = _strata.function
+"""_stratum(sampler_setup, view, film_filter, pixel, sample)."""
 
 
 @entry_kernel
@@ -183,16 +258,16 @@ def render_tile(
     for start in range(0, paths, BLOCK):
         n = min(BLOCK, paths - start)
         for k in range(n):
-            pixel = begin + (start + k) // count
-            samplers.pixels[k], samplers.numbers[k] = pixel, first + (start + k) % count
+            pixel, sample = begin + (start + k) // count, first + (start + k) % count
+            stratum = _stratum(sampler_setup, view, film_filter, pixel, sample)
+            samplers.pixels[k], samplers.numbers[k] = stratum.pixel, stratum.number
             y, x = pixel // shape[0], pixel % shape[0]
-            seen = _film_ray(view, film_filter, sampler_of(samplers, k), shape, x, y)
+            seen = _film_ray(view, film_filter, stratum, sampler_of(samplers, k), shape, x, y)
             put_ray(scratch.rays, k, seen.ray)
             weights[k] = seen.weight
         radiances(integrator, scene, samplers, n, scratch)
         for k in range(n):
-            pixel, sample = samplers.pixels[k], samplers.numbers[k]
-            i = pixel - begin
+            i, sample = (start + k) // count, first + (start + k) % count
             one = vector_of(scratch.totals, 0, k) * weights[k]
             total = row(out, i) + one
             _add_to_m2(m2, i, sample, one, total)
@@ -239,8 +314,9 @@ def first_hits_tile(
         i = pixel - begin
         albedo, normal, position = row(albedos, i), row(normals, i), row(positions, i)
         for sample in range(first, last):
-            sampler = start_sample(sampler_setup, pixel, sample)
-            seen = _film_ray(view, film_filter, sampler, shape, x, y)
+            stratum = _stratum(sampler_setup, view, film_filter, pixel, sample)
+            sampler = start_sample(sampler_setup, stratum.pixel, stratum.number)
+            seen = _film_ray(view, film_filter, stratum, sampler, shape, x, y)
             hit = closest_hit(scene.geometry, seen.ray)
             if hit.kind >= 0:
                 point = surface(scene, seen.ray, hit)

@@ -28,14 +28,19 @@ DIMENSIONS = 11 * GROUP
 """The dimensions whose pairs are computed in blocks, those of the first eleven bounces; later ones
 are computed singly.  Their pairs take 11 KiB, which leaves most of the L1 cache to the scene."""
 
+SINGLY = 2**40
+"""From this pixel number on all pairs are computed singly: no picture has as many pixels.  For
+samples in between those of a pixel, such as the filter's strata, whose pairs would replace those of
+the pixel's block each time."""
+
 FLOATS, INTEGERS = 2 * BLOCK_SAMPLES * DIMENSIONS, DIMENSIONS
 """The sizes of `BlockSample.pairs` and `BlockSample.made`."""
 
 
 class BlockSample(NamedTuple):
     """key: a hash of seed and pixel;  sample: its number in the pixel;  block: a unique number of
-    its block;  pairs (FLOATS,): a cache, for each dimension u0 and u1 of all lanes;  made
-    (INTEGERS,): the block whose pairs each dimension holds, -1 for none."""
+    its block, -1 for none;  pairs (FLOATS,): a cache, for each dimension u0 and u1 of all lanes;
+    made (INTEGERS,): the block whose pairs each dimension holds, -1 for none."""
 
     key: np.uint64
     sample: int
@@ -49,7 +54,7 @@ def start(
     setup: SobolSetup, pixel: int, sample: int, pairs: FloatArray, made: IntArray
 ) -> BlockSample:
     # At most 2^31 samples, 16 in each block.
-    block = pixel * 2**27 + sample // BLOCK_SAMPLES
+    block = pixel * 2**27 + sample // BLOCK_SAMPLES if pixel < SINGLY else -1
     return BlockSample(sobol.start(setup, pixel, 0).key, sample, block, pairs, made)
 
 
@@ -57,7 +62,7 @@ def start(
 def draw(sampler: BlockSample, dimension: int) -> tuple[float, float]:
     """The same numbers as `sobol.draw`."""
     sample, pairs = sampler.sample, sampler.pairs
-    if dimension >= DIMENSIONS:
+    if dimension >= DIMENSIONS or sampler.block < 0:
         seeds = seeds_of(sampler.key, dimension)
         return pair(seeds, dimension % GROUP, reverse_bits(np.uint64(sample)))
     at = 2 * BLOCK_SAMPLES * dimension

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import qmc
 
 import reference_rt as rt
-from reference_rt.cameras.film import film_offset
+from reference_rt.cameras.film import film_offset, stratum_of
 from reference_rt.core import transform
 
 EVERY = [
@@ -211,20 +211,56 @@ def test_as_many_of_sobol_points_are_negative(description):
     assert len(counts) == 1
 
 
-@pytest.mark.cases(2)
+@pytest.mark.parametrize(
+    "description", [rt.MitchellFilter(), rt.CatmullRomFilter(), rt.LanczosFilter()], ids=str
+)
+def test_strata_share_out_all_samples(description):
+    """Of 128 samples each stratum has the first numbers of its sequence, each once; its weight
+    makes up for how many they are; and every sample is in each stratum as often."""
+    setup = description.setup()
+    for pixel in (0, 7):
+        strata = {}
+        for k in range(128):
+            with np.errstate(over="ignore"):  # of hashes
+                own = stratum_of(setup, 3, pixel, k)
+            strata.setdefault((own.pixel, *own[2:]), []).append(own.number)
+        parts = parts_of(setup.share)
+        assert {(x, y) for _, x, y, _ in strata} == {(x, y) for x in parts for y in parts}
+        assert len(strata) == 4
+        for (_, x, y, weight), numbers in strata.items():
+            assert sorted(numbers) == list(range(len(numbers)))
+            assert weight * len(numbers) / 128 == pytest.approx(x[1] * y[1], rel=1e-14)
+    of, size = setup.strata.of, setup.strata.size
+    for k in range(4):
+        often = (of == k).reshape(16, 4, 16).sum(axis=(0, 1))
+        assert (often == 16 * size[k] // 16).all()
+
+
+def parts_of(share):
+    """The parts of [0, 1) in which a filter is negative, and positive."""
+    return (0.0, share), (share, 1.0 - share)
+
+
+@pytest.mark.cases(3)
+@pytest.mark.parametrize(
+    ("sampler", "rows"),
+    [(rt.Independent(spp=4096, seed=6), 32), (rt.Sobol(spp=24, seed=6), 1024)],
+    ids=["independent", "sobol"],
+)
 @pytest.mark.parametrize(
     "description",
     [EVERY[0], EVERY[1], EVERY[3], rt.MitchellFilter(), rt.CatmullRomFilter(), rt.LanczosFilter()],
     ids=str,
 )
-def test_a_step(description):
-    """The emissive half-plane x < 0.3 pixels right of the picture's middle, under each pixel."""
+def test_a_step(description, sampler, rows):
+    """The emissive half-plane x < 0.3 pixels right of the picture's middle, under each pixel.  Of
+    24 samples a pixel has a part of the strata only."""
     edge, width = 0.3, 12
     half = transform.Translate(translate=(-100 + edge * 2 / width, 0, 0))
     scene = rt.Scene(
         camera=rt.Orthographic(eye=(0, 0, 1), width=2),
-        film=rt.Film(width=width, height=32, filter=description),
-        sampler=rt.Independent(spp=4096, seed=6),
+        film=rt.Film(width=width, height=rows, filter=description),
+        sampler=sampler,
         integrator=rt.Whitted(),
         materials={"lamp": rt.Emissive(radiance=(1, 1, 1))},
         shapes=(
@@ -232,7 +268,7 @@ def test_a_step(description):
         ),
     )
     columns = rt.render(scene).colour[..., 0]
-    mean, error = columns.mean(axis=0), columns.std(axis=0, ddof=1) / math.sqrt(32)
+    mean, error = columns.mean(axis=0), columns.std(axis=0, ddof=1) / math.sqrt(rows)
     for i in range(width):
         to = edge + width / 2 - (i + 0.5)  # the edge, counted from this pixel's centre
         # 4 standard errors, and rounding.

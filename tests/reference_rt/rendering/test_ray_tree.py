@@ -45,6 +45,10 @@ CASES = {
     "lights, direct": (lights, {"integrator": rt.Direct(light_samples=2, bsdf_samples=2)}),
     "lights, whitted": (lights, WHITTED),
     "cornell box, path": (cornell_box, {}),
+    "cornell box, signs of a filter": (
+        cornell_box,
+        {"film": rt.Film(width=6, height=4, filter=rt.LanczosFilter())},
+    ),
     "cornell box, direct": (cornell_box, {"integrator": rt.Direct(hide_emitters=True)}),
 }
 
