@@ -74,7 +74,7 @@ def layers(
         pair = [np.zeros((len(o), 3)), np.zeros((len(o), 3))]
         for picture, hits, some in zip(pair, sides, values, strict=True):
             hit = hits.shape >= 0
-            picture[hit] = some[hit].reshape(hit.sum(), -1)
+            picture[hit] = some.reshape(len(o), -1)[hit]
         found[name] = pair[0].reshape(*y.shape, 3), pair[1].reshape(*y.shape, 3)
     return found
 

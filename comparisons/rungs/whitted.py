@@ -30,7 +30,7 @@ from reference_rt.materials import most_branches
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
-from reference_rt.shapes import Box
+from reference_rt.shapes import Box, Rectangle
 
 # Radiance along neighbouring rays: which differences of a ray's two values are those of edges and
 # gradients that Mitsuba does not resolve.
@@ -306,7 +306,9 @@ def plugin_radiance(
         or not isinstance(mi_shape.leaf, SAMPLED)
         or mi_shape.plugin.stand_in is not None
     ]
-    boxes = [name for name, p in counterpart.mi_shapes.items() if isinstance(p.leaf, Box)]
+    boxes = [
+        name for name, p in counterpart.mi_shapes.items() if isinstance(p.leaf, Box | Rectangle)
+    ]
     ambient = dict(
         zip(("ambient_r", "ambient_g", "ambient_b"), ambient_of(scene.lights), strict=True)
     )

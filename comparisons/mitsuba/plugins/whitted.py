@@ -107,7 +107,7 @@ def light_points(
     mi: Any, scene: Any, unlit: Collection[str] = (), boxes: Collection[str] = ()
 ) -> list[LightPoint]:
     """The points of all area lights of a scene, except shapes whose id is in `unlit`;  boxes: the
-    ids of boxes, which may be meshes: see `translate.shapes.primitives.box_of_triangles`."""
+    ids of boxes and rectangles, which may be meshes: see `translate.shapes.primitives`."""
     found: list[LightPoint] = []
     for emitter in scene.emitters():
         shape = emitter.get_shape()
@@ -134,10 +134,12 @@ def _points_of(mi: Any, shape: Any, is_box: bool) -> list[LightPoint]:
         return [_fixed(mi, shape, m[:3, 3], _FLAT[kind] * np.cross(m[:3, 0], m[:3, 1]))]
     values = mi.traverse(shape)
     vertices = np.array(values["vertex_positions"], dtype=np.float64).reshape(-1, 3)
-    if kind == "Cube" or is_box:
+    if kind == "Cube" or (is_box and len(vertices) > 4):
         return [_box_point(mi, shape, vertices, *(_CUBE if kind == "Cube" else _MESH))]
     corners = vertices[np.array(values["faces"]).reshape(-1, 3)]
     areas = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    if is_box:  # a rectangle
+        return [_fixed(mi, shape, vertices.mean(axis=0), areas.sum(axis=0))]
     # Turk's square root warp: barycentrics sqrt(1/2) / 2 of the second and the third corner.
     b = 0.5 * math.sqrt(0.5)
     points = corners[:, 0] * (1.0 - 2.0 * b) + (corners[:, 1] + corners[:, 2]) * b
@@ -254,7 +256,7 @@ def register(mi: Any) -> None:
         """Parameters: max_depth, most reflections and refractions of a ray; min_contribution, the
         throughput below which a ray is not followed; components, at least as many as any BSDF has;
         unlit, the ids, separated by spaces, of emissive shapes that do not count as lights;
-        boxes, those of boxes;
+        boxes, those of boxes and rectangles;
         ambient_r, ambient_g, ambient_b, the ambient light's radiance."""
 
         def __init__(self, properties: Any) -> None:

@@ -58,6 +58,13 @@ def test_layers_are_the_hits_of_both_sides() -> None:
         assert off.sum() <= 3, name
     lengths = np.linalg.norm(found["normal"][0], axis=-1)
     np.testing.assert_allclose(lengths, hit, atol=1e-12)
+    # Of the sky alone.
+    camera = scene.camera.model_copy(
+        update={"target": tuple(scene.camera.eye + np.array([0, 9, 1]))}
+    )
+    scene = scene.changed(camera=camera)
+    found = layers(scene, build_tables(scene), counterpart)
+    assert not any(picture.any() for pair in found.values() for picture in pair)
 
 
 @pytest.mark.slow

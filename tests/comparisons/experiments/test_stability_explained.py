@@ -13,6 +13,7 @@ from comparisons.experiments.stability.harness.core import (
     summarise,
 )
 from comparisons.experiments.stability.harness.run import Choice, mitsuba_is_there, run
+from reference_rt.util.workers import Threads
 
 # Cases have triangles without area on purpose: what a mesh leaves out is no news here.
 pytestmark = pytest.mark.filterwarnings("ignore::reference_rt.util.errors.SceneWarning")
@@ -75,7 +76,7 @@ def test_no_series_is_unexplained(tmp_path):
     """The quick run of all: ours holds, and where Mitsuba does as well, the series says why."""
     if why := mitsuba_is_there():
         pytest.skip(why)
-    found = run(Choice(NAMES, "quick", 1), tmp_path, 2, lambda *_: None).found
+    found = run(Choice(NAMES, "quick", 1), tmp_path, Threads(2), lambda *_: None).found
     for name in NAMES:
         for one in summarise(family(name), found):
             place = f"{name} {one.series.name}"

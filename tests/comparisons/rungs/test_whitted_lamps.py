@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from comparisons.mitsuba.backend import scalar
+from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.translate import load
 from comparisons.mitsuba.translate.shapes.stand_ins import coarser
 from comparisons.rungs import whitted
@@ -109,3 +109,29 @@ def test_edges_of_texels_in_the_middle_of_lamps(lamp: str, tmp_path: Path) -> No
         found = whitted(scene, scene.tables, faulty)
     assert right.status in ("agree", "reference-limited"), right.reason
     assert found.status == "differ"
+
+
+def test_a_mirrored_rectangle_shines_by_a_texture() -> None:
+    """Mitsuba samples the light of its own rectangle, if it is flipped, on the back."""
+    scene = Scene.parse("""
+camera: {type: perspective, eye: [0, -6, 3], target: [0, 0, 0], up: [0, 0, 1]}
+film: {width: 16, height: 12}
+integrator: {type: whitted}
+textures: {tiles: {type: checker, first: 0.9, second: 0.2, uv: {scale: 1.3}}}
+materials: {lamp: {type: emissive, radiance: tiles}}
+shapes:
+  - {type: plane, transform: [{translate: [0, 0, -1]}]}
+  - {type: rectangle, material: lamp, transform: [{scale: [-1, 2, 1]},
+     {rotate: {axis: [1, 0.2, 0], degrees: 170}}, {translate: [0.5, 0, 1]}]}
+""")
+    with scalar():
+        counterpart, mi = load(scene), mitsuba()
+        place = mi.SurfaceInteraction3f()
+        place.p = mi.Point3f(0.2, 0.3, -1.0)
+        for u in np.random.default_rng(0).random((20, 2)):
+            drawn, light = counterpart.mi_scene.sample_emitter_direction(
+                place, mi.Point2f(u), False
+            )
+            assert drawn.pdf > 0.0
+            assert max(light) > 0.0
+        assert whitted(scene, scene.tables, counterpart).status == "agree"

@@ -101,6 +101,13 @@ def sphere_surface(shape: Sphere) -> tuple[list[Patch], Implicit]:
 def _(shape: Rectangle, site: Site) -> list[Plugin]:
     m = affine.map_in(shape, site.place)
     mirrored = bool(np.linalg.det(m[:, :3]) < 0.0)
+    if mirrored and "emitter" in site.parts and site.parts["emitter"]["radiance"]["type"] != "rgb":
+        # Mitsuba samples the texture's light on the back of a rectangle with `flip_normals`.
+        square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+        corners = np.column_stack([2.0 * square - 1.0, np.zeros(4)])
+        flat = Soup(corners, uvs=square, faces=np.array([[0, 1, 2], [0, 2, 3]]))
+        mesh = flat.moved(m, mirrored).mesh(with_mesh_light(site).parts)
+        return [Plugin(mesh, faces=np.zeros(2, np.int64), uv=same_uv)]
     # The third column has no effect but on orientation.
     columns = np.column_stack([m[:, 0], m[:, 1], -m[:, 2] if mirrored else m[:, 2]])
     plugin = {
