@@ -208,7 +208,7 @@ def _rows(table: Any) -> int:
     """The number of rows of a table, whose columns may be tables; 0 for None."""
     if table is None:
         return 0
-    first = table
+    first = getattr(table, "face", table)  # of triangles the first column is of shared points
     while isinstance(first, tuple):
         first = first[0]
     return len(first)

@@ -105,11 +105,7 @@ def _barycentrics(triangles: Triangles) -> FloatArray:
 def align(parts: Sequence[Triangles]) -> list[Triangles]:
     """Gives all tables the columns that any of them has, and corners the rows of points in all
     tables one after another, so that they can be concatenated."""
-    starts = np.cumsum([0] + [len(part.points) for part in parts], dtype=np.int32)
-    parts = [
-        part if start == 0 else part._replace(corners=part.corners + start)
-        for part, start in zip(parts, starts[:-1], strict=True)
-    ]
+    parts = list(parts)
     if any(part.normals is not None for part in parts):
         parts = [
             part._replace(normals=_flat_normals(part)) if part.normals is None else part
@@ -126,7 +122,11 @@ def align(parts: Sequence[Triangles]) -> list[Triangles]:
             else part
             for part in parts
         ]
-    return parts
+    starts = np.cumsum([0] + [len(part.points) for part in parts], dtype=np.int32)
+    return [
+        part if start == 0 else part._replace(corners=part.corners + start)
+        for part, start in zip(parts, starts[:-1], strict=True)
+    ]
 
 
 def _flat_normals(triangles: Triangles) -> FloatArray:

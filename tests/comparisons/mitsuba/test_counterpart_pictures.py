@@ -364,7 +364,7 @@ def test_scalar_variants_take_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
     assert load(lit("union", "grey")).no_pictures_reason == ""
     budget = Budget(spp=4, replicates=2, pixels=16, light_pixels=16)
 
-    def refused(_: Scene) -> Counterpart:
+    def refused(_: Scene, sampler: str) -> Counterpart:
         raise UntranslatableError("of a test", "scene")
 
     with scalar():

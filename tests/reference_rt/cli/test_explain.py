@@ -29,8 +29,8 @@ LIGHTS = {
 
 
 def rows(table):
-    """Of a table, whose columns may be tables."""
-    return len(table) if isinstance(table, np.ndarray) else rows(table[0])
+    """Of a table, whose columns may be tables; of triangles, which share points, the last one."""
+    return len(table) if isinstance(table, np.ndarray) else rows(table[-1])
 
 
 def explained(scene):
