@@ -76,7 +76,7 @@ def test_no_series_is_unexplained(tmp_path):
     """The quick run of all: ours holds, and where Mitsuba does as well, the series says why."""
     if why := mitsuba_is_there():
         pytest.skip(why)
-    found = run(Choice(NAMES, "quick", 1), tmp_path, Threads(2), lambda *_: None).found
+    found = run(Choice(NAMES, "quick", 1), tmp_path, Threads(2), lambda *_: None)
     for name in NAMES:
         for one in summarise(family(name), found):
             place = f"{name} {one.series.name}"
