@@ -29,8 +29,10 @@ LIGHTS = {
 
 
 def rows(table):
-    """Of a table, whose columns may be tables; of triangles, which share points, the last one."""
-    return len(table) if isinstance(table, np.ndarray) else rows(table[-1])
+    """Of a table, whose columns may be tables; triangles share points."""
+    if isinstance(table, np.ndarray):
+        return len(table)
+    return len(table.corners) if hasattr(table, "corners") else rows(table[0])
 
 
 def explained(scene):
