@@ -45,7 +45,7 @@ OF_KERNELS = (
     ),
     SourceFault(
         "filter's weight of x alone", "filter_catmull_rom", "rendering/tiles.py",
-        "    return FilmRay(ray, weight_x * weight_y)\n", "    return FilmRay(ray, weight_x)\n",
+        "weight_x * weight_y * stratum.weight", "weight_x * stratum.weight",
     ),
     SourceFault(
         "any-hit misses one triangle", "mesh_knot", "accel/geometry.py",
