@@ -53,7 +53,7 @@ from reference_rt.integrators.shading import shade, shade_point
 from reference_rt.jit.kernel import ByClass, kernel, local_floats, local_integers
 from reference_rt.lights import Pick
 from reference_rt.materials import Shading
-from reference_rt.sampling import Sample, Samplers, sampler_of
+from reference_rt.sampling import Sample, Samplers, sampler_of, split_sample
 from reference_rt.sampling.blocks import BlockSample
 from reference_rt.sampling.grid import GridSample
 from reference_rt.sampling.independent import IndependentSample
@@ -185,6 +185,13 @@ def _part(n: int) -> State:
 
 
 @kernel
+def _group(n: int) -> int:
+    """The group of dimensions of n samples at the first hit: that of the camera ray for one, which
+    is stratified together with it, and another for more, whose numbers are not the ray's."""
+    return min(n - 1, 1)
+
+
+@kernel
 def _enqueue(
     direct: DirectSetup,
     scene: SceneTables,
@@ -220,13 +227,16 @@ def _of_samples(
 ) -> Waiting:
     """Samples of lights and of the material at the first hit of camera ray j."""
     shadows, scattered = waiting
-    state = _part(direct.light_samples)
-    for k in range(direct.light_samples):
-        connection = next_event_estimation(direct, scene, state, shading, sampler, k)
+    n = direct.light_samples
+    state, group = _part(n), _group(n)
+    for k in range(n):
+        part = split_sample(sampler, n, k)
+        connection = next_event_estimation(direct, scene, state, shading, part, group)
         shadows = _enqueue(direct, scene, connection, j, shadows, queue)
-    state = _part(direct.bsdf_samples)
-    for k in range(direct.bsdf_samples):
-        step = scatter(direct, scene, state, shading, sampler, k)
+    n = direct.bsdf_samples
+    state, group = _part(n), _group(n)
+    for k in range(n):
+        step = scatter(direct, scene, state, shading, split_sample(sampler, n, k), group)
         if not step.goes_on:
             continue
         if scattered == BLOCK:

@@ -67,9 +67,7 @@ def linked_view(linker: Linker, view: Any) -> LinkedView:
 
 
 def linked_filter(linker: Linker, setup: Any) -> Link:
-    """A filter's setup behind a link; None has a link to nothing."""
-    if setup is None:
-        return Link(0)
+    """A filter's setup behind a link."""
     return linker.link(film_filters.operations, film_filters.operations, {0: setup})
 
 

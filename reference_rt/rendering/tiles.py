@@ -59,7 +59,7 @@ class FilmRay(NamedTuple):
 
 
 class GivenRays(NamedTuple):
-    """Given rays in place of a camera: a film of n pixels in one row, without a filter (None).
+    """Given rays in place of a camera: a film of n pixels in one row, whose filter is not used.
     Pixel x has the ray from o[x] along the unit direction d[x]; o, d (n, 3)."""
 
     o: FloatArray
@@ -69,7 +69,7 @@ class GivenRays(NamedTuple):
 @kernel
 def _given_ray(
     rays: GivenRays,
-    film_filter: None,
+    film_filter: Any,
     stratum: Stratum,
     sampler: Any,
     shape: tuple[int, int],
@@ -120,7 +120,7 @@ def _linked_film_ray(
     y: int,
 ) -> FilmRay:
     if len(view.given.o) > 0:
-        return _given_ray(view.given, None, stratum, sampler, shape, x, y)
+        return _given_ray(view.given, film_filter, stratum, sampler, shape, x, y)
     return _camera_film_ray(view, film_filter, stratum, sampler, shape, x, y)
 
 
@@ -166,44 +166,13 @@ _film_ray = _film_rays.function
 
 
 @kernel
-def _given_stratum(
-    view: GivenRays, film_filter: None, seed: int, pixel: int, sample: int
-) -> Stratum:
-    return no_stratum(pixel, sample)
-
-
-@kernel
-def _camera_stratum(view: Any, film_filter: Any, seed: int, pixel: int, sample: int) -> Stratum:
+def _stratum_of_sobol(setup: SobolSetup, film_filter: Any, pixel: int, sample: int) -> Stratum:
+    seed: Any = np.int64(setup.seed)
     return stratum_of(film_filter, seed, pixel, sample)
 
 
 @kernel
-def _linked_stratum(
-    view: LinkedView, film_filter: Link, seed: int, pixel: int, sample: int
-) -> Stratum:
-    if len(view.given.o) > 0:
-        return no_stratum(pixel, sample)
-    return stratum_of(film_filter, seed, pixel, sample)
-
-
-_view_strata = ByClass("stratum_of_view")
-_view_strata.register(LinkedView, _linked_stratum)
-_view_strata.register(GivenRays, _given_stratum)
-for _view in VIEWS:
-    _view_strata.register(_view, _camera_stratum)
-_stratum_of_view = _view_strata.function
-
-
-@kernel
-def _stratum_of_sobol(
-    setup: SobolSetup, view: Any, film_filter: Any, pixel: int, sample: int
-) -> Stratum:
-    found: Stratum = _stratum_of_view(view, film_filter, np.int64(setup.seed), pixel, sample)
-    return found
-
-
-@kernel
-def _stratum_of_others(setup: Any, view: Any, film_filter: Any, pixel: int, sample: int) -> Stratum:
+def _stratum_of_others(setup: Any, film_filter: Any, pixel: int, sample: int) -> Stratum:
     return no_stratum(pixel, sample)
 
 
@@ -212,7 +181,7 @@ _strata.register(SobolSetup, _stratum_of_sobol)
 _strata.register(IndependentSetup, _stratum_of_others)
 _strata.register(GridSetup, _stratum_of_others)
 _stratum = _strata.function
-"""_stratum(sampler_setup, view, film_filter, pixel, sample)."""
+"""_stratum(sampler_setup, film_filter, pixel, sample)."""
 
 
 @entry_kernel
@@ -259,7 +228,7 @@ def render_tile(
         n = min(BLOCK, paths - start)
         for k in range(n):
             pixel, sample = begin + (start + k) // count, first + (start + k) % count
-            stratum = _stratum(sampler_setup, view, film_filter, pixel, sample)
+            stratum = _stratum(sampler_setup, film_filter, pixel, sample)
             samplers.pixels[k], samplers.numbers[k] = stratum.pixel, stratum.number
             y, x = pixel // shape[0], pixel % shape[0]
             seen = _film_ray(view, film_filter, stratum, sampler_of(samplers, k), shape, x, y)
@@ -314,7 +283,7 @@ def first_hits_tile(
         i = pixel - begin
         albedo, normal, position = row(albedos, i), row(normals, i), row(positions, i)
         for sample in range(first, last):
-            stratum = _stratum(sampler_setup, view, film_filter, pixel, sample)
+            stratum = _stratum(sampler_setup, film_filter, pixel, sample)
             sampler = start_sample(sampler_setup, stratum.pixel, stratum.number)
             seen = _film_ray(view, film_filter, stratum, sampler, shape, x, y)
             hit = closest_hit(scene.geometry, seen.ray)

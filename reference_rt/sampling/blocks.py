@@ -33,6 +33,9 @@ SINGLY = 2**40
 samples in between those of a pixel, such as the filter's strata, whose pairs would replace those of
 the pixel's block each time."""
 
+_MOST_SAMPLES = 2**31
+_MOST_BLOCKS = _MOST_SAMPLES // BLOCK_SAMPLES
+
 FLOATS, INTEGERS = 2 * BLOCK_SAMPLES * DIMENSIONS, DIMENSIONS
 """The sizes of `BlockSample.pairs` and `BlockSample.made`."""
 
@@ -53,9 +56,16 @@ class BlockSample(NamedTuple):
 def start(
     setup: SobolSetup, pixel: int, sample: int, pairs: FloatArray, made: IntArray
 ) -> BlockSample:
-    # At most 2^31 samples, 16 in each block.
-    block = pixel * 2**27 + sample // BLOCK_SAMPLES if pixel < SINGLY else -1
+    block = pixel * _MOST_BLOCKS + sample // BLOCK_SAMPLES if pixel < SINGLY else -1
     return BlockSample(sobol.start(setup, pixel, 0).key, sample, block, pairs, made)
+
+
+@kernel
+def split(sampler: BlockSample, n: int, k: int) -> BlockSample:
+    number, block = (sampler.sample * n + k) % _MOST_SAMPLES, sampler.block
+    if block >= 0:
+        block += number // BLOCK_SAMPLES - block % _MOST_BLOCKS
+    return BlockSample(sampler.key, number, block, sampler.pairs, sampler.made)
 
 
 @kernel

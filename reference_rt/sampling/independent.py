@@ -38,6 +38,11 @@ def start(setup: IndependentSetup, pixel: int, sample: int) -> IndependentSample
 
 
 @kernel
+def split(sampler: IndependentSample, n: int, k: int) -> IndependentSample:
+    return IndependentSample(combine(sampler.key, np.uint64(k))) if n > 1 else sampler
+
+
+@kernel
 def draw(sampler: IndependentSample, dimension: int) -> tuple[float, float]:
     """Two multiples of 2^-32 plus 2^-33, the middles of cells: never 0, never 1."""
     h = mix(sampler.key + np.uint64(dimension + 1) * np.uint64(0x9E3779B97F4A7C15))

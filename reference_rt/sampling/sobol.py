@@ -93,6 +93,12 @@ def start(setup: SobolSetup, pixel: int, sample: int) -> SobolSample:
 
 
 @kernel
+def split(sampler: SobolSample, n: int, k: int) -> SobolSample:
+    number = reverse_bits(sampler.reversed_index) * np.uint64(n) + np.uint64(k)
+    return SobolSample(sampler.key, reverse_bits(number & LOW32))
+
+
+@kernel
 def hash_of(key: np.uint64, dimension: int) -> np.uint64:
     """The hash of seed, pixel (in key) and dimension."""
     return mix(key + np.uint64(dimension + 1) * _STEP)

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from reference_rt.cameras.film import BoxFilter
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import UNIT_ROUNDOFF, Ray
 from reference_rt.core.vec3 import row
@@ -144,7 +145,7 @@ def estimate(
     threads = threads or os.cpu_count() or 1
     if n > 0:
         job = radiance_job(setup, sampler, (n, 1), has_variance=True)
-        with Running([job], tables, GivenRays(o, d), None, threads) as running:
+        with Running([job], tables, GivenRays(o, d), BoxFilter().setup(), threads) as running:
             kernel = running.run(0)
 
             def add(begin: int, end: int, first: int, last: int) -> None:

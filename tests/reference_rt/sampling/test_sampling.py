@@ -15,6 +15,7 @@ from reference_rt.sampling import (
     blocks,
     draw_pair,
     sobol,
+    split_sample,
     start_in_block,
     start_sample,
 )
@@ -98,6 +99,34 @@ def test_blocks_give_the_same_numbers(sampler):
         _draw_all(setup, pixels[which], samples[which], dimension, each)
         expected[which] = each
     assert np.array_equal(found, expected)
+
+
+@entry_kernel
+def _draw_parts(setup, n, samples, pairs, made, alone, in_blocks):
+    for i in range(len(samples)):
+        one = start_sample(setup, 5, samples[i])
+        same = start_in_block(setup, 5, samples[i], pairs, made)
+        for k in range(n):
+            j = i * n + k
+            alone[j, 0], alone[j, 1] = draw_pair(split_sample(one, n, k), 7)
+            in_blocks[j, 0], in_blocks[j, 1] = draw_pair(split_sample(same, n, k), 7)
+        # The sample itself between its parts, whose block is another.
+        draw_pair(same, 7)
+
+
+@pytest.mark.parametrize("sampler", SAMPLERS)
+@pytest.mark.parametrize("n", [1, 2, 3, 17])
+def test_parts_of_samples_are_one_sequence(sampler, n):
+    samples = np.random.default_rng(65).permutation(2000)
+    pairs, made = np.full(PAIR_FLOATS, np.nan), np.full(PAIR_INTEGERS, -1)
+    alone, in_blocks = np.empty((2, 2000 * n, 2))
+    _draw_parts(sampler(spp=1, seed=9).setup(), n, samples, pairs, made, alone, in_blocks)
+    assert np.array_equal(in_blocks, alone)
+    assert len(np.unique(alone, axis=0)) == 2000 * n
+    assert chi_square(alone) < CHI2_255
+    if sampler is rt.Sobol or n == 1:
+        numbers = (samples[:, None] * n + np.arange(n)).ravel()
+        assert np.array_equal(alone, draw(sampler(spp=1, seed=9), 5, numbers, 7))
 
 
 @entry_kernel
