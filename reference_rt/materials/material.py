@@ -156,25 +156,36 @@ class Shading(NamedTuple):
 
 
 _NOISE = 64.0 * UNIT_ROUNDOFF
-"""Orthogonalisation takes the part along the unit normal off a vector of size 1.  A remainder
-shorter than this is rounding noise, of some ten roundings of numbers up to 1.  A longer one is
-orthogonal to the last bits when that is done twice ("twice is enough": Parlett 1980, "The Symmetric
-Eigenvalue Problem", 6.9)."""
+"""Orthogonalisation takes the part along the unit normal off a vector.  A remainder shorter than
+this share of the vector is rounding noise, of some ten roundings."""
+
+_LEAST, _MOST = 2.0**-400, 2.0**400
+"""Components between whose squares neither overflow nor lose digits to underflow."""
 
 
 @kernel
 def frame_along(n: Vec3, direction: Vec3) -> Frame:
     """A right-handed basis around a unit normal, its `s` as far along `direction` (of any length)
-    as it can be; any where that is parallel to n, or zero."""
+    as it can be; any where that is parallel to n, or zero.
+
+    What orthogonalisation leaves is orthogonal to within some roundings of the direction's length.
+    Where that is not most of it, it is done again ("twice is enough": Parlett 1980, "The Symmetric
+    Eigenvalue Problem", 6.9).
+    """
     size = max_abs(direction)
     if not size > 0.0:
         return frame_from_normal(n)
-    s = direction / size
-    s = s - n * dot(n, s)
-    if max_abs(s) <= _NOISE:
-        return frame_from_normal(n)
-    s = normalize(s)
-    s = normalize(s - n * dot(n, s))
+    if not _LEAST < size < _MOST:
+        direction = direction / size
+    s = direction - n * dot(n, direction)
+    length2, whole2 = dot(s, s), dot(direction, direction)
+    if length2 < 0.25 * whole2:
+        if length2 <= _NOISE * _NOISE * whole2:
+            return frame_from_normal(n)
+        s = normalize(s)
+        s = s - n * dot(n, s)
+        length2 = dot(s, s)
+    s = s * (1.0 / math.sqrt(length2))
     return Frame(s, cross(n, s), n)
 
 
