@@ -186,6 +186,8 @@ def greatest(bitmaps: Bitmaps) -> float:
 @kernel
 def _wrapped(i: int, n: int, wrap: int) -> int:
     """The texel, 0 to n - 1, at position i of a row of n texels that is continued by `wrap`."""
+    if 0 <= i < n:
+        return i
     if wrap == _CLAMP:
         return min(max(i, 0), n - 1)
     if wrap == _MIRROR:
@@ -208,8 +210,15 @@ def _value(bitmaps: Bitmaps, i: int, k: int) -> float:
 @kernel
 def texel(bitmaps: Bitmaps, i: int, x: int, y: int) -> Vec3:
     """The texel at column x, row y (from the top) of image i; beyond its edges by its `wrap`."""
-    width, height, wrap = bitmaps.width[i], bitmaps.height[i], bitmaps.wrap[i]
-    k = _wrapped(y, height, wrap // 3) * width + _wrapped(x, width, wrap % 3)
+    wrap = bitmaps.wrap[i]
+    x = _wrapped(x, bitmaps.width[i], wrap % 3)
+    return _stored(bitmaps, i, x, _wrapped(y, bitmaps.height[i], wrap // 3))
+
+
+@kernel
+def _stored(bitmaps: Bitmaps, i: int, x: int, y: int) -> Vec3:
+    """The texel at column x, row y of image i, which has both."""
+    k = y * bitmaps.width[i] + x
     if bitmaps.channels[i] == 1:
         grey = _value(bitmaps, i, k)
         return Vec3(grey, grey, grey)
@@ -235,11 +244,14 @@ def _patch(bitmaps: Bitmaps, i: int, u: float, v: float) -> Patch:
     v = 1 - (y + 1/2) / height."""
     x, y = u * bitmaps.width[i] - 0.5, (1.0 - v) * bitmaps.height[i] - 0.5
     column, line = math.floor(x), math.floor(y)
+    width, height, wrap = bitmaps.width[i], bitmaps.height[i], bitmaps.wrap[i]
+    left, right = _wrapped(column, width, wrap % 3), _wrapped(column + 1, width, wrap % 3)
+    upper, lower = _wrapped(line, height, wrap // 3), _wrapped(line + 1, height, wrap // 3)
     return Patch(
-        texel(bitmaps, i, column, line),
-        texel(bitmaps, i, column + 1, line),
-        texel(bitmaps, i, column, line + 1),
-        texel(bitmaps, i, column + 1, line + 1),
+        _stored(bitmaps, i, left, upper),
+        _stored(bitmaps, i, right, upper),
+        _stored(bitmaps, i, left, lower),
+        _stored(bitmaps, i, right, lower),
         x - column,
         y - line,
     )
