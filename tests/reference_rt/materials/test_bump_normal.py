@@ -99,12 +99,11 @@ def test_gradient_is_the_slope_of_the_lookup(nearest, wrap):
 
 
 def test_checkers_have_no_slope():
-    colours = np.array([[0.0, 0.0, 0.0]]), np.array([[1.0, 1.0, 1.0]])
     textures = Textures(
         np.array([CHECKER]),
         np.array([0]),
         PLAIN.coefficients()[None],
-        Checkers(*colours),
+        Checkers(np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])),
         None,
         None,
     )
