@@ -141,7 +141,6 @@ def put_state(scene: SceneTables, scratch: Scratch, j: int, k: int, state: State
 
 
 UNLIMITED = 2**31
-_LEAST_PDF = 2.0**-1022
 ROULETTE_CAP = 0.999
 """The highest survival probability of Russian roulette: below 1, so that paths between perfect
 mirrors end.
@@ -393,9 +392,7 @@ def connect(
     weight = 1.0
     if not light.is_delta:
         weight = _mis_weight(setup, LIGHT_SAMPLING, pdf, sample.bsdf_pdf)
-    # Two factors, whose divisions do not wait for each other (measured: 2 % of a picture's time).
-    # A subnormal density, which has lost digits, would have an infinite inverse, and a weight of 0.
-    arriving = sample.contribution * (1.0 / max(pdf, _LEAST_PDF)) * weight
+    arriving = sample.contribution * (weight / pdf)
     return LightConnection(state.throughput * arriving, shadow_ray(shading.point, light))
 
 
