@@ -38,8 +38,8 @@ from reference_rt.rendering.query import hits, tracing
 from reference_rt.rendering.query.tracing import link_to_geometry
 from reference_rt.scene import build_hierarchies
 from reference_rt.shapes import box
-from reference_rt.shapes.curved import sphere
-from reference_rt.shapes.flat import rectangle
+from reference_rt.shapes.curved import quadrics, sphere
+from reference_rt.shapes.flat import disk, rectangle
 from reference_rt.shapes.ray_simd import make_plain_nearer
 
 KINDS = ("sphere", "rectangle", "box", "triangle")
@@ -450,10 +450,35 @@ def _nearer_sphere(numbers, at, shape, t, codes):
     sphere.nearer(numbers, at, shape, 5, t, codes)
 
 
-NEARER = ((rectangle, 4, _nearer_rectangle), (box, 4, _nearer_box), (sphere, 1, _nearer_sphere))
+@entry_kernel
+def _nearer_disk(numbers, at, shape, t, codes):
+    disk.nearer(numbers, at, shape, 5, t, codes)
 
 
-@pytest.mark.parametrize(("module", "vectors", "nearer"), NEARER, ids=["flat", "box", "sphere"])
+@entry_kernel
+def _nearer_quadric(numbers, at, shape, t, codes):
+    quadrics.nearer(numbers, at, shape, 5, t, codes)
+
+
+NEARER = (
+    (rectangle, 4, _nearer_rectangle),
+    (box, 4, _nearer_box),
+    (sphere, 1, _nearer_sphere),
+    (disk, 4, _nearer_disk),
+    (quadrics, 4, _nearer_quadric),
+)
+NAMES = ["flat", "box", "sphere", "disk", "quadric"]
+
+
+def _rest_of_quadric(rng):
+    """Coefficients, of which many are 0, a box that clips some axes, and whether it is a solid."""
+    k = tuple(np.where(rng.random(10) < 0.5, 0.0, rng.normal(size=10)))
+    lower, upper = Vec3(*-rng.uniform(0.1, 1, 3)), Vec3(*rng.uniform(0.1, 1, 3))
+    clipped = Vec3(*rng.integers(0, 2, 3).astype(float))
+    return k, lower, upper, clipped, np.float64(rng.integers(0, 2))
+
+
+@pytest.mark.parametrize(("module", "vectors", "nearer"), NEARER, ids=NAMES)
 def test_vector_code_gives_the_bits_of_the_plain_kernel(module, vectors, nearer):
     """Infinities, zeros and NaN included."""
     rng = np.random.default_rng(72)
@@ -468,6 +493,8 @@ def test_vector_code_gives_the_bits_of_the_plain_kernel(module, vectors, nearer)
         shape = tuple(Vec3(*map(np.float64, v)) for v in values)
         if module is sphere:
             shape = (*shape, np.float64(rng.uniform(0.5, 3)))
+        if module is quadrics:
+            shape = (*shape, *_rest_of_quadric(rng))
         at = int(rng.choice([0, VECTOR_WIDTH]))
         t, codes = np.full(VECTOR_WIDTH, rng.choice([math.inf, 2.0])), np.full(VECTOR_WIDTH, -1)
         plain_t, plain_codes = t.copy(), codes.copy()
