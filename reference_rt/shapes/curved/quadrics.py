@@ -275,7 +275,7 @@ def _distance_beside(quadric: Row, near: Rebased) -> float:
 
 @kernel
 def _distance(quadric: Row, ray: Ray) -> float:
-    """A surface that is not capped includes its rim.  A line within the surface does not meet it."""
+    """A surface that is not capped includes its rim.  A line in the surface does not meet it."""
     near = _rebased_ray(quadric, ray)
     t: float = _distance_beside(negated(_is_outside(near.ray)), math.inf, quadric, near)
     return t

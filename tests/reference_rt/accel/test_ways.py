@@ -200,7 +200,8 @@ def thrice(kinds):
 SCENES = {
     "two kinds": thrice(["rectangle", "box"]),
     "spheres": thrice(["sphere"]),
-    "three kinds": thrice(["sphere", "rectangle", "disk"]),
+    "five kinds": [*thrice(["sphere", "rectangle", "disk"]), rt.Cylinder(z_max=0.5),
+                   rt.Polygon(rings=[[(-0.9, -0.9), (0.5, -0.9), (0.5, 0.9), (-0.9, 0.9)]])],
     "a ball of triangles": [mesh(icosphere(3))],
     "a cube of triangles": [mesh(cube(7))],
     "solids and a plane": [mesh(icosphere(2)), rt.Sphere(center=(0.9, 0.2, 0.1), radius=0.4),
