@@ -18,7 +18,6 @@ from reference_rt.core.ray import (
     RAY_FLOATS,
     Hit,
     HitBlock,
-    Ray,
     RayBlock,
     put_ray,
     ray_of,
@@ -75,9 +74,8 @@ def trace_packet(
     indices are in `numbers`.  Returns both as they are afterwards.  Hits come in any order, misses
     are left out.
     """
-    outcome = INCOHERENT
-    if count == PACKET_SIZE:
-        outcome = closest_of_packet(geometry, o, d, begin, width, work.packet, work.hits)
+    no_ends = work.rays.numbers[:0]
+    outcome = _together(geometry, o, d, no_ends, begin, width, count, work.packet, work.hits)
     if outcome == FOUND:
         for j in range(PACKET_SIZE):
             hit = hit_of(geometry, ray_of(work.packet, j), work.hits, j)
@@ -97,6 +95,26 @@ def trace_packet(
             filled = _add_hit(found, numbers, filled, hit, work.numbers[j])
         waiting = 0
     return waiting, filled
+
+
+@kernel
+def _together(
+    geometry: Geometry,
+    o: FloatArray,
+    d: FloatArray,
+    ends: FloatArray,
+    begin: int,
+    width: int,
+    count: int,
+    packet: RayBlock,
+    hits: HitBlock,
+) -> int:
+    """`closest_of_packet` of the first `count` rays of a packet."""
+    if count < PACKET_SIZE:
+        return INCOHERENT
+    if not may_be_coherent(row(d, begin), row(d, ray_number(begin, width, PACKET_SIZE - 1))):
+        return INCOHERENT
+    return closest_of_packet(geometry, o, d, ends, begin, width, packet, hits)
 
 
 @kernel
@@ -122,6 +140,19 @@ def rows_width(o: FloatArray, d: FloatArray) -> int:
 
 
 JUMP = 8.0
+
+
+@kernel
+def packet_place(k: int, n: int, width: int) -> tuple[int, int]:
+    """(begin, width) for `ray_number` of the packet of the rays that come k-th of n.
+
+    Bands of TILE rows are traced in packets of TILE rows, and the rays after the last one in their
+    order.
+    """
+    band = width * TILE
+    if width > TILE and k < n // band * band:
+        return k // band * band + k % band // TILE, width
+    return k, TILE
 
 
 @kernel
@@ -167,20 +198,28 @@ def occluded_rays(
     geometry: Geometry, o: FloatArray, d: FloatArray, t_max: FloatArray, out: npt.NDArray[np.bool_]
 ) -> None:
     """Whether each ray hits anything at 0 < t < t_max (n,), written to out (n,)."""
-    rays = RayBlock(local_floats(RAY_FLOATS))
+    rays, packet = RayBlock(local_floats(RAY_FLOATS)), RayBlock(local_floats(RAY_FLOATS))
     hits = HitBlock(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS))
-    numbers = local_integers(BLOCK)
+    numbers, waiting = local_integers(BLOCK), 0
     for k in range(RAY_FLOATS):
         rays.numbers[k] = 1.0
-    for begin in range(0, len(o), BLOCK):
-        count = 0
-        for i in range(begin, min(begin + BLOCK, len(o))):
-            out[i] = False
-            ray, _, valid = scaled(row(o, i), row(d, i), t_max[i])
-            if valid:
-                put_ray(rays, count, Ray(ray.o, ray.d, ray.t_max))
-                numbers[count] = i
-                count += 1
-        any_hits(geometry, rays, hits, count)
+    n, width = len(o), rows_width(o, d)
+    for k in range(0, n, PACKET_SIZE):
+        begin, across = packet_place(k, n, width)
+        count = min(PACKET_SIZE, n - k)
+        outcome = _together(geometry, o, d, t_max, begin, across, count, packet, hits)
         for j in range(count):
-            out[numbers[j]] = hits.codes[j] >= 0
+            out[ray_number(begin, across, j)] = outcome == FOUND and hits.codes[j] >= 0
+        if outcome == INCOHERENT:
+            for j in range(count):
+                i = ray_number(begin, across, j)
+                ray, _, valid = scaled(row(o, i), row(d, i), t_max[i])
+                if valid:
+                    put_ray(rays, waiting, ray)
+                    numbers[waiting] = i
+                    waiting += 1
+        if waiting > BLOCK - PACKET_SIZE or k + PACKET_SIZE >= n:
+            any_hits(geometry, rays, hits, waiting)
+            for j in range(waiting):
+                out[numbers[j]] = hits.codes[j] >= 0
+            waiting = 0

@@ -9,6 +9,7 @@ import numpy as np
 from numba import types
 
 from reference_rt.jit.kernel import is_named_tuple, kernel, overload_kernel
+from reference_rt.jit.simd import larger
 
 
 class Vec3(NamedTuple):
@@ -121,7 +122,8 @@ def normalize(a: Vec3) -> Vec3:
 @kernel
 def max_abs(a: Vec3) -> float:
     """The largest magnitude of a component: the infinity norm."""
-    return max(abs(a.x), max(abs(a.y), abs(a.z)))
+    largest: float = larger(abs(a.x), larger(abs(a.y), abs(a.z)))
+    return largest
 
 
 @kernel

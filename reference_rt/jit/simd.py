@@ -8,8 +8,8 @@ rounds once, by IEEE's rules, in the order written: all results have the same bi
 with narrower vectors LLVM splits the instructions.
 
 A generic function has no branches.  It uses `select`, `smaller` and `larger` instead, the square
-root and the sign functions below, and &, | and ~ for conditions.  `simd_kernel` makes such a
-function callable from kernels."""
+root and the sign functions below, and &, | and `negated` for conditions; `only_where` for what few
+lanes need.  `simd_kernel` makes such a function callable from kernels."""
 
 import functools
 import inspect
@@ -24,7 +24,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from reference_rt.jit.kernel import overload_kernel
+from reference_rt.jit.kernel import kernel, overload_kernel
 from reference_rt.jit.numba_codegen import call_llvm, data_of, nothing
 
 VECTOR_WIDTH = 8
@@ -100,7 +100,7 @@ class SimdVector:
     def compared(self, how: str, other: Any) -> Mask:
         return Mask(self.builder, self.builder.fcmp_ordered(how, self.value, self.of(other)))
 
-    __add__, __mul__ = _arithmetic("fadd"), _arithmetic("fmul")
+    __add__, __mul__, __rmul__ = (_arithmetic(name) for name in ("fadd", "fmul", "fmul"))
     __sub__, __rsub__ = _arithmetic("fsub"), _arithmetic("fsub", is_reflected=True)
     __truediv__, __rtruediv__ = _arithmetic("fdiv"), _arithmetic("fdiv", is_reflected=True)
 
@@ -139,6 +139,51 @@ def lanes_where(chosen: Sequence[bool], x: Any) -> Any:
     return x.lanes_where(chosen) if isinstance(x, SimdVector) else np.array(chosen)
 
 
+def negated(condition: Any) -> Any:
+    return ~condition if isinstance(condition, Mask) else not condition
+
+
+def only_where(function: Callable[..., Any]) -> Callable[..., Any]:
+    """f(condition, otherwise, ...): function(...) in lanes where the condition holds, in others
+    `otherwise`.  A branch: the function, generic itself, runs if any lane needs it.
+
+    The function returns a number or a tuple of numbers, and `otherwise` is as many.
+    """
+
+    one = kernel(function)
+
+    def chosen(condition: Any, otherwise: Any, *arguments: Any) -> Any:
+        if isinstance(condition, Mask):
+            return _in_some_lanes(condition, otherwise, function, arguments)
+        return function(*arguments) if condition else otherwise
+
+    def compiled(condition: Any, otherwise: Any, *arguments: Any) -> Any:
+        return one(*arguments) if condition else otherwise
+
+    _compiled_as(chosen, compiled)
+    return chosen
+
+
+def _in_some_lanes(
+    condition: Mask, otherwise: Any, function: Callable[..., Any], arguments: Any
+) -> Any:
+    builder, word = condition.builder, ir.IntType(VECTOR_WIDTH)
+    before = builder.block
+    needed = builder.icmp_unsigned("!=", builder.bitcast(condition.value, word), word(0))
+    with builder.if_then(needed):
+        found = function(*arguments)
+        end = builder.block
+    lanes = SimdVector(builder, condition.value)
+    merged = []
+    for a, b in zip(_items(found), _items(otherwise), strict=True):
+        value = builder.phi(F64_VECTOR)
+        value.add_incoming(lanes.of(a), end)
+        value.add_incoming(lanes.of(b), before)
+        merged.append((SimdVector(builder, value), b))
+    chosen = tuple(select(condition, a, b) for a, b in merged)
+    return chosen if isinstance(found, tuple) else chosen[0]
+
+
 def smaller(a: Any, b: Any) -> Any:
     """Python's min(a, b): `a` if either is NaN."""
     return select(b < a, b, a)
@@ -165,8 +210,8 @@ def square_root(x: Any) -> Any:
 
 
 def with_sign(x: Any, sign: Any) -> Any:
-    if isinstance(x, SimdVector):
-        return x.call("copysign", sign)
+    if isinstance(sign, SimdVector):
+        return SimdVector(sign.builder, sign.of(x)).call("copysign", sign)
     return np.copysign(x, sign) if isinstance(x, np.ndarray) else math.copysign(x, sign)
 
 
@@ -200,6 +245,7 @@ def _compiled_as(function: Callable[..., Any], one: Callable[..., Any]) -> None:
     overload_kernel(function)(lambda *_: one)
 
 
+_compiled_as(negated, lambda condition: not condition)
 _compiled_as(select, lambda condition, a, b: a if condition else b)
 _compiled_as(smaller, lambda a, b: b if b < a else a)
 _compiled_as(larger, lambda a, b: b if b > a else a)
@@ -286,7 +332,7 @@ class _PlainMemory:
         self.flat[start : start + VECTOR_WIDTH] = lanes
 
 
-def _conditions(found: Any) -> tuple[Any, ...]:
+def _items(found: Any) -> tuple[Any, ...]:
     return found if isinstance(found, tuple) else (found,)
 
 
@@ -305,7 +351,7 @@ def plain(function: Callable[..., Any]) -> Callable[..., int]:
 
     @functools.wraps(function)
     def run(*arguments: Any) -> int:
-        lanes = np.concatenate(_conditions(function(*_as_lanes(arguments))))
+        lanes = np.concatenate(_items(function(*_as_lanes(arguments))))
         return int.from_bytes(np.packbits(lanes, bitorder="little").tobytes(), "little")
 
     return run
@@ -329,7 +375,7 @@ def simd_kernel(function: Callable[..., Any]) -> Callable[..., int]:
 
     def bits_of(context: Any, builder: Any, found: Any) -> Any:
         bits = I64(0)
-        for k, condition in enumerate(_conditions(found)):
+        for k, condition in enumerate(_items(found)):
             of_lanes = builder.bitcast(condition.value, ir.IntType(VECTOR_WIDTH))
             bits = builder.or_(
                 bits, builder.shl(builder.zext(of_lanes, I64), I64(k * VECTOR_WIDTH))

@@ -17,7 +17,9 @@ world coordinates and scene units, for row i of the table or the row of a hit:
 - `sample(table, i, area, p, u0, u1) -> LightPoint` and `pdf(table, i, area, p, q)` of shapes that
   can be lights, with `areas(table)`: a density per solid angle at p; 0 means that no light arrives;
 - `spans(table, i, ray) -> Spans` of solids: where the line, at all t, is inside; t = inf for none;
-- `face_of(table, hit)` of shapes with several faces: the number of the face.
+- `face_of(table, hit)` of shapes with several faces: the number of the face;
+- `nearer` of shapes that `ray_simd.py` tests against several rays at once, with `arguments(table,
+  i)`, what its `distance` takes of a row, and `found(table, i, ray, t)`, the crossing at t.
 
 To add a shape: its file; what `tables.py` says; a translator in `comparisons.mitsuba.translate`; a
 scene; a row in the tests' tuple.  Step by step: docs/extending.md.

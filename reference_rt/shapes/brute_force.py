@@ -1,9 +1,8 @@
 """Closest hits by brute force, without a BVH: faster for scenes of a few shapes.
 
 Given tables (`Shapes`), all of them are searched in one kernel; given a link to tables, by
-operations, one for each type.  Spheres, rectangles and boxes are tested with SIMD: VECTOR_WIDTH
-shapes against one ray (`nearest_in_packets`), or one shape against VECTOR_WIDTH rays
-(`nearer_spheres`, ...).
+operations, one for each type.  SIMD tests VECTOR_WIDTH spheres, rectangles or boxes against one ray
+(`nearest_in_packets`), or one shape of a type with the kernel `nearer` against VECTOR_WIDTH rays.
 """
 
 from collections.abc import Callable
@@ -23,23 +22,18 @@ from reference_rt.core.ray import (
     put_hit,
     ray_of,
 )
-from reference_rt.core.vec3 import row
 from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import ByClass, kernel, local_floats, local_integers
 from reference_rt.jit.links import Link
 from reference_rt.jit.simd import VECTOR_WIDTH
-from reference_rt.shapes import box
-from reference_rt.shapes.box import Boxes
-from reference_rt.shapes.curved import sphere
-from reference_rt.shapes.curved.sphere import Spheres
-from reference_rt.shapes.flat import rectangle
-from reference_rt.shapes.flat.rectangle import Rectangles
 from reference_rt.shapes.meshes.triangle import Triangles
 from reference_rt.shapes.meshes.watertight import shear_of
 from reference_rt.shapes.ray_simd import begin, end, resume
 from reference_rt.shapes.shape import nearest_lane
 from reference_rt.shapes.tables import (
     BOX,
+    DISK,
+    QUADRIC,
     RECTANGLE,
     SPHERE,
     TABLES,
@@ -105,7 +99,8 @@ def nearest_in_table(kind: int, table: Any, ray: Any, closest: Hit) -> Hit:
         return closest
     for i in range(len(table.face)):
         found: Crossing = intersect_row(table, i, ray)
-        if found.t < closest.t:
+        # Of a block's ray, types with SIMD kernels and greater codes are already in `closest`.
+        if found.t < closest.t or (found.t == closest.t and kind < closest.kind):
             closest = Hit(found.t, kind, i, found.u, found.v, -1)
     return closest
 
@@ -114,48 +109,29 @@ KIND = 2**40
 """`HitBlock.codes` are kind * KIND + row while types with SIMD kernels are searched."""
 
 
-@kernel
-def nearer_spheres(
-    spheres: Spheres | None, rays: RayBlock, at: int, t: FloatArray, codes: IntArray
-) -> None:
-    """VECTOR_WIDTH rays, from number `at` on, against all spheres; updates t and codes."""
-    if spheres is not None:
-        for i in range(len(spheres.face)):
-            shape = (row(spheres.center, i), spheres.radius[i])
-            sphere.nearer(rays.numbers, at, shape, SPHERE * KIND + i, t, codes)
+def _nearer_by(code: int, module: Any) -> Callable[..., None]:
+    """The kernel that tests VECTOR_WIDTH rays, from number `at` on, against all shapes of a type;
+    it updates t and codes."""
+    nearer, arguments = module.nearer, module.arguments
 
-
-@kernel
-def nearer_rectangles(
-    table: Rectangles | None, rays: RayBlock, at: int, t: FloatArray, codes: IntArray
-) -> None:
-    """The same for rectangles."""
-    if table is not None:
+    @kernel
+    def of_table(table: Any, rays: RayBlock, at: int, t: FloatArray, codes: IntArray) -> None:
         for i in range(len(table.face)):
-            place = (row(table.center, i), row(table.normal, i))
-            shape = (*place, row(table.x_of, i), row(table.y_of, i))
-            rectangle.nearer(rays.numbers, at, shape, RECTANGLE * KIND + i, t, codes)
+            nearer(rays.numbers, at, arguments(table, i), code * KIND + i, t, codes)
+
+    return of_table
 
 
-@kernel
-def nearer_boxes(
-    boxes: Boxes | None, rays: RayBlock, at: int, t: FloatArray, codes: IntArray
-) -> None:
-    """The same for boxes."""
-    if boxes is not None:
-        for i in range(len(boxes.face)):
-            box.nearer(rays.numbers, at, box.arguments(boxes, i), BOX * KIND + i, t, codes)
+_NEARER = {
+    code: _nearer_by(code, module) for code, _, _, module in TABLES if hasattr(module, "nearer")
+}
+"""The types with SIMD kernels for VECTOR_WIDTH rays."""
 
+SIDE_BY_SIDE = tuple(_NEARER)
+ONE_BY_ONE = tuple(code for code, _, _, _ in TABLES if code not in _NEARER)
 
 Packed = Annotated[FloatArray, 3]
 """The SoA layout of the shapes of one type: packets (k, columns, VECTOR_WIDTH)."""
-
-_NEARER: dict[int, Callable[..., None]] = {
-    SPHERE: nearer_spheres,
-    RECTANGLE: nearer_rectangles,
-    BOX: nearer_boxes,
-}
-"""The types with SIMD kernels."""
 
 _CODES = {module: code for code, _, _, module in TABLES}
 _KINDS = len(TABLES)
@@ -177,7 +153,7 @@ def _nearest_by(module: Any) -> Callable[..., Hit]:
     def of_others(table: Any, ray: Ray, closest: Hit) -> Hit:
         return nearest_in_table(kind, table, ray, closest)
 
-    if kind in _NEARER:
+    if hasattr(module, "lane_distance"):
         return of_packets
     return of_triangles if kind == TRIANGLE else of_others
 
@@ -203,7 +179,7 @@ def _linked_nearest(shapes: Any, packets: Any, ray: Ray) -> Hit:
 def _of_block_by(module: Any) -> Callable[..., None]:
     """The kernel of `nearest_of_block` for a type of shape."""
     kind = _CODES[module]
-    nearer = _NEARER.get(kind, nearer_spheres)
+    nearer = _NEARER.get(kind, _NEARER[SPHERE])
 
     @kernel
     def of_rays(table: Any, rays: RayBlock, hits: HitBlock, n: int) -> None:
@@ -275,12 +251,12 @@ def _linked_nearest_of_rays(
     """`brute_force.nearest_of_rays` through a link; it completes the hits too."""
     for j in range(min(BLOCK, n + VECTOR_WIDTH - 1)):
         hits.numbers[j], hits.codes[j] = rays.numbers[6 * BLOCK + j], -1
-    for kind in (SPHERE, RECTANGLE, BOX):
+    for kind in SIDE_BY_SIDE:
         nearest_of_block(shapes, kind, rays, hits, n, any_hit)
     if not any_hit:
-        for kind in (SPHERE, RECTANGLE, BOX):  # spheres first: their codes are below KIND
+        for kind in SIDE_BY_SIDE:  # spheres first: their codes are below KIND
             complete_block(shapes, kind, rays, hits, n)
-    for kind in range(TRIANGLE, _KINDS):
+    for kind in ONE_BY_ONE:
         nearest_of_block(shapes, kind, rays, hits, n, any_hit)
 
 
@@ -298,21 +274,29 @@ def _nearest(shapes: Shapes, packets: Packets, ray: Ray) -> Hit:
     closest = nearest_in_packets(SPHERE, shapes.spheres, packets.spheres, ray, closest)
     closest = nearest_in_packets(RECTANGLE, shapes.rectangles, packets.rectangles, ray, closest)
     closest = nearest_in_packets(BOX, shapes.boxes, packets.boxes, ray, closest)
-    return _nearest_of_others(shapes, ray, closest)
+    closest = _nearest_triangle(shapes.triangles, ray, closest)
+    found: Hit = _nearest_without_packets(shapes, ray, closest)
+    return found
 
 
-_without_packets = ByCode(
-    (code, field, module)
-    for code, field, _, module in TABLES
-    if code != TRIANGLE and not hasattr(module, "lane_distance")
-)
-_nearest_in_tables = _without_packets.in_turn(nearest_in_table)
+def _tables_without(*names: str) -> ByCode:
+    """The types, without triangles, whose modules have none of these kernels."""
+    return ByCode(
+        (code, field, module)
+        for code, field, _, module in TABLES
+        if code != TRIANGLE and not any(hasattr(module, name) for name in names)
+    )
+
+
+_nearest_without_packets = _tables_without("lane_distance").in_turn(nearest_in_table)
+_one_by_one = _tables_without("nearer")
+_nearest_one_by_one = _one_by_one.in_turn(nearest_in_table)
 
 
 @kernel
 def _nearest_of_others(shapes: Shapes, ray: Ray, closest: Hit) -> Hit:
     """The nearest of `closest` and all shapes of types without SIMD kernels."""
-    found: Hit = _nearest_in_tables(shapes, ray, _nearest_triangle(shapes.triangles, ray, closest))
+    found: Hit = _nearest_one_by_one(shapes, ray, _nearest_triangle(shapes.triangles, ray, closest))
     return found
 
 
@@ -321,13 +305,13 @@ def _yes(kind: int, table: Any, found: bool) -> bool:
     return True
 
 
-_any_in_tables = _without_packets.in_turn(_yes)
+_any_one_by_one = _one_by_one.in_turn(_yes)
 
 
 @kernel
 def _has_others(shapes: Shapes) -> bool:
     """Whether the scene has types of shapes without SIMD kernels: a constant."""
-    return bool(_any_in_tables(shapes, shapes.triangles is not None))
+    return bool(_any_one_by_one(shapes, shapes.triangles is not None))
 
 
 @kernel
@@ -335,6 +319,26 @@ def _nearest_triangle(triangles: Triangles | None, ray: Ray, closest: Hit) -> Hi
     if triangles is None:
         return closest
     return nearest_in_table(TRIANGLE, triangles, shear_of(ray), closest)
+
+
+_nearer_in_table = ByClass("nearer_in_table")
+for _code, _, _table, _ in TABLES:
+    if _code in _NEARER:
+        _nearer_in_table.register(_table, _NEARER[_code])
+_nearer = _nearer_in_table.function
+
+
+@kernel
+def _step(
+    kind: int, table: Any, rays: RayBlock, at: int, t: FloatArray, codes: IntArray, done: bool
+) -> bool:
+    _nearer(table, rays, at, t, codes)
+    return done
+
+
+_nearer_in_tables = ByCode(
+    (code, field, module) for code, field, _, module in TABLES if code in _NEARER
+).in_turn(_step)
 
 
 @kernel
@@ -345,9 +349,7 @@ def _nearest_of_rays(shapes: Shapes, rays: RayBlock, hits: HitBlock, n: int, any
     t, codes = local_floats(VECTOR_WIDTH), local_integers(VECTOR_WIDTH)
     for at in range(0, n, VECTOR_WIDTH):
         begin(rays.numbers, at, t, codes)
-        nearer_spheres(shapes.spheres, rays, at, t, codes)
-        nearer_rectangles(shapes.rectangles, rays, at, t, codes)
-        nearer_boxes(shapes.boxes, rays, at, t, codes)
+        _nearer_in_tables(shapes, rays, at, t, codes, True)
         end(t, codes, at, hits.numbers, hits.codes)
     if any_hit and _has_others(shapes):
         for j in range(n):
@@ -368,13 +370,22 @@ def _hit_of_code(shapes: Shapes, ray: Ray, code: int, t: float) -> Hit:
     if code < 0:
         return no_hit(ray)
     kind, i = code // KIND, code % KIND
-    if shapes.rectangles is None and shapes.boxes is None:
+    if (
+        shapes.rectangles is None
+        and shapes.boxes is None
+        and shapes.disks is None
+        and shapes.quadrics is None
+    ):
         kind = SPHERE  # a constant, so that the branches below vanish
     found = Crossing(t, 0.0, 0.0)
     if kind == RECTANGLE:
         found = found_at(shapes.rectangles, i, ray, t)
     elif kind == BOX:
         found = found_at(shapes.boxes, i, ray, t)
+    elif kind == DISK:
+        found = found_at(shapes.disks, i, ray, t)
+    elif kind == QUADRIC:
+        found = found_at(shapes.quadrics, i, ray, t)
     return Hit(found.t, kind, i, found.u, found.v, -1)
 
 

@@ -47,10 +47,10 @@ class _Writer:
         number = self.builder.extract_value(value, at)
         return SimdVector(self.builder, broadcast(self.builder, number))
 
-    def vector(self, value: ir.Value, k: int) -> Vec3:
-        """Item k of a tuple, a `Vec3`, in every lane."""
-        components: list[Any] = [self.lanes(value, k, axis) for axis in range(3)]
-        return Vec3(*components)
+    def tuple_of(self, value: ir.Value, k: int, of: Any) -> Any:
+        """Item k of a tuple, a tuple of numbers itself such as a `Vec3`, in every lane."""
+        numbers = [self.lanes(value, k, place) for place in range(len(of))]
+        return of.instance_class(*numbers) if hasattr(of, "instance_class") else numbers
 
     def column(self, array_type: Any, rays: ir.Value, column: int, at: ir.Value) -> SimdVector:
         """One component (see `RayBlock.numbers`) of VECTOR_WIDTH rays."""
@@ -77,7 +77,7 @@ def make_nearer(distance: Callable[..., Any]) -> Callable[..., None]:
             rays_value, at_value, shape_value, code_value, t_value, codes_value = values
             numbers: list[Any] = [writer.column(rays, rays_value, k, at_value) for k in range(6)]
             arguments = [
-                writer.vector(shape_value, k)
+                writer.tuple_of(shape_value, k, part)
                 if isinstance(part, types.BaseTuple)
                 else writer.lanes(shape_value, k)
                 for k, part in enumerate(shape)

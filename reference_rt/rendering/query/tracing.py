@@ -16,6 +16,7 @@ from reference_rt.accel.array_query import (
     Primitives,
     TraceScratch,
     closest_one_by_one,
+    packet_place,
     rows_width,
     trace_packet,
 )
@@ -228,16 +229,10 @@ def closest(
         work.rays.numbers[k] = 1.0  # lanes without a ray are traced too
     waiting, filled, written = 0, 0, 0
     n, width = len(o), rows_width(o, d)
-    # Bands of TILE rows are traced in packets of TILE rows, and the rays after the last one in
-    # their order.
-    band = width * TILE
-    in_bands = n // band * band if width > TILE else 0
     for k in range(0, n, PACKET_SIZE):
-        begin, across = k, TILE
-        if k < in_bands:
-            begin, across = k // band * band + k % band // TILE, width
+        begin, across = packet_place(k, n, width)
         if k == written:
-            written = min(k + (band if k < in_bands else TOGETHER), n)
+            written = min(k + (TOGETHER if across == TILE else width * TILE), n)
             _put_misses(out, k, written)
         count = min(PACKET_SIZE, n - k)
         if filled > len(numbers) - MOST_ADDED:

@@ -129,6 +129,12 @@ nearer = make_nearer(distance)
 
 
 @kernel
+def arguments(spheres: Spheres, i: int) -> tuple[Vec3, float]:
+    """What `distance` takes after the ray."""
+    return row(spheres.center, i), spheres.radius[i]
+
+
+@kernel
 def spans(spheres: Spheres, i: int, ray: Ray) -> Spans:
     meets, near, far = roots(ray, row(spheres.center, i), spheres.radius[i])
     return one_span(near, 0.0, far, 0.0) if meets else no_spans()

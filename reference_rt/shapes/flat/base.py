@@ -109,6 +109,31 @@ def coordinates(table: Any, i: int, ray: Ray, t: float) -> tuple[float, float]:
 
 
 @kernel
+def arguments(table: Any, i: int) -> tuple[Vec3, Vec3, Vec3, Vec3]:
+    """What `met` takes after the ray."""
+    return row(table.center, i), row(table.normal, i), row(table.x_of, i), row(table.y_of, i)
+
+
+@kernel
+def met(ray: Ray, center: Vec3, normal: Vec3, x_of: Vec3, y_of: Vec3) -> tuple[float, float, float]:
+    """(t, x, y) where a line meets a plane, by the operations of `meet`, for SIMD.
+
+    For a parallel ray all are ±inf or NaN: any comparison with a limit fails.
+    """
+    from_center = ray.o - center
+    t = -dot(from_center, normal) / dot(ray.d, normal)
+    q = from_center + ray.d * t
+    return t, dot(q, x_of), dot(q, y_of)
+
+
+@kernel
+def found(table: Any, i: int, ray: Ray, t: float) -> Crossing:
+    """The crossing of shape i at t; its u, v are the local x, y."""
+    x, y = coordinates(table, i, ray, t)
+    return Crossing(t, x, y)
+
+
+@kernel
 def meet(table: Any, i: int, ray: Ray) -> Crossing:
     """Where the ray meets plane i, on either side; its u, v are x and y.
 
@@ -117,11 +142,8 @@ def meet(table: Any, i: int, ray: Ray) -> Crossing:
     incidence, the error of t |d| is at most 7 u r / cos, of x 13 u r |x_of| / cos, and of y
     likewise: a decision by x or y is right if it has a larger margin.
     """
-    t = -signed_distance(table, i, ray.o) / dot(ray.d, row(table.normal, i))
-    if (t > 0.0) & (t < math.inf):
-        x, y = coordinates(table, i, ray, t)
-        return Crossing(t, x, y)
-    return miss()
+    t, x, y = met(ray, *arguments(table, i))
+    return Crossing(t, x, y) if (t > 0.0) & (t < math.inf) else miss()
 
 
 @kernel

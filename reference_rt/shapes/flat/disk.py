@@ -9,8 +9,10 @@ from reference_rt.core.arrays import Bounds, FloatArray
 from reference_rt.core.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, SurfacePoint, miss
 from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.kernel import kernel
+from reference_rt.jit.simd import select
 from reference_rt.sampling.warp import around, concentric_disk
 from reference_rt.shapes.flat import base
+from reference_rt.shapes.ray_simd import make_nearer
 from reference_rt.shapes.shape import (
     LightPoint,
     Shape,
@@ -49,6 +51,18 @@ def bounds(disks: Disks) -> Bounds:
 def areas(disks: Disks) -> FloatArray:
     cross = np.cross(disks.x_edge, disks.y_edge)
     return np.asarray(math.pi * np.linalg.norm(cross, axis=1))
+
+
+@kernel
+def distance(ray: Ray, center: Vec3, normal: Vec3, x_of: Vec3, y_of: Vec3) -> float:
+    """The t > 0 at which a ray meets a disk, inf for a miss."""
+    t, x, y = base.met(ray, center, normal, x_of, y_of)
+    nearest: float = select((t > 0.0) & (x * x + y * y <= 1.0), t, math.inf)
+    return nearest
+
+
+nearer = make_nearer(distance)
+arguments, found = base.arguments, base.found
 
 
 @kernel

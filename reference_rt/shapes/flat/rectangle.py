@@ -207,23 +207,13 @@ def pack_all(rectangles: Rectangles) -> FloatArray:
 @kernel
 def distance(ray: Ray, center: Vec3, normal: Vec3, x_of: Vec3, y_of: Vec3) -> float:
     """The t > 0 at which a ray meets a rectangle, inf for a miss."""
-    from_center = ray.o - center
-    # For a parallel ray this is ±inf or NaN: both fail the comparisons.
-    t = -dot(from_center, normal) / dot(ray.d, normal)
-    q = from_center + ray.d * t
-    meets = (t > 0.0) & (abs(dot(q, x_of)) <= 1.0) & (abs(dot(q, y_of)) <= 1.0)
-    nearest: float = select(meets, t, math.inf)
+    t, x, y = base.met(ray, center, normal, x_of, y_of)
+    nearest: float = select((t > 0.0) & (abs(x) <= 1.0) & (abs(y) <= 1.0), t, math.inf)
     return nearest
 
 
 nearer = make_nearer(distance)
-
-
-@kernel
-def found(rectangles: Rectangles, i: int, ray: Ray, t: float) -> Crossing:
-    """The crossing of rectangle i at t; its u, v are the local x, y in [-1, 1]."""
-    x, y = base.coordinates(rectangles, i, ray, t)
-    return Crossing(t, x, y)
+arguments, found = base.arguments, base.found
 
 
 @kernel

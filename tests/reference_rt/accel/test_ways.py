@@ -28,7 +28,7 @@ from reference_rt.core.ray import (
     put_ray,
     ray_of,
 )
-from reference_rt.core.vec3 import Vec3, row
+from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel, local_floats
 from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.rendering import query
@@ -37,10 +37,6 @@ from reference_rt.rendering.kernels import Running
 from reference_rt.rendering.query import hits, tracing
 from reference_rt.rendering.query.tracing import link_to_geometry
 from reference_rt.scene import build_hierarchies
-from reference_rt.shapes import box
-from reference_rt.shapes.curved import sphere
-from reference_rt.shapes.flat import rectangle
-from reference_rt.shapes.ray_simd import make_plain_nearer
 
 KINDS = ("sphere", "rectangle", "box", "triangle")
 METHODS = ("brute force", "none", "sah", "median", "spatial")
@@ -200,7 +196,8 @@ def thrice(kinds):
 SCENES = {
     "two kinds": thrice(["rectangle", "box"]),
     "spheres": thrice(["sphere"]),
-    "three kinds": thrice(["sphere", "rectangle", "disk"]),
+    "five kinds": [*thrice(["sphere", "rectangle", "disk"]), rt.Cylinder(z_min=0.25),
+                   rt.Polygon(rings=[[(-1, -1, 0.25), (0.5, -1, 0.25), (0, 1, 0.25)]])],
     "a ball of triangles": [mesh(icosphere(3))],
     "a cube of triangles": [mesh(cube(7))],
     "solids and a plane": [mesh(icosphere(2)), rt.Sphere(center=(0.9, 0.2, 0.1), radius=0.4),
@@ -433,51 +430,6 @@ def test_a_packet_enters_what_its_rays_enter():
         assert packets > 20
         # Intervals forget which origin and which direction belong together.
         assert entered <= (1.2 if width == 0.0 else 5.0) * needed
-
-
-@entry_kernel
-def _nearer_rectangle(numbers, at, shape, t, codes):
-    rectangle.nearer(numbers, at, shape, 5, t, codes)
-
-
-@entry_kernel
-def _nearer_box(numbers, at, shape, t, codes):
-    box.nearer(numbers, at, shape, 5, t, codes)
-
-
-@entry_kernel
-def _nearer_sphere(numbers, at, shape, t, codes):
-    sphere.nearer(numbers, at, shape, 5, t, codes)
-
-
-NEARER = ((rectangle, 4, _nearer_rectangle), (box, 4, _nearer_box), (sphere, 1, _nearer_sphere))
-
-
-@pytest.mark.parametrize(("module", "vectors", "nearer"), NEARER, ids=["flat", "box", "sphere"])
-def test_vector_code_gives_the_bits_of_the_plain_kernel(module, vectors, nearer):
-    """Infinities, zeros and NaN included."""
-    rng = np.random.default_rng(72)
-    odd = np.array([0.0, -0.0, 1.0, -1.0, math.inf, -math.inf, math.nan, 1e300, 1e-310])
-    finite = 0
-    for _ in range(400):
-        numbers = rng.normal(size=RAY_FLOATS)
-        which = rng.random(RAY_FLOATS) < 0.1
-        numbers[which] = rng.choice(odd, which.sum())
-        values = rng.normal(size=(vectors, 3)) * 0.5
-        values[rng.random(values.shape) < 0.1] = 0.0
-        shape = tuple(Vec3(*map(np.float64, v)) for v in values)
-        if module is sphere:
-            shape = (*shape, np.float64(rng.uniform(0.5, 3)))
-        at = int(rng.choice([0, VECTOR_WIDTH]))
-        t, codes = np.full(VECTOR_WIDTH, rng.choice([math.inf, 2.0])), np.full(VECTOR_WIDTH, -1)
-        plain_t, plain_codes = t.copy(), codes.copy()
-        nearer(numbers, at, shape, t, codes)
-        with np.errstate(all="ignore"):
-            make_plain_nearer(module.distance)(numbers, at, shape, 5, plain_t, plain_codes)
-        assert t.tobytes() == plain_t.tobytes()
-        assert np.array_equal(codes, plain_codes)
-        finite += (codes == 5).sum()
-    assert finite > 200
 
 
 @pytest.mark.parametrize("spp", [1, 16, 37])
