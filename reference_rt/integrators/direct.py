@@ -155,6 +155,7 @@ def radiances(
         states=scratch.states,
         samples=scratch.samples,
         kept=local_floats(any_material.scratch_floats(scene.materials)),
+        sky=scratch.sky,
     )
     prepare(queue)
     rays, hits, waiting = scratch.rays, scratch.hits, Waiting(0, 0)
@@ -222,7 +223,7 @@ def _of_samples(
     shadows, scattered = waiting
     state = _part(direct.light_samples)
     for k in range(direct.light_samples):
-        connection = next_event_estimation(direct, scene, state, shading, sampler, k)
+        connection = next_event_estimation(direct, scene, state, shading, sampler, k, None)
         shadows = _enqueue(direct, scene, connection, j, shadows, queue)
     state = _part(direct.bsdf_samples)
     for k in range(direct.bsdf_samples):
@@ -278,7 +279,7 @@ def _trace(direct: DirectSetup, scene: SceneTables, waiting: Waiting, queue: Scr
         state, ray, j = state_of(scene, queue, k), ray_of(rays, k), queue.samples[k]
         hit = hit_of(scene.geometry, ray, hits, k)
         if hit.kind < 0:
-            add_vector(queue.totals, 0, j, environment_emission(direct, scene, state, ray))
+            add_vector(queue.totals, 0, j, environment_emission(direct, scene, state, ray, None))
             continue
         point = surface(scene, ray, hit)
         if any_light.is_area(scene.lights, point):
