@@ -155,6 +155,7 @@ def radiances(
         states=scratch.states,
         samples=scratch.samples,
         kept=local_floats(any_material.scratch_floats(scene.materials)),
+        sky=scratch.sky,
     )
     prepare(queue)
     rays, hits, waiting = scratch.rays, scratch.hits, Waiting(0, 0)
@@ -231,7 +232,7 @@ def _of_samples(
     state, group = _part(n), _group(n)
     for k in range(n):
         part = split_sample(sampler, n, k)
-        connection = next_event_estimation(direct, scene, state, shading, part, group)
+        connection = next_event_estimation(direct, scene, state, shading, part, group, None)
         shadows = _enqueue(direct, scene, connection, j, shadows, queue)
     n = direct.bsdf_samples
     state, group = _part(n), _group(n)
@@ -288,7 +289,7 @@ def _trace(direct: DirectSetup, scene: SceneTables, waiting: Waiting, queue: Scr
         state, ray, j = state_of(scene, queue, k), ray_of(rays, k), queue.samples[k]
         hit = hit_of(scene.geometry, ray, hits, k)
         if hit.kind < 0:
-            add_vector(queue.totals, 0, j, environment_emission(direct, scene, state, ray))
+            add_vector(queue.totals, 0, j, environment_emission(direct, scene, state, ray, None))
             continue
         point = surface(scene, ray, hit)
         if any_light.is_area(scene.lights, point):

@@ -8,7 +8,7 @@ rounds once, by IEEE's rules, in the order written: all results have the same bi
 with narrower vectors LLVM splits the instructions.
 
 A generic function has no branches.  It uses `select`, `smaller` and `larger` instead, the square
-root and the sign functions below, and &, | and `negated` for conditions; `only_where` for what few
+root and the other functions below, and &, | and `negated` for conditions; `only_where` for what few
 lanes need.  `simd_kernel` makes such a function callable from kernels."""
 
 import functools
@@ -31,6 +31,10 @@ VECTOR_WIDTH = 8
 """The vector width: eight float64 are one AVX-512 register."""
 
 LANES = range(VECTOR_WIDTH)
+
+TINY = 2.0**-1022
+"""The smallest normal number: what generic functions divide by in place of 0."""
+
 I32, I64 = ir.IntType(32), ir.IntType(64)
 F64_VECTOR = ir.VectorType(ir.DoubleType(), VECTOR_WIDTH)
 
@@ -100,7 +104,8 @@ class SimdVector:
     def compared(self, how: str, other: Any) -> Mask:
         return Mask(self.builder, self.builder.fcmp_ordered(how, self.value, self.of(other)))
 
-    __add__, __mul__, __rmul__ = (_arithmetic(name) for name in ("fadd", "fmul", "fmul"))
+    __add__, __mul__ = _arithmetic("fadd"), _arithmetic("fmul")
+    __radd__, __rmul__ = __add__, __mul__
     __sub__, __rsub__ = _arithmetic("fsub"), _arithmetic("fsub", is_reflected=True)
     __truediv__, __rtruediv__ = _arithmetic("fdiv"), _arithmetic("fdiv", is_reflected=True)
 
@@ -215,6 +220,18 @@ def with_sign(x: Any, sign: Any) -> Any:
     return np.copysign(x, sign) if isinstance(x, np.ndarray) else math.copysign(x, sign)
 
 
+def whole_part(x: Any) -> Any:
+    """The largest whole number that is at most x."""
+    if isinstance(x, SimdVector):
+        return x.call("floor")
+    return np.floor(x) if isinstance(x, np.ndarray) else float(math.floor(x))
+
+
+def number_at(array: Any, i: Any, k: int) -> Any:
+    """Number i + k of a C-contiguous array of float64, for a whole number i of each lane."""
+    return array.gather(i, k) if hasattr(array, "gather") else array.item(int(i) + k)
+
+
 def product_error(x: Any, y: Any, product: Any) -> Any:
     """The rounding error x y - product, exactly, for product = fl(x y).  Compiled it is one fused
     multiply-add; plain Python computes it in rational numbers."""
@@ -240,6 +257,15 @@ def _fused(typing_context: Any, x: Any, y: Any, z: Any) -> Any:
     return number(number, number, number), generate
 
 
+@intrinsic  # type: ignore[untyped-decorator]
+def _number_at(typing_context: Any, array: Any, i: Any, k: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        at = builder.add(builder.fptosi(values[1], I64), values[2])
+        return builder.load(builder.gep(data_of(context, builder, array, values[0]), [at]))
+
+    return types.float64(array, types.float64, types.int64), generate
+
+
 def _compiled_as(function: Callable[..., Any], one: Callable[..., Any]) -> None:
     """Compiled code calls `one` in place of `function`, with single numbers."""
     overload_kernel(function)(lambda *_: one)
@@ -251,6 +277,8 @@ _compiled_as(smaller, lambda a, b: b if b < a else a)
 _compiled_as(larger, lambda a, b: b if b > a else a)
 _compiled_as(square_root, lambda x: math.sqrt(x))
 _compiled_as(with_sign, lambda x, sign: math.copysign(x, sign))
+_compiled_as(whole_part, lambda x: np.floor(x))
+_compiled_as(number_at, lambda array, i, k: _number_at(array, i, k))
 _compiled_as(product_error, lambda x, y, product: _fused(x, y, -product))
 
 
@@ -303,6 +331,15 @@ class _Memory:
         value = self.builder.load(self._place(i, ir.DoubleType()))
         return SimdVector(self.builder, broadcast(self.builder, value))
 
+    def gather(self, i: SimdVector, k: int) -> SimdVector:
+        builder, found = self.builder, ir.Constant(F64_VECTOR, ir.Undefined)
+        whole = builder.fptosi(i.value, ir.VectorType(I64, VECTOR_WIDTH))
+        for lane in LANES:
+            at = builder.add(builder.extract_element(whole, I32(lane)), I64(k))
+            one = builder.load(builder.gep(self.data, [at]))
+            found = builder.insert_element(found, one, I32(lane))
+        return SimdVector(builder, found)
+
     def load_index(self, i: Any) -> _Index:
         value = self.builder.load(self._place(i, I32))
         return _Index(self.builder, self.builder.zext(value, I64))
@@ -324,6 +361,9 @@ class _PlainMemory:
 
     def everywhere(self, i: int) -> Any:
         return np.full(VECTOR_WIDTH, self.flat[i])
+
+    def gather(self, i: Any, k: int) -> Any:
+        return self.flat[i.astype(np.int64) + k]
 
     def load_index(self, i: int) -> int:
         return int(self.flat[i])
@@ -365,7 +405,7 @@ def simd_kernel(function: Callable[..., Any]) -> Callable[..., int]:
 
     - C-contiguous arrays of float64 or float32: load(i) is the vector of VECTOR_WIDTH numbers from
       number i on, everywhere(i) is number i in every lane, store(i, lanes) (float64 only) stores a
-      vector;
+      vector, and `number_at` (float64 only) gathers one number for each lane;
     - C-contiguous arrays of uint32: load_index(i) is number i, an integer;
     - float64 numbers: the same number in every lane;
     - integers, which may be added and multiplied.

@@ -32,6 +32,7 @@ from reference_rt.lights.dispatch import (
     ambient,
     area_pdf,
     background,
+    background_of,
     count,
     emitted,
     environment_pdf,
@@ -40,12 +41,13 @@ from reference_rt.lights.dispatch import (
     pick_probability,
     sample_fixed,
     sample_one,
+    sample_picked,
 )
 from reference_rt.lights.emitters import directional, point, projector, spot
 from reference_rt.lights.emitters.area import Areas
 from reference_rt.lights.emitters.constant import Ambient, Constant, Environment
 from reference_rt.lights.emitters.directional import Directional
-from reference_rt.lights.emitters.environment_map import EnvironmentMap
+from reference_rt.lights.emitters.environment_map import Ahead, EnvironmentMap, EnvironmentMaps
 from reference_rt.lights.emitters.point import Point
 from reference_rt.lights.emitters.projector import Projector
 from reference_rt.lights.emitters.spot import Spot
@@ -65,6 +67,8 @@ from reference_rt.lights.tables import (
     LinkedLights,
     depends_on_normal,
     depends_on_point,
+    map_of,
+    sky_floats,
 )
 
 AnyLight = Annotated[
@@ -89,6 +93,7 @@ __all__ = [
     "PROJECTOR",
     "SPOT",
     "TABLES",
+    "Ahead",
     "Ambient",
     "AnyLight",
     "Areas",
@@ -96,6 +101,7 @@ __all__ = [
     "Directional",
     "Environment",
     "EnvironmentMap",
+    "EnvironmentMaps",
     "LightSample",
     "LightSampler",
     "Lights",
@@ -107,15 +113,19 @@ __all__ = [
     "ambient",
     "area_pdf",
     "background",
+    "background_of",
     "count",
     "depends_on_normal",
     "depends_on_point",
     "emitted",
     "environment_pdf",
     "is_area",
+    "map_of",
     "pick",
     "pick_probability",
     "sample_fixed",
     "sample_one",
+    "sample_picked",
     "shadow_ray",
+    "sky_floats",
 ]

@@ -9,7 +9,8 @@ from typing import Any
 from reference_rt.core.ray import SurfacePoint
 from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.kernel import kernel
-from reference_rt.lights.emitters import area
+from reference_rt.lights.emitters import area, environment_map
+from reference_rt.lights.emitters.environment_map import Ahead
 from reference_rt.lights.light import AREA, ENVIRONMENT, NO_LIGHT, LightSample
 from reference_rt.lights.selection import choice
 from reference_rt.lights.selection.choice import Pick
@@ -35,9 +36,25 @@ def _background(lights: Lights, d: Vec3) -> Vec3:
     return Vec3(0.0, 0.0, 0.0)
 
 
+@kernel
+def background_of(ahead: Ahead | None, lights: Any, d: Vec3) -> Vec3:
+    """`background`, computed ahead or now."""
+    if ahead is None:
+        return background(lights, d)
+    return environment_map.radiance_ahead(ahead)
+
+
 @by_code("environment_density", code=str(ENVIRONMENT))
-def _environment_density(lights: Lights, arriving: Vec3) -> float:
+def _environment_density(lights: Lights, d: Vec3) -> float:
     return 0.0
+
+
+@kernel
+def _density_of(ahead: Ahead | None, lights: Any, d: Vec3) -> float:
+    if ahead is None:
+        found: float = _environment_density(emitters(lights), d)
+        return found
+    return environment_map.pdf_ahead(ahead)
 
 
 @kernel
@@ -94,6 +111,25 @@ def sample_one(
     kind, i = lights.choice.kind[k], lights.choice.row[k]
     found: LightSample = _sample(emitters(lights), kind, i, shapes, textures, p, u0, u1)
     return found
+
+
+@kernel
+def sample_picked(
+    ahead: Ahead | None,
+    lights: Lights,
+    k: int,
+    shapes: Shapes,
+    textures: Textures | None,
+    p: Vec3,
+    u0: float,
+    u1: float,
+) -> LightSample:
+    """`sample_one`, computed ahead for an environment map or now."""
+    if ahead is None:
+        return sample_one(lights, k, shapes, textures, p, u0, u1)
+    if lights.choice.kind[k] == ENVIRONMENT:  # type: ignore[union-attr]
+        return environment_map.sample_ahead(ahead)
+    return sample_one(lights, k, shapes, textures, p, u0, u1)
 
 
 @by_code("sample")
@@ -163,9 +199,9 @@ def area_pdf(lights: Lights, shapes: Shapes, p: Vec3, n: Vec3, q: SurfacePoint) 
 
 
 @kernel
-def environment_pdf(lights: Lights, p: Vec3, n: Vec3, arriving: Vec3) -> float:
-    """The same for a direction to the environment, by the radiance of its `background`."""
-    density: float = _environment_density(emitters(lights), arriving)
+def environment_pdf(ahead: Ahead | None, lights: Lights, p: Vec3, n: Vec3, d: Vec3) -> float:
+    """The same for a direction d to the environment, computed ahead or now."""
+    density = _density_of(ahead, lights, d)
     if density == 0.0:
         return 0.0
     return density * pick_probability(lights, p, n, count(lights) - 1)

@@ -19,7 +19,7 @@ from reference_rt.lights.emitters import (
 from reference_rt.lights.emitters.area import Areas
 from reference_rt.lights.emitters.constant import Environment
 from reference_rt.lights.emitters.directional import Directionals
-from reference_rt.lights.emitters.environment_map import EnvironmentMaps
+from reference_rt.lights.emitters.environment_map import AHEAD_FLOATS, EnvironmentMaps
 from reference_rt.lights.emitters.point import Points
 from reference_rt.lights.emitters.projector import Projectors
 from reference_rt.lights.emitters.spot import Spots
@@ -78,8 +78,8 @@ class _Surroundings:
 
     @staticmethod
     @kernel
-    def environment_density(environment: Any, arriving: Vec3) -> float:
-        found: float = _density_of(environment, arriving)
+    def environment_density(environment: Any, d: Vec3) -> float:
+        found: float = _density_of(environment, d)
         return found
 
     @staticmethod
@@ -156,6 +156,40 @@ constant."""
 
 depends_on_normal = _for("depends_on_normal", _normal_matters, _always)
 """depends_on_normal(lights): whether any probability depends on the normal n: a constant."""
+
+
+@kernel
+def _map_of(lights: Lights) -> EnvironmentMaps | None:
+    found: EnvironmentMaps | None = _as_map(lights.environment)
+    return found
+
+
+@kernel
+def _no_map(lights: Any) -> None:
+    return None
+
+
+_maps = ByClass("as_map")
+_maps.register(EnvironmentMaps, _themselves)
+_maps.register(Environment, _no_map)
+_maps.register(type(None), _no_map)
+_as_map = _maps.function
+
+map_of = _for("map_of", _map_of, _no_map)
+"""map_of(lights): the environment map whose light is computed ahead, None if there is none."""
+
+
+@kernel
+def sky_floats(lights: Any) -> int:
+    """The size of the scratch buffer for what is computed ahead."""
+    return _floats_for(map_of(lights))
+
+
+@kernel
+def _floats_for(sky: EnvironmentMaps | None) -> int:
+    if sky is None:
+        return 0
+    return AHEAD_FLOATS
 
 
 @kernel

@@ -35,6 +35,7 @@ from reference_rt.integrators.scene_tables import SceneTables, surface
 from reference_rt.integrators.shading import texture_place
 from reference_rt.jit.kernel import ByClass, entry_kernel, kernel, local_floats, local_integers
 from reference_rt.jit.links import Link
+from reference_rt.lights import sky_floats
 from reference_rt.materials import scratch_floats
 from reference_rt.sampling import (
     PAIR_FLOATS,
@@ -211,6 +212,7 @@ def render_tile(
         states=local_floats(STATE_FLOATS),
         samples=local_integers(BLOCK),
         kept=local_floats(scratch_floats(scene.materials)),
+        sky=local_floats(sky_floats(scene.lights)),
     )
     weights = local_floats(BLOCK)
     samplers = Samplers(

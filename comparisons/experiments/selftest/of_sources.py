@@ -98,8 +98,8 @@ OF_KERNELS = (
     ),
     SourceFault(
         "pdf of the sky 5 % small", "environment", "lights/emitters/environment_map.py",
-        "float(luminance(arriving) / table.total[0])",
-        "float(luminance(arriving) / table.total[0] * 0.95)",
+        "found.radiance, found.light / table.total[0], wi",
+        "found.radiance, found.light / table.total[0] * 0.95, wi",
     ),
     SourceFault(
         "probability of a light forgotten", "many_lights", "integrators/path.py",
@@ -242,8 +242,8 @@ FAULTS = (
     ),
     SourceFault(
         "sky off by half a texel", SKY, "lights/emitters/environment_map.py",
-        "    across = turns(right, -back) * width - 0.5\n",
-        "    across = turns(right, -back) * width\n",
+        "    across = turns(right, -back) * sky.width - 0.5\n",
+        "    across = turns(right, -back) * sky.width\n",
     ),
     SourceFault(
         "1/pi written as 0.32", BOX, "materials/bsdfs/diffuse.py",
@@ -287,7 +287,7 @@ FAULTS = (
     ),
     SourceFault(
         "a sky clamped at its seam", SKY, "lights/emitters/environment_map.py",
-        "        left += width\n    beside = left + 1 if left + 1 < width else 0\n",
-        "        left = 0\n    beside = min(int(column) + 1, width - 1)\n",
+        "    beside, row = select(x + 1.0 < sky.width, x + 1.0, 0.0), y * sky.width\n",
+        "    beside, row = smaller(x + 1.0, sky.width - 1.0), y * sky.width\n",
     ),
 )  # fmt: skip

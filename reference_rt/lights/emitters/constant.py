@@ -50,7 +50,7 @@ def radiance(environment: Environment, d: Vec3) -> Vec3:
 
 
 @kernel
-def pdf(environment: Environment, arriving: Vec3) -> float:
+def pdf(environment: Environment, d: Vec3) -> float:
     """The density of `sample` per solid angle, in every direction."""
     return PDF
 

@@ -2,25 +2,29 @@
 
 import math
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IdArray
 from reference_rt.core.model import Description, Positive
+from reference_rt.core.ray import BLOCK, put_vector, vector_of
 from reference_rt.core.transform import Transform, affine
 from reference_rt.core.vec3 import Vec3, dot, luminance, triple
 from reference_rt.jit.kernel import kernel
-from reference_rt.lights.light import NO_LIGHT, LightSample
-from reference_rt.sampling.distribution import (
-    blended,
-    blended_cell_of,
-    bracket,
-    guide,
-    guided_cell_of,
-    linear,
-    running_sums,
+from reference_rt.jit.simd import (
+    TINY,
+    VECTOR_WIDTH,
+    larger,
+    number_at,
+    select,
+    simd_kernel,
+    smaller,
+    square_root,
+    whole_part,
 )
+from reference_rt.lights.light import LightSample
+from reference_rt.sampling.distribution import guide, guided_cell_of, linear, running_sums
 from reference_rt.sampling.warp import on_circle, turns
 from reference_rt.textures.image_file import read_image
 
@@ -76,195 +80,285 @@ def orthogonal(steps: Transform) -> FloatArray:
 
 
 class EnvironmentMaps(NamedTuple):
-    """One map.  texels (h, w, 3): radiance, row 0 on top; to_map (1, 9): the world's directions in
-    the map's coordinates; down_sums (w + 1, h): running sums down each column of texels of the
-    luminance in its cells, in radiance times polar solid angle, the first column again at the end;
-    across_sums (w + 1,): running sums of whole columns of cells, in radiance times solid angle;
-    down_guides, across_guides: where to search in these, see `guide`; total (1,): the integral of
-    the luminance over all directions; polar (h, 2): sine and cosine of the rows' polar angles.
+    """One map.  texels (h, w, 3): radiance, row 0 on top; to_map (1, 9): the world's directions
+    in the map's coordinates; heights (h,): cosines of the rows' polar angles; down_sums (w,
+    h): running sums down each column of cells of their luminance, in radiance times solid angle;
+    across_sums (w + 1,): running sums of whole columns of cells; down_guides, across_guides: where
+    to search in these, see `guide`; total (1,): the sum of all.
 
     Radiance is bilinear between texels: across, texel x stands at azimuth 2 pi (x + 1/2) / w and
     the first follows the last; upright, texel y stands at polar angle pi y / (h - 1), so that the
-    top and the bottom row are the poles.  Cell (x, y) has its texel at the upper left corner.
+    top and the bottom row are the poles.  Cell (x, y) has its texel at the upper left corner.  For
+    samples the luminance in a cell is bilinear between its corners in azimuth and height, the
+    cosine of the polar angle, which makes its integral and its inverse elementary.
     """
 
     texels: FloatArray
     to_map: FloatArray
+    heights: FloatArray
     down_sums: FloatArray
     across_sums: FloatArray
     down_guides: IdArray
     across_guides: IdArray
     total: FloatArray
-    polar: FloatArray
 
 
 def tabulate(texels: FloatArray, to_world: FloatArray) -> EnvironmentMaps:
     """The table of an image (h, w, 3) of radiance;  to_world: an orthogonal (3, 3)."""
     height, width = texels.shape[:2]
-    step = math.pi / (height - 1)
-    angles = np.arange(height) * step
-    flat, rising = polar_weights(angles[:-1, None], step)
-    down_sums = np.zeros((width + 1, height))
+    heights = np.cos(np.linspace(0.0, math.pi, height))
+    solid_angles = (heights[:-1] - heights[1:]) * (2.0 * math.pi / width)
+    down_sums = np.empty((width, height))
     for x in range(0, width, 64):  # some at a time, since the table itself is what memory holds
-        light = np.asarray(luminance(Vec3(*np.moveaxis(texels[:, x : x + 64], -1, 0))))
-        masses = light[:-1] * np.maximum(flat - rising, 0.0) + light[1:] * rising
-        down_sums[x : x + masses.shape[1]] = running_sums(masses.T)
-    down_sums[width] = down_sums[0]
-    columns = down_sums[:, -1]
-    across_sums = running_sums((columns[:-1] + columns[1:]) * (math.pi / width))
+        columns = texels[:, np.arange(x, min(x + 64, width) + 1) % width]
+        light = np.asarray(luminance(Vec3(*np.moveaxis(columns, -1, 0))))
+        light = 0.5 * light[:, 1:] + 0.5 * light[:, :-1]
+        cells = (0.5 * light[1:] + 0.5 * light[:-1]) * solid_angles[:, None]
+        down_sums[x : x + 64] = running_sums(cells.T)
+    across_sums = running_sums(down_sums[:, -1])
     return EnvironmentMaps(
         texels=np.ascontiguousarray(texels),
         to_map=to_world.T.reshape(1, 9).copy(),
+        heights=heights,
         down_sums=down_sums,
         across_sums=across_sums,
         down_guides=guide(down_sums),
         across_guides=guide(across_sums[None])[0],
         total=across_sums[-1:].copy(),
-        polar=np.column_stack([np.sin(angles), np.cos(angles)]),
     )
 
 
-def polar_weights(start: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
-    """The integrals of sin(theta) and of sin(theta) (theta - start) / step, over the angles theta
-    from `start` as far as `step`.
+class _Sky(NamedTuple):
+    """What generic functions (`jit.simd`) read;  right, up, back: the rows of `to_map`;  width,
+    last: the numbers of columns and of rows of cells."""
 
-    With t = theta - start: sin(start + t) has the integral 2 sin(t/2) sin(start + t/2), and
-    t sin(start + t) has 2 sin(t/2) cos(start + t/2) - t cos(start + t).
+    texels: Any
+    heights: Any
+    right: Vec3
+    up: Vec3
+    back: Vec3
+    width: Any
+    last: Any
+
+
+class Arriving(NamedTuple):
+    """wi: the direction in which `radiance` arrives;  light: the density of `sample` per solid
+    angle in that direction, times `EnvironmentMaps.total`."""
+
+    wi: Vec3
+    radiance: Vec3
+    light: Any
+
+
+@kernel
+def _sky(table: EnvironmentMaps) -> _Sky:
+    height, width = table.texels.shape[0], table.texels.shape[1]
+    m = table.to_map
+    axes = triple(m, 0, 0), triple(m, 0, 1), triple(m, 0, 2)
+    return _Sky(table.texels, table.heights, *axes, float(width), float(height - 1))
+
+
+@kernel
+def _texel(sky: _Sky, row: Any, x: Any) -> Vec3:
+    """A texel of the row that begins at texel number `row`."""
+    at, texels = 3.0 * (row + x), sky.texels
+    return Vec3(number_at(texels, at, 0), number_at(texels, at, 1), number_at(texels, at, 2))
+
+
+@kernel
+def _corners(sky: _Sky, x: Any, y: Any) -> tuple[Vec3, Vec3, Vec3, Vec3]:
+    """The texels at the corners of a cell: upper left, upper right, lower left, lower right."""
+    beside, row = select(x + 1.0 < sky.width, x + 1.0, 0.0), y * sky.width
+    upper = _texel(sky, row, x), _texel(sky, row, beside)
+    row = row + sky.width
+    return (*upper, _texel(sky, row, x), _texel(sky, row, beside))
+
+
+@kernel
+def _look_up(sky: _Sky, d: Vec3) -> Arriving:
+    """The light from direction d, of any length; a generic function."""
+    right, up, back = dot(sky.right, d), dot(sky.up, d), dot(sky.back, d)
+    out2 = right * right + back * back
+    across = turns(right, -back) * sky.width - 0.5
+    down = turns(square_root(out2), up) * (2.0 * sky.last)
+    column, y = whole_part(across), smaller(whole_part(down), sky.last - 1.0)
+    s, t = across - column, down - y
+    x = select(column < 0.0, column + sky.width, column)
+    a, b, c, e = _corners(sky, x, y)
+    upper, lower = a * (1.0 - s) + b * s, c * (1.0 - s) + e * s
+    top, bottom = number_at(sky.heights, y, 0), number_at(sky.heights, y, 1)
+    height = up / larger(square_root(out2 + up * up), TINY)
+    w = smaller(larger((top - height) / (top - bottom), 0.0), 1.0)
+    light = luminance(upper) * (1.0 - w) + luminance(lower) * w
+    return Arriving(d, upper * (1.0 - t) + lower * t, light)
+
+
+@kernel
+def _in_cell(sky: _Sky, x: Any, y: Any, u0: Any, u1: Any) -> Arriving:
+    """The direction in a cell at the shares u0 of its light down and u1 across; a generic
+    function."""
+    a, b, c, e = _corners(sky, x, y)
+    a_light, b_light, c_light, e_light = luminance(a), luminance(b), luminance(c), luminance(e)
+    s = linear(u1, a_light + c_light, b_light + e_light)
+    upper, lower = a * (1.0 - s) + b * s, c * (1.0 - s) + e * s
+    above, below = a_light * (1.0 - s) + b_light * s, c_light * (1.0 - s) + e_light * s
+    w = linear(u0, above, below)
+    height = number_at(sky.heights, y, 0) * (1.0 - w) + number_at(sky.heights, y, 1) * w
+    out = square_root(larger((1.0 - height) * (1.0 + height), 0.0))
+    t = smaller(larger(turns(out, height) * (2.0 * sky.last) - y, 0.0), 1.0)
+    azimuth = (x + 0.5 + s) / sky.width
+    cosine, sine = on_circle(select(azimuth < 1.0, azimuth, azimuth - 1.0))
+    across = sky.right * (out * sine) - sky.back * (out * cosine)
+    light = above * (1.0 - w) + below * w
+    return Arriving(across + sky.up * height, upper * (1.0 - t) + lower * t, light)
+
+
+class _Cell(NamedTuple):
+    """A cell, and the shares of its light down and across at a sample."""
+
+    x: float
+    y: float
+    u0: float
+    u1: float
+
+
+@kernel
+def _cell_of(table: EnvironmentMaps, u0: float, u1: float) -> _Cell:
+    """The cell of a sample: u1 chooses the column, u0 the row in it.
+
+    In this order samples of a stratum stay closer together than in the other: for the irradiance
+    from ten kinds of skies and rooms, 64 Sobol' points have 0.5 to 1.0 of the variance (measured).
     """
-    chord, middle = 2.0 * math.sin(0.5 * step), start + 0.5 * step
-    rising = chord * np.cos(middle) - step * np.cos(start + step)
-    return chord * np.sin(middle), np.maximum(rising, 0.0) / step
+    x = guided_cell_of(table.across_sums, table.across_guides, u1)
+    column = table.down_sums[x]
+    y = guided_cell_of(column, table.down_guides[x], u0)
+    return _Cell(float(x), float(y), _share(column, y, u0), _share(table.across_sums, x, u1))
+
+
+@kernel
+def _share(sums: FloatArray, i: int, u: float) -> float:
+    """Where in cell i the share u of all is, from 0 to 1."""
+    cell = sums[i + 1] - sums[i]
+    if cell <= 0.0:
+        return 0.0
+    return float(min(max((u * sums[-1] - sums[i]) / cell, 0.0), 1.0))
 
 
 @kernel
 def radiance(table: EnvironmentMaps, d: Vec3) -> Vec3:
     """The radiance from direction d, of any length."""
-    height, width = table.texels.shape[0], table.texels.shape[1]
-    right, up, back = (
-        dot(triple(table.to_map, 0, 0), d),
-        dot(triple(table.to_map, 0, 1), d),
-        dot(triple(table.to_map, 0, 2), d),
-    )
-    across = turns(right, -back) * width - 0.5
-    down = turns(math.sqrt(right * right + back * back), up) * (2.0 * (height - 1))
-    column, line = math.floor(across), min(int(down), height - 2)
-    s, t = across - column, down - line
-    left = int(column)
-    if left < 0:
-        left += width
-    beside = left + 1 if left + 1 < width else 0
-    upper = texel(table, line, left) * (1.0 - s) + texel(table, line, beside) * s
-    lower = texel(table, line + 1, left) * (1.0 - s) + texel(table, line + 1, beside) * s
-    arriving: Vec3 = upper * (1.0 - t) + lower * t
-    return arriving
+    return _look_up(_sky(table), d).radiance
 
 
 @kernel
-def texel(table: EnvironmentMaps, y: int, x: int) -> Vec3:
-    texels = table.texels
-    return Vec3(texels[y, x, 0], texels[y, x, 1], texels[y, x, 2])
-
-
-@kernel
-def pdf(table: EnvironmentMaps, arriving: Vec3) -> float:
-    """The density of `sample` per solid angle in a direction of this radiance: its luminance, over
-    the integral of the luminance."""
-    return float(luminance(arriving) / table.total[0])
+def pdf(table: EnvironmentMaps, d: Vec3) -> float:
+    """The density of `sample` per solid angle in direction d, of any length."""
+    return float(_look_up(_sky(table), d).light / table.total[0])
 
 
 @kernel
 def sample(table: EnvironmentMaps, u0: float, u1: float) -> LightSample:
-    """A direction with a density exactly proportional to its luminance: u1 inverts the integral
-    over the azimuth, u0 that over polar angles there.
-
-    In this order samples of a stratum stay closer together than in the other: for the irradiance
-    from ten kinds of skies and rooms, 64 Sobol' points have 0.5 to 1.0 of the variance (measured).
-    """
-    height, width = table.texels.shape[0], table.texels.shape[1]
-    x = guided_cell_of(table.across_sums, table.across_guides, u1)
-    cell = table.across_sums[x + 1] - table.across_sums[x]
-    if cell <= 0.0:
-        return NO_LIGHT
-    last = height - 1
-    before, after = table.down_sums[x, last], table.down_sums[x + 1, last]
-    s = linear((u1 * table.total[0] - table.across_sums[x]) / cell, before, after)
-    mass = u0 * blended(table.down_sums, x, s, last)
-    low, high = bracket(table.down_guides, x, u0)
-    y = blended_cell_of(table.down_sums, x, s, mass, low, high)
-    above = blended(table.down_sums, x, s, y)
-    cell = blended(table.down_sums, x, s, y + 1) - above
-    beside = x + 1 if x + 1 < width else 0
-    upper = texel(table, y, x) * (1.0 - s) + texel(table, y, beside) * s
-    lower = texel(table, y + 1, x) * (1.0 - s) + texel(table, y + 1, beside) * s
-    t = _down_in_cell(table, y, luminance(upper), luminance(lower), mass - above, cell)
-    arriving = upper * (1.0 - t) + lower * t
-    azimuth = (x + 0.5 + s) / width
-    cosine, sine = on_circle(azimuth if azimuth < 1.0 else azimuth - 1.0)
-    upwards, out = on_circle((y + t) / (2.0 * last))
-    wi = (
-        triple(table.to_map, 0, 0) * (out * sine)
-        + triple(table.to_map, 0, 1) * upwards
-        - triple(table.to_map, 0, 2) * (out * cosine)
-    )
-    return LightSample(wi, arriving, pdf(table, arriving), wi, math.inf, False)
-
-
-LOW_CELL = math.pi / 64.0
-"""The largest height of a cell for which the series of `_down_in_cell` has enough terms."""
+    """A direction with a density that is proportional to the luminance, but for its course within a
+    cell: see `EnvironmentMaps`."""
+    cell = _cell_of(table, u0, u1)
+    found = _in_cell(_sky(table), cell.x, cell.y, cell.u0, cell.u1)
+    return _sampled(table, found)
 
 
 @kernel
-def _down_in_cell(
-    table: EnvironmentMaps, y: int, a: float, b: float, mass: float, cell: float
-) -> float:
-    """The place t in a cell of row y, from 0 to 1, at which the integral over polar angles of the
-    luminance, a on top and b at the bottom, is `mass`, of `cell` at 1: by Newton's iteration, kept
-    inside the bounds found so far.
+def _sampled(table: EnvironmentMaps, found: Arriving) -> LightSample:
+    wi = found.wi
+    return LightSample(wi, found.radiance, found.light / table.total[0], wi, math.inf, False)
 
-    It begins with the place if luminance times sin(theta) were linear, and ends with an error of
-    2^-32 of a cell, the spacing of the numbers that samplers draw.  The density is a product of two
-    functions that are concave and not negative, so that a step d from t leaves an error of at most
-    d² / min(t, 1 - t).  In low cells it is c0 + c1 t + ... + c6 t^6: of sin(theta) there are the
-    terms up to t^5 of its series, and the next is below 2e-11 of it.
-    """
-    if cell <= 0.0:
-        return 0.5
-    step, d = math.pi / (table.texels.shape[0] - 1), b - a
-    sine, cosine = table.polar[y, 0], table.polar[y, 1]
-    s0, s1 = sine * step, cosine * step * step
-    s2, s3 = s0 * (-0.5 * step * step), s1 * (-1.0 / 6.0 * step * step)
-    s4, s5 = s2 * (-1.0 / 12.0 * step * step), s3 * (-1.0 / 20.0 * step * step)
-    c0, c1, c2, c3 = a * s0, a * s1 + d * s0, a * s2 + d * s1, a * s3 + d * s2
-    c4, c5, c6 = a * s4 + d * s3, a * s5 + d * s4, d * s5
-    i1, i2, i3, i4, i5, i6 = c1 / 2.0, c2 / 3.0, c3 / 4.0, c4 / 5.0, c5 / 6.0, c6 / 7.0
-    low, high = 0.0, 1.0
-    t = linear(mass / cell, a * sine, b * table.polar[y + 1, 0])
-    for _ in range(64):  # as many as halvings alone could take, and more
-        if step <= LOW_CELL:
-            integral = t * (c0 + t * (i1 + t * (i2 + t * (i3 + t * (i4 + t * (i5 + t * i6))))))
-            density = c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * (c5 + t * c6)))))
-        else:
-            angle = t * step
-            s, c = math.sin(angle), math.cos(angle)
-            flat = sine * s + cosine * (1.0 - c)
-            rising = sine * (angle * s + c - 1.0) + cosine * (s - angle * c)
-            integral = a * flat + d * rising / step
-            density = (a + d * t) * (sine * c + cosine * s) * step
-        excess = integral - mass
-        if excess > 0.0:
-            high = t
-        else:
-            low = t
-        following = 0.5 * (low + high)
-        if density > 0.0:
-            newton = t - excess / density
-            if low < newton < high:
-                following = newton
-        moved = following - t
-        if moved * moved <= 2.0**-32 * min(t, 1.0 - t) or abs(moved) <= 2.0**-32:
-            return following
-        t = following
-    return t
+
+# ---- for a block of paths at once: look-ups where rays escape, samples at surfaces ---------------
+
+AHEAD_FLOATS = 16 * BLOCK
+"""Columns of BLOCK numbers.  Those of rays that escape: the direction, then radiance and light of
+`Arriving`; those of surfaces: x and y of the cell, then u0 and u1, in their place all of
+`Arriving`."""
+
+_CELLS, _SAMPLES = 7 * BLOCK, 9 * BLOCK
+
+
+class Ahead(NamedTuple):
+    """What was computed ahead for one path: its place k in the columns of `numbers`."""
+
+    table: EnvironmentMaps
+    numbers: FloatArray
+    k: int
+
+
+def _sky_of(texels: Any, heights: Any, to_map: Any, width: Any, last: Any) -> _Sky:
+    m = [to_map.everywhere(i) for i in range(9)]
+    return _Sky(texels, heights, Vec3(*m[:3]), Vec3(*m[3:6]), Vec3(*m[6:]), width, last)
+
+
+@simd_kernel
+def _look_up_lanes(
+    texels: Any, heights: Any, to_map: Any, width: Any, last: Any, numbers: Any, k: Any
+) -> Any:
+    x, y, z = numbers.load(k), numbers.load(k + BLOCK), numbers.load(k + 2 * BLOCK)
+    found = _look_up(_sky_of(texels, heights, to_map, width, last), Vec3(x, y, z))
+    for column, value in enumerate((*found.radiance, found.light)):
+        numbers.store(k + (3 + column) * BLOCK, value)
+    return found.light > 0.0
+
+
+@simd_kernel
+def _in_cell_lanes(
+    texels: Any, heights: Any, to_map: Any, width: Any, last: Any, numbers: Any, k: Any
+) -> Any:
+    x, y, u0, u1 = (numbers.load(k + (_CELLS + column * BLOCK)) for column in range(4))
+    found = _in_cell(_sky_of(texels, heights, to_map, width, last), x, y, u0, u1)
+    for column, value in enumerate((*found.wi, *found.radiance, found.light)):
+        numbers.store(k + (_SAMPLES + column * BLOCK), value)
+    return found.light > 0.0
+
+
+@kernel
+def put_escaped(numbers: FloatArray, k: int, d: Vec3) -> None:
+    """Let ray k of those that escape have the direction d."""
+    put_vector(numbers, 0, k, d)
+
+
+@kernel
+def put_surface(table: EnvironmentMaps, numbers: FloatArray, k: int, u0: float, u1: float) -> None:
+    """Let the sample of surface k be that of (u0, u1)."""
+    cell = _cell_of(table, u0, u1)
+    numbers[_CELLS + k], numbers[_CELLS + BLOCK + k] = cell.x, cell.y
+    numbers[_SAMPLES + k], numbers[_SAMPLES + BLOCK + k] = cell.u0, cell.u1
+
+
+@kernel
+def compute_ahead(table: EnvironmentMaps, numbers: FloatArray, escaped: int, surfaces: int) -> None:
+    """Compute what `numbers` holds the arguments of, VECTOR_WIDTH at a time."""
+    texels, heights, to_map = table.texels, table.heights, table.to_map
+    width, last = float(texels.shape[1]), float(texels.shape[0] - 1)
+    for k in range(0, escaped, VECTOR_WIDTH):
+        _look_up_lanes(texels, heights, to_map, width, last, numbers, k)
+    for k in range(0, surfaces, VECTOR_WIDTH):
+        _in_cell_lanes(texels, heights, to_map, width, last, numbers, k)
+
+
+@kernel
+def radiance_ahead(ahead: Ahead) -> Vec3:
+    """`radiance` of a ray that escapes."""
+    return vector_of(ahead.numbers, 3, ahead.k)
+
+
+@kernel
+def pdf_ahead(ahead: Ahead) -> float:
+    """`pdf` of a ray that escapes."""
+    return float(ahead.numbers[6 * BLOCK + ahead.k] / ahead.table.total[0])
+
+
+@kernel
+def sample_ahead(ahead: Ahead) -> LightSample:
+    """`sample` at a surface."""
+    numbers, k = ahead.numbers, ahead.k
+    wi, arriving = vector_of(numbers, 9, k), vector_of(numbers, 12, k)
+    return _sampled(ahead.table, Arriving(wi, arriving, numbers[_SAMPLES + 6 * BLOCK + k]))
 
 
 def power(table: EnvironmentMaps, scene_radius: float) -> FloatArray:

@@ -53,8 +53,7 @@ def visible_beckmann(w: Vec3, u0: float, u1: float) -> Vec3:
     "Importance Sampling Microfacet-Based BSDFs using the Distribution of Visible Normals")."""
     sine = math.sqrt(w.x * w.x + w.y * w.y)
     x = _slope_seen(w.z, sine, u0)
-    # By symmetry from the lower half, where fewer digits cancel.
-    y = _slope_across(u1) if u1 < 0.5 else -_slope_across(1.0 - u1)
+    y = about_normal(max(u1, _LEAST))
     cos_phi, sin_phi = (w.x / sine, w.y / sine) if sine > 0.0 else (1.0, 0.0)
     return Vec3(sin_phi * y - cos_phi * x, -sin_phi * x - cos_phi * y, 1.0)
 
@@ -62,14 +61,13 @@ def visible_beckmann(w: Vec3, u0: float, u1: float) -> Vec3:
 @kernel
 def seen(cosine: float, sine: float, x: float) -> float:
     """The integral of 2 (cosine - sine x) exp(-x²) from -infinity to x."""
-    return cosine * SQRT_PI * math.erfc(-x) + sine * math.exp(-x * x)
+    return _seen(cosine, sine, x, math.exp(-x * x))
 
 
 @kernel
-def _slope_across(u: float) -> float:
-    """The quantile u of the slopes: the root of erfc(-x) = 2 u."""
-    u = max(u, _LEAST)
-    return _refined(1.0, 0.0, FAR, u * (2.0 * SQRT_PI), about_normal(u))
+def _seen(cosine: float, sine: float, x: float, gauss: float) -> float:
+    """The same, given exp(-x²)."""
+    return cosine * SQRT_PI * math.erfc(-x) + sine * gauss
 
 
 @kernel
@@ -93,9 +91,10 @@ def _refined(cosine: float, sine: float, most: float, goal: float, x: float) -> 
     """The root of `seen` = goal below `most`, to the last digits of the goal: by Halley's method
     from a start x near it.  The error after a step is about the cube of that before."""
     for _ in range(64):
-        off = goal - seen(cosine, sine, x)
+        gauss = math.exp(-x * x)
+        off = goal - _seen(cosine, sine, x, gauss)
         height = cosine - sine * x
-        slope = 2.0 * height * math.exp(-x * x)
+        slope = 2.0 * height * gauss
         if not (slope > 0.0 and abs(off) > _ROUNDED * goal):
             break
         step = off / slope

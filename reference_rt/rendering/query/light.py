@@ -13,7 +13,7 @@ from reference_rt.accel.array_query import Primitives
 from reference_rt.accel.geometry import Geometry, closest_hit, surface
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Ray, scaled
-from reference_rt.core.vec3 import normalize, row
+from reference_rt.core.vec3 import row
 from reference_rt.integrators.direct_light import direct
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.integrators.shading import shade
@@ -132,8 +132,7 @@ def pdf_kernel(
         if not valid:
             continue
         if found.codes[i, 0] < 0:
-            arriving = any_light.background(lights, normalize(ray.d))
-            out[i] = any_light.environment_pdf(lights, ray.o, row(n, i), arriving)
+            out[i] = any_light.environment_pdf(None, lights, ray.o, row(n, i), ray.d)
             continue
         q = surface(geometry, ray, hit_of(found, i))
         out[i] = any_light.area_pdf(lights, shapes, ray.o, row(n, i), q)

@@ -56,7 +56,7 @@ def _from_middle(h: float, x: float, y0: float, y1: float) -> float:
     tangents' sum."""
     x2, h2 = x * x, h * h
     r0, r1 = math.sqrt(x2 + y0 * y0 + h2), math.sqrt(x2 + y1 * y1 + h2)
-    return _TURN * turns(x * h * (y1 * r0 - y0 * r1), h2 * (r0 * r1) + x2 * (y0 * y1))
+    return float(_TURN * turns(x * h * (y1 * r0 - y0 * r1), h2 * (r0 * r1) + x2 * (y0 * y1)))
 
 
 @kernel
@@ -73,7 +73,7 @@ def solid_angle_of(h: float, x0: float, x1: float, y0: float, y1: float) -> floa
     ad, dc = x0 * x0 + y0 * y1 + h2, x0 * x1 + y1 * y1 + h2
     lower = a * b * c + ab * c + bc * a + ac * b
     upper = a * d * c + ad * c + dc * a + ac * d
-    return 2.0 * _TURN * turns(volume * (lower + upper), lower * upper - volume * volume)
+    return float(2.0 * _TURN * turns(volume * (lower + upper), lower * upper - volume * volume))
 
 
 @kernel

@@ -21,7 +21,6 @@ from reference_rt.materials.microfacet.ggx_and_smith import (
     MIN_ALPHA,
     AlphaParameter,
     Microfacets,
-    _slope_across,
     _slope_seen,
     density,
     g1,
@@ -124,9 +123,6 @@ def test_beckmanns_slopes_are_inverted_to_the_last_digits():
             found = seen(c, s, _slope_seen(c, s, u)) / seen(c, s, most)
             # erfc and exp are right to 2 u, and the sums and Newton's last step add some.
             assert abs(float(found - arb(u))) < 16 * U
-    for u in (*rng.uniform(0, 0.5, 200).tolist(), *(10.0 ** rng.uniform(-18, -1, 50)).tolist()):
-        found = seen(1, 0, _slope_across(u)) / (2 * arb.pi().sqrt())
-        assert abs(float(found / arb(u)) - 1) < (16 + 4 * abs(math.log(u))) * U  # x itself rounds
 
 
 @pytest.mark.parametrize("edge", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15])

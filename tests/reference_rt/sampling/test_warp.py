@@ -224,5 +224,7 @@ def test_about_normal():
     rng = np.random.default_rng(35)
     tails = 10.0 ** rng.uniform(-18, -1, 500)
     for u in (*rng.uniform(0, 1, 500), *tails, *(1.0 - tails[tails > 1e-8])):
-        assert about_normal(float(u)) == pytest.approx(ndtri(u) / math.sqrt(2), rel=2e-7, abs=1e-9)
+        # SciPy's are off by 4 u (measured).
+        expected = ndtri(u) / math.sqrt(2)
+        assert about_normal(float(u)) == pytest.approx(expected, rel=12 * U)
     assert about_normal(0.5) == 0.0
