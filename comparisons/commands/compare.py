@@ -79,10 +79,6 @@ def compare(
     Finished cases are kept in the output folder and not run again.
     """
     with compare_extra():
-        from comparisons.runs.processes import start_ahead, worker_of_cases
-
-        if fresh or not (out / "cases").is_dir():
-            start_ahead(worker_of_cases(threads))
         from comparisons.compare.budget import Budget
         from comparisons.compare.looks import FIRST, PARTED, PARTS, SECONDS
         from comparisons.results.case import exit_code

@@ -40,7 +40,7 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid, Sobol
 from reference_rt.scene.build import build_tables
 
-__all__ = ["Evidence", "Say", "Subject", "budgeted", "compare_scene", "gather", "run_case"]
+__all__ = ["Evidence", "Say", "Subject", "budgeted", "compare_scene", "gather"]
 
 
 # ---- the control cases: Mitsuba against itself, in another variant and with other seeds ----------
@@ -168,19 +168,6 @@ class Subject:
     scene: Scene
     reference: Scene | None = None
     witness: Scene | None = None
-
-
-def run_case(
-    scene: Scene, budget: Budget, say: Say, threads: int | None, rungs: tuple[str, ...]
-) -> Case:
-    """`compare_scene` in a worker process, Mitsuba too with `threads` threads."""
-    backend.mitsuba()
-    if threads is not None:
-        import drjit
-
-        # Not 1: Mitsuba 3.9.1 then waits for ever for the thread that decodes an .exr file.
-        drjit.set_thread_count(max(threads, 2))
-    return compare_scene(Subject(scene), budget, say, threads, rungs)
 
 
 def compare_scene(

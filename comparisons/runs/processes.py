@@ -116,20 +116,6 @@ class Ended:
     invalid: bool
 
 
-_ahead: list["_Child"] = []
-"""Children that were started before there was a request.  They end with this process."""
-
-
-def start_ahead(module: Sequence[str]) -> None:
-    """Start a child for `run` now: it imports while this process does."""
-    _ahead.append(_Child(tuple(module), ""))
-
-
-def worker_of_cases(threads: int | None) -> list[str]:
-    """The module that runs the cases of a suite, and its options, for `run`."""
-    return ["comparisons.suites.worker", *([] if threads is None else ["--threads", str(threads)])]
-
-
 class Children:
     """The child processes of this one, for its threads: each request takes one that is idle, or a
     new one."""
@@ -186,13 +172,9 @@ class Children:
             same = [c for c in self._idle if c.made_by == (module, folder) and c.is_fit()]
             if not same:  # no more processes than threads
                 others, self._idle = self._idle, []
-            ready = [c for c in _ahead if c.made_by == (module, folder) and c.is_fit()]
+            child = same[0] if same else _Child(module, folder)
             if same:
-                self._idle.remove(child := same[0])
-            elif ready:
-                _ahead.remove(child := ready[0])
-            else:
-                child = _Child(module, folder)
+                self._idle.remove(child)
             self._busy.add(child)
         for other in others:
             other.close()

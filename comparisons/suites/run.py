@@ -35,7 +35,7 @@ from comparisons.results.stored_case import (
 )
 from comparisons.runs import engine
 from comparisons.runs.engine import Count
-from comparisons.runs.processes import Ended, worker_of_cases
+from comparisons.runs.processes import Ended
 from comparisons.runs.provenance import provenance
 from comparisons.suites.keys import case_key
 from comparisons.suites.suite import Plan, Source, Work, folder_name
@@ -241,8 +241,9 @@ class Options:
     @property
     def worker(self) -> list[str]:
         """The module that runs cases, and its options."""
+        threads = [] if self.threads is None else ["--threads", str(self.threads)]
         runner = [] if self.runner is None else ["--runner", self.runner]
-        return [*worker_of_cases(self.threads), *runner]
+        return ["comparisons.suites.worker", *threads, *runner]
 
 
 def run_suite(source: Source, plan: Plan, options: Options) -> Run:

@@ -3,7 +3,7 @@
 It follows `comparisons.runs.processes`: it reads `Request`s and stores each case in the
 request's folder.
 
-`--runner module:function` replaces the function `run_case` (in tests, by one that crashes);
+`--runner module:function` replaces the function `compare` (in tests, by one that crashes);
 `--threads` is the number of threads it may use.
 """
 
@@ -25,9 +25,10 @@ from comparisons.results.stored_case import write_case
 from comparisons.runs.processes import carry_out, private_stdout, send
 from comparisons.suites.suite import Changes
 from reference_rt.cli.guarded import scene_warnings
+from reference_rt.rendering.scene import Scene
 
 Runner = Callable[..., Case]
-"""Called as `comparisons.compare.compare.run_case` is."""
+"""Called as `compare` is."""
 
 
 class Request(BaseModel):
@@ -54,7 +55,7 @@ class Request(BaseModel):
 def main() -> None:
     """Handle requests until standard input ends."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("--runner", default="comparisons.compare.compare:run_case")
+    parser.add_argument("--runner", default="comparisons.suites.worker:compare")
     parser.add_argument("--threads", type=int, default=None)
     options = parser.parse_args()
     faulthandler.enable()
@@ -123,6 +124,26 @@ def _replicates(budget: Budget) -> str:
         f"{budget.replicates} replicates, doubled until the question is decided or "
         f"{budget.seconds:g} s have passed"
     )
+
+
+def compare(
+    scene: Scene,
+    budget: Budget,
+    say: Callable[[str], None],
+    threads: int | None,
+    rungs: tuple[str, ...],
+) -> Case:
+    """`comparisons.compare.compare.compare_scene`, Mitsuba too with `threads` threads."""
+    from comparisons.compare.compare import Subject, compare_scene
+    from comparisons.mitsuba.backend import mitsuba
+
+    mitsuba()
+    if threads is not None:
+        import drjit
+
+        # Not 1: Mitsuba 3.9.1 then waits for ever for the thread that decodes an .exr file.
+        drjit.set_thread_count(max(threads, 2))
+    return compare_scene(Subject(scene), budget, say, threads, rungs)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -133,14 +132,3 @@ def test_an_interruption_keeps_what_is_done(tmp_path, number):
         with pytest.raises(ProcessLookupError):
             os.kill(int(worker), 0)
     assert [case.scene for case in read_stored_results(out).cases] == ["a"]
-
-
-def test_a_child_that_was_started_ahead_takes_the_first_request():
-    lines = "for line in sys.stdin: print(json.dumps({'failed': str(os.getpid())}), flush=True)"
-    command = (sys.executable, "-c", f"import json, os, sys\n{lines}")
-    children.start_ahead(command)
-    ahead = children._ahead[-1]
-    with closing(children.Children()) as found:
-        ended = found.carry_out(command, "", "{}", 60.0, lambda step: None)
-    assert ended.failure == str(ahead._process.pid)
-    assert ahead not in children._ahead
