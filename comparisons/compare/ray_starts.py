@@ -18,7 +18,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from comparisons import statistics
 from comparisons.mitsuba.backend import mitsuba
@@ -179,5 +179,5 @@ class Effect:
     @property
     def is_certain(self) -> bool:
         """Whether the image mean changes by more than its noise."""
-        least = stats.t.isf(SURE / 6.0, self._pairs - 1)
+        least = -special.stdtrit(self._pairs - 1, SURE / 6.0)
         return bool((np.abs(self.mean) > least * self.error).any())

@@ -8,7 +8,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from comparisons.results.case import FloatArray, Images, Metrics, RungResult
 from comparisons.statistics.metric_null import (
@@ -234,8 +234,8 @@ def _bias(
         noise = np.hypot(ours, math.sqrt(1.0 + filtered) * theirs)
         dof = min(_BY_PIXELS if is_known(x) else len(x) - 1 for x in replicates)
         of_one = LEVEL / 6.0  # three channels, two sides
-        missed = stats.norm.isf(of_one) * np.sqrt(_missed(replicates))
-        reach = np.hypot(stats.t.isf(of_one, dof) * noise, missed)
+        missed = -special.ndtri(of_one) * np.sqrt(_missed(replicates))
+        reach = np.hypot(special.stdtrit(dof, of_one) * noise, missed)
     excess = difference - MEAN_BIAS * scale - reach
     worst = int(np.argmax(excess))
     if not scale[worst]:

@@ -10,7 +10,7 @@ noise these pairs are distributed as the given pair would be without bias.
 import math
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from comparisons.results.case import FloatArray, Images
 from comparisons.statistics.metrics import LocalErrors, local_errors, relative_squares
@@ -179,7 +179,7 @@ def _scatter(maps: FloatArray) -> float:
         return 0.0
     # Over the total first: squares of dim pictures' variances would be 0.
     dof = max(1.0, 1.0 / max(float(((variance / total) ** 2).sum()), 1e-300))
-    quantile = float(stats.t.isf(LEVEL, dof))
+    quantile = -float(special.stdtrit(dof, LEVEL))
     return quantile * math.sqrt(total * (1.0 + 1.0 / len(maps)))
 
 

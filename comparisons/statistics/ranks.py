@@ -43,7 +43,7 @@ from functools import partial
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special
 from scipy.linalg import hadamard
 
 from comparisons.results.case import FloatArray
@@ -55,6 +55,7 @@ from comparisons.statistics.scales import (
     cell_means,
     cell_pixels,
     cell_sums,
+    ranks_of,
 )
 from comparisons.statistics.sides import Side
 from comparisons.statistics.welch import are_unequal, noise_ratio
@@ -138,9 +139,9 @@ def uniformity(a: Side, b: Side, margins: Margins, level: float = 1.0) -> Unifor
         expected=expected,
         error=error,
         mean_beyond_margin=beyond_mean,
-        p_wide=float(stats.t.cdf((beyond_mean - expected) / error, dof)),
-        p_narrow=float(stats.t.sf(excess / error, dof)),
-        p_reversed=float(stats.t.sf(excess / of_reversed[0], of_reversed[1])),
+        p_wide=float(special.stdtr(dof, (beyond_mean - expected) / error)),
+        p_narrow=float(special.stdtr(dof, -excess / error)),
+        p_reversed=float(special.stdtr(of_reversed[1], -excess / of_reversed[0])),
         blocks=int(noisy.any(axis=-1).sum()),
         replicates=half,
         level=level * UNIFORMITY_LEVEL,
@@ -186,8 +187,7 @@ def _p_values(value: FloatArray, others: FloatArray) -> FloatArray:
 
 def _mean_p_values(sizes: FloatArray) -> FloatArray:
     """For each row of (K, n) the mean of its p-values among the other rows."""
-    ranks = stats.rankdata(sizes, axis=0)
-    return np.asarray((len(sizes) - ranks).mean(axis=1) / (len(sizes) - 1))
+    return np.asarray((len(sizes) - ranks_of(sizes)).mean(axis=1) / (len(sizes) - 1))
 
 
 # ---- the order of replicates, and noise that both sides share ------------------------------------

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 from scipy.ndimage import correlate1d
 
 from comparisons.results.case import FloatArray
@@ -82,7 +82,7 @@ def _in_cells(side: Side, seen: FloatArray, sums: Callable[[FloatArray], FloatAr
         lit = sums(scale * noisy)
         whole = sums(scale**2) / sums(scale)
         own = sums(scale**2 * noisy) / np.where(lit > 0.0, lit, 1.0)
-        size = side.event(scale, scale**-of_places)
+        size = side.event(scale, (1.0 / scale) ** of_places)
         found.append(size * np.where(lit > 0.0, own, whole))
     return np.asarray(np.max(found, axis=0))
 
@@ -183,7 +183,7 @@ def unseen(pictures: FloatArray, level: float) -> Unseen:
     energy = once.sum(axis=(0, 1))
     size = ratio((once**2).sum(axis=(0, 1)), energy)
     count = ratio(energy, size)
-    most = 0.5 * stats.chi2.isf(level / 3.0, 2.0 * (count + 1.0))  # three channels
+    most = 0.5 * special.chdtri(2.0 * (count + 1.0), level / 3.0)  # three channels
     # A channel counts by its energy: in a dark one a share says little.
     scale = np.maximum(total, DARK * total.mean())
     return Unseen(

@@ -85,3 +85,10 @@ def cell_pixels(images: FloatArray, tile: int) -> FloatArray:
 def cell_means(images: FloatArray, tile: int) -> FloatArray:
     """(..., height, width, 3) -> (..., rows, columns, 3)."""
     return np.asarray(cell_sums(images, tile) / cell_pixels(images, tile))
+
+
+def ranks_of(values: FloatArray) -> FloatArray:
+    """(R, ...) -> (R, ...): the rank of each among the R, from 1 on; equal ones have their mean."""
+    below = [np.count_nonzero(values < row, axis=0) for row in values]
+    equal = [np.count_nonzero(values == row, axis=0) for row in values]
+    return np.asarray(np.array(below) + 0.5 * (np.array(equal) + 1.0))

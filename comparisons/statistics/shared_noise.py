@@ -7,11 +7,11 @@ from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage, stats
+from scipy import ndimage, special
 from scipy.linalg import helmert
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.scales import HALF, cell_means, cell_sums, tile_sums
+from comparisons.statistics.scales import HALF, cell_means, cell_sums, ranks_of, tile_sums
 
 # ---- replicates without noise, or the same as others bit for bit: an error, or chance ------------
 #
@@ -135,7 +135,7 @@ def odd_replicate(pictures: FloatArray) -> OddReplicate | None:
     features = np.concatenate([blocks.mean(axis=-1, keepdims=True), blocks], axis=-1)
     middle = np.median(features, axis=0)
     noisy = features.std(axis=0) > 1e-6 * max(float(np.abs(middle).mean()), 1e-300)
-    ordered = stats.rankdata(features, axis=0) - 0.5 * (count + 1)
+    ordered = ranks_of(features) - 0.5 * (count + 1)
     every = np.where(noisy, ordered / (count - 1), 0.0)
     parts = _parts(middle[..., 0])
     tests = list(_tests(every, noisy, parts))
@@ -154,7 +154,7 @@ def odd_replicate(pictures: FloatArray) -> OddReplicate | None:
         errors, limit = furthest / (known * math.sqrt(max(shared, 1.0))), STANDARD_ERRORS
     else:
         errors = furthest / np.sqrt(np.maximum(variance * count / (count - 1), 1e-300))
-        limit = float(stats.t.isf(LEVEL / (2 * ranks.size), count - 2))
+        limit = -float(special.stdtrit(count - 2, LEVEL / (2 * ranks.size)))
     proven = (errors > limit) & (furthest > MATTERS)
     if not proven.any():
         return None
@@ -288,7 +288,8 @@ def correlated_pair(pictures: FloatArray) -> tuple[int, int, float] | None:
     if count < FEWEST_REPLICATES or pixels < FEWEST_PIXELS:
         return None
     z = np.where(noisy, deviation / np.where(noisy, scale, 1.0), 0.0)
-    bands = [_correlations(band) for band in (z, _detail(z))]
+    products = [_products(band) for band in (z, _detail(z))]
+    bands = [_correlations(band) for band in products]
     lowest = np.min([band - _highest_by_chance(band, pixels) for band in bands], axis=0)
     i, j = sorted(int(k) for k in np.unravel_index(np.argmax(lowest), lowest.shape))
     if lowest[i, j] > 0.0:
@@ -297,7 +298,7 @@ def correlated_pair(pictures: FloatArray) -> tuple[int, int, float] | None:
     # become negative, and hide that they are outliers. So they are judged by the others alone.
     least = np.min(bands, axis=0)
     i, j = sorted(int(k) for k in np.unravel_index(np.argmax(least), least.shape))
-    alone = [_beyond_others(band, i, j, pixels) for band in (z, _detail(z))]
+    alone = [_beyond_others(band, i, j, pixels) for band in products]
     return (i, j, float(bands[0][i, j])) if min(alone) > 0.0 else None
 
 
@@ -307,31 +308,37 @@ def _detail(z: FloatArray) -> FloatArray:
     return np.asarray(z - ndimage.convolve(z, around[None, :, :, None], mode="reflect"))
 
 
-def _correlations(deviations: FloatArray) -> FloatArray:
-    """(R, R): between replicates, -inf on the diagonal.
+def _products(deviations: FloatArray) -> FloatArray:
+    """(R, R): of the deviations of replicates, summed over a picture."""
+    z = deviations.reshape(len(deviations), -1)
+    return np.asarray(z @ z.T)
+
+
+def _correlations(products: FloatArray) -> FloatArray:
+    """(R, R): between replicates, -inf on the diagonal;  products: of deviations from their mean.
 
     Deviations of independent replicates from the common mean have a correlation of -1 / (R - 1),
     which is removed.
     """
-    count = len(deviations)
-    z = deviations.reshape(count, -1)
-    products = z @ z.T
+    count = len(products)
     length = np.sqrt(np.maximum(np.diag(products), 1e-300))
     found = products / np.outer(length, length) * (count - 1) / count + 1.0 / count
     np.fill_diagonal(found, -np.inf)
     return np.asarray(found)
 
 
-def _beyond_others(deviations: FloatArray, i: int, j: int, pixels: int) -> float:
+def _beyond_others(products: FloatArray, i: int, j: int, pixels: int) -> float:
     """By how much the correlation of replicates i and j, about the mean of the others, exceeds what
     the correlations of the others permit."""
-    count = len(deviations)
-    others = np.delete(deviations, (i, j), axis=0)
+    count = len(products)
+    others = np.delete(np.arange(count), (i, j))
+    about = np.eye(count)  # takes that mean from each replicate
+    about[:, others] -= 1.0 / (count - 2)
+    of_all = about @ products @ about.T
     # Both contain the noise of that mean, which is a correlation of 1 / (R - 1).
-    one, two = (deviations[k].ravel() - others.mean(axis=0).ravel() for k in (i, j))
-    length = math.sqrt(max(float(one @ one) * float(two @ two), 1e-300))
-    found = (float(one @ two) / length - 1.0 / (count - 1)) * (count - 1) / (count - 2)
-    pairs = _correlations(others - others.mean(axis=0))[np.triu_indices(count - 2, 1)]
+    length = math.sqrt(max(float(of_all[i, i] * of_all[j, j]), 1e-300))
+    found = (float(of_all[i, j]) / length - 1.0 / (count - 1)) * (count - 1) / (count - 2)
+    pairs = _correlations(of_all[np.ix_(others, others)])[np.triu_indices(count - 2, 1)]
     scatter = max(math.sqrt(float((pairs**2).mean())), 1.0 / math.sqrt(pixels))
     times = OUTLYING_ALONE[0] + OUTLYING_ALONE[1] / (count - 3) ** 2
     return found - max(CORRELATED, times * scatter, -2.0 * float(pairs.min()))
@@ -431,7 +438,7 @@ def _differences(pictures: FloatArray) -> FloatArray:
 
 def _log_factor(squares: FloatArray) -> float:
     scatter = float(np.log(np.maximum(squares, 1e-300)).std(ddof=1))
-    return float(stats.t.isf(BY_CHANCE, len(squares) - 1)) * scatter
+    return -float(special.stdtrit(len(squares) - 1, BY_CHANCE)) * scatter
 
 
 def _neighbours(z: FloatArray) -> float:

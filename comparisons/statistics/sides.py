@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special
 from scipy.ndimage import correlate1d
 
 from comparisons.results.case import FloatArray
@@ -234,7 +234,7 @@ def excess_by_filter(candidate: FloatArray, reference: FloatArray, variance: Flo
     power = float((z**2).sum()) / float(noisy.sum())
     error = PAIRS * power * math.sqrt(2.0 / float(pairs_near.sum()))
     quartile = PAIRS * float(np.quantile(found, 0.25))
-    total = quartile - stats.norm.ppf(0.25) * error * math.sqrt(len(found))
+    total = quartile - special.ndtri(0.25) * error * math.sqrt(len(found))
     return total if total > CLEAR * error else 0.0
 
 

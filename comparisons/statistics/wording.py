@@ -11,7 +11,7 @@ import math
 from typing import Any
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from comparisons.results.case import FloatArray
 from comparisons.statistics.ranks import Uniformity
@@ -292,7 +292,7 @@ def factor_needed(
 
 def _known(test: BiasTest) -> FloatArray:
     """The largest of the lower bounds, at 95 %, of the standard errors."""
-    bounds = [e.value * np.sqrt(e.dof / stats.chi2.isf(0.05, e.dof)) for e in test.errors]
+    bounds = [e.value * np.sqrt(e.dof / special.chdtri(e.dof, 0.05)) for e in test.errors]
     return np.asarray(np.max(bounds, axis=0))
 
 

@@ -150,7 +150,7 @@ class _LowerInlined(NativeLowering):
         call = _call(lowered.fndesc, state.library)
         state.targetctx.insert_func_defn([(call, stands_for_it, call.signature)])
         state["cr"] = lowered._replace(cfunc=stands_for_it)
-        return True
+        return False  # else Numba computes how long variables live once more
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -160,7 +160,8 @@ class _LowerEntry(NativeLowering):
     def run_pass(self, state: Any) -> bool:
         state.library = _Entry(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
-        return bool(super().run_pass(state))
+        super().run_pass(state)
+        return False
 
 
 class _AsStruct:

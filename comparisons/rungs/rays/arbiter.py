@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special
 
 from reference_rt.core.arrays import FloatArray, IntArray
 
@@ -42,7 +42,7 @@ AT_ONCE = 2000
 def too_many(count: int, total: int, limit: float = LIMIT) -> bool:
     """Whether `count` of `total` rays prove a fraction above `limit` (binomial test): of few rays
     one may be too many by chance."""
-    return bool(stats.binom.sf(count - 1, total, limit) < SURE)
+    return bool(special.bdtrc(count - 1, total, limit) < SURE)
 
 
 def directions(n: int) -> FloatArray:
