@@ -81,7 +81,8 @@ FEWEST_BLOCKS = 36
 """The mean rank of fewer blocks is not normal."""
 
 LEVEL = 1e-4
-"""Chance of a false alarm of all tests of one side together."""
+"""Chance of a false alarm of all tests of one side together.  It is larger where all pixels of a
+replicate share one brightness of few values: five of six may have one, and the sixth another."""
 
 STANDARD_ERRORS = 6.0
 """Threshold if blocks are independent, whose standard error is known: one false alarm in 10^6 for

@@ -44,10 +44,9 @@ def test_synthetic_pictures_are_pictures_and_new_for_each_seed(case: RightCase):
     assert not np.array_equal(candidate, other)
 
 
-@pytest.mark.cases(2)
-@pytest.mark.parametrize("case", of(case for case in CASES if not case.rendered))
+@pytest.mark.parametrize("case", of([case for case in CASES if not case.rendered][::8]))
 def test_right_synthetic_pictures_are_not_called_wrong(case: RightCase):
-    """A few seeds; a thousand in the slow test."""
+    """Two cases and two seeds; all cases and more seeds in the slow test."""
     found = alarms_of(case, 2, SCENES)
     assert found.false_alarms == 0, found.reasons
 
@@ -55,7 +54,10 @@ def test_right_synthetic_pictures_are_not_called_wrong(case: RightCase):
 @pytest.mark.slow
 @pytest.mark.parametrize("case", of(CASES))
 def test_false_alarms_of_a_right_renderer(case: RightCase):
-    found = alarms_of(case, 1000, SCENES)
+    """Defects that were found so raised false alarms in 8 % and 15 % of runs: 60 runs, of which one
+    may differ, miss a rate of 8 % with a probability of 0.04.  `reference-rt selftest --seeds`
+    makes more runs."""
+    found = alarms_of(case, 60, SCENES)
     assert found.holds, found.reasons
 
 
@@ -126,7 +128,7 @@ def test_a_bias_that_is_there_already_spoils_the_calibration():
 
 
 @pytest.mark.parametrize(
-    ("caught", "half", "holds"), [(0.99, 0.1, True), (0.96, 0.1, False), (0.99, 0.2, False)]
+    ("caught", "half", "holds"), [(0.99, 0.1, True), (0.96, 0.1, False), (0.99, 0.4, False)]
 )
 def test_what_holds(caught, half, holds):
     assert Calibration("scene", 100, 0.005, caught, half).holds == holds
@@ -134,6 +136,6 @@ def test_what_holds(caught, half, holds):
 
 @pytest.mark.slow
 def test_calibration_of_five_scenes():
-    found = calibration(300, SCENES)
+    found = calibration(100, SCENES, print)
     assert len(found) == 5
     assert all(one.holds for one in found), found

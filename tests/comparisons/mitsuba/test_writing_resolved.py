@@ -79,7 +79,7 @@ def test_every_shape(write, tmp_path):
         "polygons_fill_rules",
         *(
             pytest.param(name, marks=pytest.mark.slow)
-            for name in ("transforms", "quadrics", "cylinders_and_cones", "csg_dice", "csg_nested")
+            for name in ("transforms", "cylinders_and_cones", "csg_dice", "csg_nested")
         ),
     ],
 )

@@ -98,7 +98,7 @@ def test_noise_alone_agrees(picture, noise, counts) -> None:
 @pytest.mark.parametrize("count", [4, 16])
 def test_noise_alone_agrees_often(picture, noise, count) -> None:
     rng = np.random.default_rng(1)
-    for _ in range(300):
+    for _ in range(100):
         result = judged(noise(rng, picture, count), noise(rng, picture, count))
         assert result.status == "agree", result.reason
 

@@ -117,7 +117,7 @@ def test_independent_replicates_have_no_order(law: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_independent_replicates_have_no_order_in_many_cases(law: str) -> None:
-    cases = 500
+    cases = 100
     found = sum(alarms(law, count, cases) for count in (8, 16))
     assert found <= stats.binom.isf(1e-4, 2 * cases, ORDER_LEVEL)
 

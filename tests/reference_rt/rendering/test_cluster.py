@@ -50,24 +50,6 @@ def box():
 
 
 @pytest.mark.slow
-def test_workers_that_die(machines, box, small_units):
-    """Two of three, one of them replaced."""
-    for _ in range(3):
-        machines.start_worker()
-    killed = []
-
-    def watch(fraction):
-        if len(killed) < 2 and fraction > (0.1, 0.4)[len(killed)]:
-            killed.append(machines.workers[len(killed)])
-            killed[-1].send_signal(signal.SIGKILL)
-            if len(killed) == 2:
-                machines.start_worker()
-
-    assert same(rendered(box, machines.address, watch), rt.render(box))
-    assert len(killed) == 2
-
-
-@pytest.mark.slow
 def test_a_scheduler_that_restarts(machines, box, small_units):
     """With its workers, as a batch system does it."""
     machines.start_worker()
@@ -233,37 +215,30 @@ def test_no_scheduler(box, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_worker_killed_every_five_seconds_for_a_minute(machines, box, small_units):
-    """Of four; each is replaced; the scheduler is restarted once."""
+def test_a_worker_killed_at_every_tenth_of_a_render(machines, box, small_units):
+    """Of four; each is replaced, except the first; the scheduler is restarted once."""
     for _ in range(4):
         machines.start_worker()
-    scene = box.changed(sampler=rt.Sobol(spp=40000))
-    began = last = time.monotonic()
-    killed, restarted = [], []
+    scene = box.changed(sampler=rt.Sobol(spp=3000))
+    events = []
 
     def watch(fraction):
-        nonlocal last
-        now = time.monotonic()
-        if now - last < 5.0 or now - began > 65.0:
-            return
-        last = now
         alive = [worker for worker in machines.workers if worker.poll() is None]
-        if now - began > 30.0 and not restarted:
-            restarted.append(now)
+        if fraction < 0.1 * (len(events) + 1) or not alive:
+            return
+        restarts = len(events) == 4
+        events.append(fraction)
+        if restarts:
             machines.scheduler.kill()
             machines.scheduler.wait()
             machines.start_scheduler()
-            for worker in alive:
-                worker.kill()
+        for worker in alive if restarts else alive[:1]:
+            worker.kill()
+            if len(events) > 1:
                 machines.start_worker()
-        elif alive:
-            alive[0].kill()
-            killed.append(now)
-            machines.start_worker()
 
     assert same(rendered(scene, machines.address, watch), rt.render(scene))
-    assert len(killed) >= 8
-    assert restarted
+    assert len(events) >= 8
 
 
 # ---- descriptions of batch systems --------------------------------------------------------------
