@@ -388,8 +388,8 @@ FEW = 8
 """Lights that are picked by power alone; more are given a tree.  With a tree, variance times time
 is this many times that by power, for triangles strewn over a floor and 64 Sobol' points (measured):
 0.3 to 1.4 for 12 of them, 1.1 to 2.8 for 16, 0.3 for 24, 0.1 for 48 to 1,000, 0.4 for 10,000 and
-1.1 for 100,000; and for 8 points, which pick by power only some of the lights, 0.1 to 0.4 for 12 and
-0.1 for 16.  A pick takes a third to a half more of the time of a picture."""
+1.1 for 100,000; and for 8 points, which pick by power only some of the lights, 0.1 to 0.4 for 12
+and 0.1 for 16.  A pick takes a third to a half more of the time of a picture."""
 
 
 class LightSampler(NamedTuple):

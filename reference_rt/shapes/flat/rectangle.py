@@ -140,8 +140,8 @@ _NEAR = 2.0
 """A light nearer than this number of half diagonals is sampled by solid angle.  At this distance a
 square sampled by area gives the irradiance a relative variance of 0.01 in front of it and of 0.15
 to 0.5 obliquely per sample, less than that of a path, and of below 2e-5 for 64 Sobol' points, a
-fiftieth of that of a picture.  (Measured, in place of 3: 0.8 of the time of a ball and a floor under
-a lamp at 2 to 3 half diagonals, 1.00 to 1.03 of their variance.)"""
+fiftieth of that of a picture.  (Measured, in place of 3: 0.8 of the time of a ball and a floor
+under a lamp at 2 to 3 half diagonals, 1.00 to 1.03 of their variance.)"""
 
 _LEAST_SOLID_ANGLE = 2.0**-26
 """A light of a smaller solid angle is sampled by area: points in it are found by differences of
