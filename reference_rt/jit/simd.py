@@ -77,11 +77,9 @@ class SimdVector:
 
     def of(self, x: Any) -> ir.Value:
         """The LLVM value of `x`, a vector or a number that is the same in all lanes."""
-        return (
-            x.value
-            if isinstance(x, SimdVector)
-            else ir.Constant(F64_VECTOR, [float(x)] * VECTOR_WIDTH)
-        )
+        if isinstance(x, SimdVector):
+            return x.value
+        return ir.Constant(F64_VECTOR, [float(x)] * VECTOR_WIDTH)
 
     def call(self, name: str, *others: Any) -> "SimdVector":
         """Emit a call of an LLVM intrinsic."""
@@ -91,9 +89,7 @@ class SimdVector:
 
     def moved(self, by: int) -> "SimdVector":
         """A shuffle: lane k gets the number of lane k ^ by."""
-        which = ir.Constant(
-            ir.VectorType(I32, VECTOR_WIDTH), [lane ^ by for lane in range(VECTOR_WIDTH)]
-        )
+        which = ir.Constant(ir.VectorType(I32, VECTOR_WIDTH), [lane ^ by for lane in LANES])
         undefined = ir.Constant(F64_VECTOR, ir.Undefined)
         return SimdVector(self.builder, self.builder.shuffle_vector(self.value, undefined, which))
 
@@ -115,17 +111,10 @@ class SimdVector:
     def __abs__(self) -> "SimdVector":
         return self.call("fabs")
 
-    def __lt__(self, other: Any) -> Mask:
-        return self.compared("<", other)
-
-    def __le__(self, other: Any) -> Mask:
-        return self.compared("<=", other)
-
-    def __gt__(self, other: Any) -> Mask:
-        return self.compared(">", other)
-
-    def __ge__(self, other: Any) -> Mask:
-        return self.compared(">=", other)
+    __lt__ = functools.partialmethod(compared, "<")
+    __le__ = functools.partialmethod(compared, "<=")
+    __gt__ = functools.partialmethod(compared, ">")
+    __ge__ = functools.partialmethod(compared, ">=")
 
 
 def select(condition: Any, a: Any, b: Any) -> Any:

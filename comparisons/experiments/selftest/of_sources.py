@@ -147,7 +147,8 @@ OF_KERNELS = (
     ),
     SourceFault(
         "checks of a third", "whitted_classic", "textures/checker.py",
-        "    low_u = u - math.floor(u) < 0.5\n", "    low_u = u - math.floor(u) < 0.34\n",
+        "    is_low_u = u - math.floor(u) < 0.5\n",
+        "    is_low_u = u - math.floor(u) < 0.34\n",
     ),
     SourceFault(
         "the same numbers for two samples", LAYERS, "sampling/independent.py",

@@ -141,7 +141,7 @@ PLANTED: dict[str, tuple[str, Callable[[Patch], None], str]] = {
     ),
     "a sky's first column lost": (
         "environment",
-        _argument(environment_map, "texel", lambda table, y, x: (table, y, max(x, 1))),
+        _argument(environment_map, "_texel", lambda sky, row, x: (sky, row, np.maximum(x, 1))),
         "places at borders of texels differ; ",
     ),
     ".hdr half a mantissa brighter": ("hdr", _half_a_mantissa, "the pixel at"),
