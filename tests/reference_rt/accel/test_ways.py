@@ -376,7 +376,7 @@ def test_one_primitive_and_bounds_that_touch_infinity():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["two kinds", "spheres", "three kinds"])
+@pytest.mark.parametrize("name", ["two kinds", "spheres", "five kinds"])
 def test_brute_force_of_specialised_kernels(name):
     """Rays side by side against one shape, and one ray against shapes side by side."""
     geometry = rt.build_tables(rt.Scene(shapes=tuple(SCENES[name]))).geometry
