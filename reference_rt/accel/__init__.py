@@ -38,8 +38,8 @@ it the shapes are behind a link too, so each primitive of a leaf, except triangl
 Who decides:
 
 - `scene/build_hierarchies.py`: whether there is a BVH.  With `hierarchy: auto` there is none below
-  BVH_FROM = 40 primitives without solids and instances (a primitive that has no SIMD test counts
-  for ONE_BY_ONE = 10); with the other methods there always is.
+  BVH_FROM = 40 primitives without solids and instances (a quadric, or one that has no SIMD test,
+  counts for ONE_BY_ONE = 10); with the other methods there always is.
 - `block_query.py`, `array_query.py`: block, packet or single ray, as in the diagram.  What a scene
   lacks is None, so all but "coherent" is decided while the caller is compiled.
 - `rendering/query/tracing.py`: FEW, because packets and streams take longer to compile.  All
