@@ -127,6 +127,12 @@ _NEARER = {
 }
 """The types with SIMD kernels for VECTOR_WIDTH rays."""
 
+_nearer_in_table = ByClass("nearer_in_table")
+for _code, _, _table, _ in TABLES:
+    if _code in _NEARER:
+        _nearer_in_table.register(_table, _NEARER[_code])
+_nearer = _nearer_in_table.function
+
 SIDE_BY_SIDE = tuple(_NEARER)
 ONE_BY_ONE = tuple(code for code, _, _, _ in TABLES if code not in _NEARER)
 
@@ -179,14 +185,13 @@ def _linked_nearest(shapes: Any, packets: Any, ray: Ray) -> Hit:
 def _of_block_by(module: Any) -> Callable[..., None]:
     """The kernel of `nearest_of_block` for a type of shape."""
     kind = _CODES[module]
-    nearer = _NEARER.get(kind, _NEARER[SPHERE])
 
     @kernel
     def of_rays(table: Any, rays: RayBlock, hits: HitBlock, n: int) -> None:
         t, codes = local_floats(VECTOR_WIDTH), local_integers(VECTOR_WIDTH)
         for at in range(0, n, VECTOR_WIDTH):
             resume(hits.numbers, hits.codes, at, t, codes)
-            nearer(table, rays, at, t, codes)
+            _nearer(table, rays, at, t, codes)
             end(t, codes, at, hits.numbers, hits.codes)
 
     @kernel
@@ -319,13 +324,6 @@ def _nearest_triangle(triangles: Triangles | None, ray: Ray, closest: Hit) -> Hi
     if triangles is None:
         return closest
     return nearest_in_table(TRIANGLE, triangles, shear_of(ray), closest)
-
-
-_nearer_in_table = ByClass("nearer_in_table")
-for _code, _, _table, _ in TABLES:
-    if _code in _NEARER:
-        _nearer_in_table.register(_table, _NEARER[_code])
-_nearer = _nearer_in_table.function
 
 
 @kernel

@@ -1,7 +1,11 @@
 """The set of all linked kernels: every picture's linked kernels are in it."""
 
 import itertools
+import os
+import subprocess
+import sys
 import typing
+from pathlib import Path
 
 import numba
 import numpy as np
@@ -51,6 +55,33 @@ def known():
 def described(calls):
     """Of kernels, for messages: the source that is compiled, and for which types."""
     return {(kernel.py_func.__code__.co_filename, kernel.__name__, str(s)) for kernel, s in calls}
+
+
+def names_in_the_cache(calls):
+    """The names of the files that hold compiled kernels."""
+    codegen = numba.core.registry.cpu_target.target_context.codegen()
+    caches = ((kernel._cache, signature) for kernel, signature in calls)
+    return sorted(cache._path(cache._key(signature, codegen)).name for cache, signature in caches)
+
+
+NAMES = """
+from reference_rt.rendering.warm_up import linked_calls
+from test_warm_up import names_in_the_cache
+print(*names_in_the_cache(linked_calls()))
+"""
+
+
+def test_every_kernel_is_found_by_the_next_process(known):
+    """A name that held an address, or a function's pickled code, would be new each time."""
+    here = str(Path(__file__).parent)
+    found = subprocess.run(
+        [sys.executable, "-c", NAMES],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([here, *sys.path])},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert found.stdout.split() == names_in_the_cache(known)
 
 
 @pytest.mark.cases(4)
