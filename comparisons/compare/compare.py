@@ -16,7 +16,7 @@ from comparisons.compare.budget import LEAST, Budget
 from comparisons.compare.judge import Evidence, Rendered, judge, of_replicates, picture_rungs
 from comparisons.compare.path_length import path_lengths
 from comparisons.geometry.flatten import copies_of
-from comparisons.lights.translate import in_place_of
+from comparisons.integrators.mistakes import in_place_of
 from comparisons.mitsuba import backend
 from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.mitsuba.backend import scalar

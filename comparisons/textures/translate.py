@@ -11,6 +11,7 @@ import numpy as np
 
 from comparisons.geometry import affine
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.files import Files
 from comparisons.mitsuba.second import described_image
 from comparisons.renderers import NoCounterpartError
 from reference_rt.core.arrays import FloatArray
@@ -48,8 +49,8 @@ class TranslationContext:
     """The context of a translation: the scene's materials and textures, by name; the folder of its
     files;  has_colours: whether the material belongs to a mesh with vertex colours;  native: use
     Mitsuba's own materials even where our plugins are more exact;  images: cache of Mitsuba's
-    bitmaps;  in_file: the texture with a name, as colours or as numbers, in a scene
-    file;  None: in memory."""
+    bitmaps;  in_file: the texture with a name, as colours or as numbers, and whether a light
+    projects it, in a scene file;  files: beside the scene file;  None: in memory."""
 
     materials: Mapping[str, Material]
     textures: Mapping[str, Texture]
@@ -57,7 +58,8 @@ class TranslationContext:
     has_colours: bool = False
     native: bool = False
     images: dict[Any, Any] = field(default_factory=dict)
-    in_file: Callable[[str, "TranslationContext", bool], dict[str, Any]] | None = None
+    in_file: Callable[[str, "TranslationContext", bool, bool], dict[str, Any]] | None = None
+    files: Files | None = None
 
     @classmethod
     def of(cls, scene: Scene, native: bool = False) -> Self:
@@ -79,7 +81,7 @@ def colour(value: tuple[float, float, float] | str, context: TranslationContext)
 
 def _translated(name: str, context: TranslationContext, as_number: bool) -> dict[str, Any]:
     if context.in_file is not None:
-        return context.in_file(name, context, as_number)
+        return context.in_file(name, context, as_number, False)
     return translate_texture(context.textures[name], name, context, as_number)
 
 
@@ -87,6 +89,8 @@ def projected(
     value: tuple[float, float, float] | str, context: TranslationContext
 ) -> dict[str, Any]:
     """The same for a light that projects it: Mitsuba's v is 0 at the top of such an image."""
+    if isinstance(value, str) and context.in_file is not None:
+        return context.in_file(value, context, False, True)
     found = colour(value, context)
     if "to_uv" in found:
         found["to_uv"] = _to_uv(np.array(found["to_uv"].matrix, np.float64) @ FLIP)

@@ -13,23 +13,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.cameras.translate import (
-    translate_camera,
-    translate_film,
-    translate_sampler,
-)
+from comparisons.cameras import translate_camera
+from comparisons.cameras.film import translate_film
+from comparisons.cameras.samplers import translate_sampler
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import Copy, Leaf, copies_of, place_of
 from comparisons.geometry.frame import Frame
-from comparisons.lights.translate import (
-    BLACK,
-    counts_lights_often,
-    drops_light,
-    in_place_of,
-    never_samples,
-    translate_integrator,
-    translate_light,
-)
+from comparisons.integrators import translate_integrator
+from comparisons.integrators.mistakes import BLACK, counts_lights_often, drops_light, in_place_of
+from comparisons.lights import translate_light
+from comparisons.lights.area import never_samples
 from comparisons.materials.translate import (
     coloured_parts_of,
     is_oriented,

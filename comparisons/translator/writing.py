@@ -27,6 +27,7 @@ from comparisons.mitsuba.files import (
     check_name,
     matrix_step,
     ply,
+    transform_steps,
     write_files,
 )
 from comparisons.mitsuba.hits import Plugin
@@ -34,7 +35,7 @@ from comparisons.shapes import Site, translate_shape
 from comparisons.shapes.primitives import is_round
 from comparisons.textures.translate import UntranslatableError
 from comparisons.translator import elements
-from comparisons.translator.elements import OURS, Surfaces, transform_steps
+from comparisons.translator.elements import OURS, Surfaces
 from reference_rt.core import transform
 from reference_rt.materials import Emissive
 from reference_rt.rendering.scene import Scene

@@ -1,0 +1,80 @@
+"""The same radiance from all directions: Mitsuba's `constant`; and ambient light, which Whitted's
+ray tracing adds everywhere and which is a parameter of our plugin."""
+
+from typing import Any
+
+import numpy as np
+
+from comparisons.lights.light import (
+    Data,
+    LightType,
+    Motion,
+    brightest_of,
+    plain,
+    shows_no_image,
+)
+from comparisons.mitsuba.files import Losses
+from comparisons.mitsuba.node import Node, Reading
+from comparisons.textures.translate import TranslationContext, rgb
+from reference_rt.lights import Ambient, Constant
+
+
+def ambient_of(lights: tuple[Any, ...]) -> list[float]:
+    """The summed radiance (R, G, B) of all ambient lights."""
+    radiances = [light.radiance for light in lights if isinstance(light, Ambient)]
+    return [float(x) for x in np.sum(radiances, axis=0)] if radiances else [0.0, 0.0, 0.0]
+
+
+def _to_mitsuba(light: Constant, context: TranslationContext) -> Data:
+    return {"type": "constant", "radiance": rgb(light.radiance)}
+
+
+def _from_mitsuba(reading: Reading, node: Node) -> Constant:
+    node.ignore("to_world")
+    return Constant(radiance=plain(node, "radiance"))
+
+
+def leave_out_environment(light: Any, name: str, losses: Losses) -> None:
+    """For `to_gltf`."""
+    losses.note(f"the environment ({name}) is left out: renderers of glTF are given one beside it")
+
+
+def _leave_out_ambient(light: Ambient, name: str, losses: Losses) -> None:
+    losses.note("the ambient light is left out")
+
+
+def _stays(light: Any, motion: Motion) -> Any:
+    return light
+
+
+CONSTANT = LightType(
+    of=Constant,
+    to_mitsuba=_to_mitsuba,
+    from_mitsuba={"constant": _from_mitsuba},
+    to_cycles=lambda light: {"type": "BACKGROUND", "colour": list(light.radiance)},
+    to_gltf=leave_out_environment,
+    moved=_stays,
+    at=None,
+    along=None,
+    surrounds=True,
+    is_bounded=False,
+    projects=shows_no_image,
+    brightest=brightest_of("radiance"),
+    float32=None,
+)
+
+AMBIENT = LightType(
+    of=Ambient,
+    to_mitsuba=None,
+    from_mitsuba={},
+    to_cycles=None,
+    to_gltf=_leave_out_ambient,
+    moved=_stays,
+    at=None,
+    along=None,
+    surrounds=False,
+    is_bounded=False,
+    projects=shows_no_image,
+    brightest=brightest_of("radiance"),
+    float32=None,
+)

@@ -1,0 +1,67 @@
+"""Parallel light: Mitsuba's `directional`."""
+
+import numpy as np
+
+from comparisons.lights.light import (
+    Data,
+    LightType,
+    Motion,
+    Punctual,
+    across,
+    brightest_of,
+    given_or_placed,
+    plain,
+    shows_no_image,
+)
+from comparisons.mitsuba.files import Losses
+from comparisons.mitsuba.node import Node, Reading
+from comparisons.textures.translate import TranslationContext, rgb
+from reference_rt.lights import Directional
+
+
+def _to_mitsuba(light: Directional, context: TranslationContext) -> Data:
+    return {
+        "type": "directional",
+        "direction": list(light.direction),
+        "irradiance": rgb(light.irradiance),
+    }
+
+
+def _from_mitsuba(reading: Reading, node: Node) -> Directional:
+    direction = given_or_placed(node, "direction", (0.0, 0.0, 1.0), 2, unit=True)
+    return Directional(direction=direction, irradiance=plain(node, "irradiance"))
+
+
+def _to_cycles(light: Directional) -> Data:
+    """A sun shines along its -z."""
+    back = -np.array(light.direction) / np.linalg.norm(light.direction)
+    aside = np.cross(back, across(back))
+    aside /= np.linalg.norm(aside)
+    axes = np.column_stack([aside, np.cross(back, aside), back, np.zeros(3)])
+    return {"type": "SUN", "colour": list(light.irradiance), "matrix": axes.tolist()}
+
+
+def _to_gltf(light: Directional, name: str, losses: Losses) -> Punctual:
+    axis = np.array(light.direction) / np.linalg.norm(light.direction)
+    return Punctual(light.irradiance, axis=axis)
+
+
+def _moved(light: Directional, motion: Motion) -> Directional:
+    return light.model_copy(update={"direction": motion.direction(light.direction)})
+
+
+DIRECTIONAL = LightType(
+    of=Directional,
+    to_mitsuba=_to_mitsuba,
+    from_mitsuba={"directional": _from_mitsuba},
+    to_cycles=_to_cycles,
+    to_gltf=_to_gltf,
+    moved=_moved,
+    at=None,
+    along=lambda light: light.direction,
+    surrounds=False,
+    is_bounded=False,
+    projects=shows_no_image,
+    brightest=brightest_of("irradiance"),
+    float32=None,
+)

@@ -1,0 +1,63 @@
+"""Point lights: Mitsuba's `point`."""
+
+import math
+
+import numpy as np
+
+from comparisons.lights.light import (
+    Data,
+    LightType,
+    Motion,
+    Punctual,
+    brighter,
+    brightest_of,
+    given_or_placed,
+    plain,
+    shows_no_image,
+)
+from comparisons.mitsuba.files import Losses
+from comparisons.mitsuba.node import Node, Reading
+from comparisons.textures.translate import TranslationContext, rgb
+from reference_rt.lights import Point
+
+
+def _to_mitsuba(light: Point, context: TranslationContext) -> Data:
+    return {"type": "point", "position": list(light.position), "intensity": rgb(light.intensity)}
+
+
+def _from_mitsuba(reading: Reading, node: Node) -> Point:
+    position = given_or_placed(node, "position", (0.0, 0.0, 0.0), 3, unit=False)
+    return Point(position=position, intensity=plain(node, "intensity"))
+
+
+def _to_cycles(light: Point) -> Data:
+    """Watts are 4 pi times the radiant intensity."""
+    place = np.column_stack([np.eye(3), light.position])
+    watts = [4.0 * math.pi * x for x in light.intensity]
+    return {"type": "POINT", "colour": watts, "matrix": place.tolist()}
+
+
+def _to_gltf(light: Point, name: str, losses: Losses) -> Punctual:
+    return Punctual(light.intensity, light.position)
+
+
+def _moved(light: Point, motion: Motion) -> Point:
+    there = {"position": motion.point(light.position)}
+    return light.model_copy(update=there | {"intensity": brighter(light.intensity, motion)})
+
+
+POINT = LightType(
+    of=Point,
+    to_mitsuba=_to_mitsuba,
+    from_mitsuba={"point": _from_mitsuba},
+    to_cycles=_to_cycles,
+    to_gltf=_to_gltf,
+    moved=_moved,
+    at=lambda light: light.position,
+    along=None,
+    surrounds=False,
+    is_bounded=False,
+    projects=shows_no_image,
+    brightest=brightest_of("intensity"),
+    float32=None,
+)
