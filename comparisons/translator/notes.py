@@ -15,6 +15,7 @@ from comparisons.lights.translate import (
 )
 from comparisons.materials.translate import has_delta
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.plugins.exact_coat import (
     CELLS,
     accepted,
@@ -22,7 +23,6 @@ from comparisons.mitsuba.plugins.exact_coat import (
     rough_coat,
     smooth_reflectance,
 )
-from comparisons.textures.translate import TranslationContext
 from comparisons.translator.accuracy import accuracy
 from reference_rt.integrators import Direct
 from reference_rt.materials import (
