@@ -13,8 +13,8 @@ from comparisons.cameras.orthographic import ORTHOGRAPHIC
 from comparisons.cameras.perspective import PERSPECTIVE, PINHOLE
 from comparisons.cameras.samplers import read_sampler
 from comparisons.cameras.thin_lens import THIN_LENS
+from comparisons.mitsuba.context import TranslationContext, UntranslatableError
 from comparisons.mitsuba.node import Node, Reading
-from comparisons.textures.translate import UntranslatableError
 from reference_rt.cameras import AnyCamera, Perspective
 from reference_rt.cameras.film import Film
 from reference_rt.sampling import AnySampler
@@ -40,9 +40,9 @@ def type_of(camera: Any) -> CameraType[Any]:
     return found
 
 
-def translate_camera(camera: Any, film: Film, in_file: bool = False) -> Data:
+def translate_camera(camera: Any, film: Film, context: TranslationContext) -> Data:
     """A sensor's dict, without film and sampler.  Raises UntranslatableError."""
-    return type_of(camera).to_mitsuba(camera, film, in_file)
+    return type_of(camera).to_mitsuba(camera, film, context)
 
 
 class View(NamedTuple):
@@ -56,9 +56,9 @@ class View(NamedTuple):
 def read_sensor(reading: Reading, node: Node | None) -> View:
     """A sensor with its film and sampler; without one, Mitsuba's default.  Raises SceneError."""
     if node is None:
-        ends = {"near": CLIP["near_clip"], "far": CLIP["far_clip"]}
-        camera = Perspective(eye=(0, 0, 0), target=(0, 0, 1), **focal(50.0), **ends)
-        return View(camera, read_film(reading, None)[1], read_sampler(None))
+        near, far = CLIP.values()
+        default = Perspective(eye=(0, 0, 0), target=(0, 0, 1), **focal(50.0), near=near, far=far)
+        return View(default, read_film(reading, None)[1], read_sampler(None))
     if node.plugin not in _BY_PLUGIN:
         why = _NO_CAMERAS.get(node.plugin, "")
         raise node.unsupported(f"{why}expected one of: {', '.join(sorted(_BY_PLUGIN))}")

@@ -10,7 +10,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from comparisons.cameras.film import Frame
-from comparisons.mitsuba.files import to_world
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.parse import LookAt, Step
 from reference_rt.cameras import AnyCamera
@@ -38,8 +38,8 @@ class CameraType(Generic[C]):
     """A type of cameras.  A test holds that `CAMERAS` has a row for each member of `AnyCamera`."""
 
     of: type[C]
-    to_mitsuba: Callable[[C, Film, bool], Data]
-    """The dictionary of a sensor, without film and sampler; the flag: of a scene file's."""
+    to_mitsuba: Callable[[C, Film, TranslationContext], Data]
+    """The dictionary of a sensor, without film and sampler."""
     from_mitsuba: Mapping[str, Callable[[Reading, Node, Frame], AnyCamera]]
     """By Mitsuba's plugin: the camera of an element.  Raises SceneError."""
     edges: Callable[[C, Film], Edges]
@@ -61,7 +61,7 @@ at 45 degrees for both)."""
 
 def placed(
     camera: Camera,
-    in_file: bool,
+    context: TranslationContext,
     right: float = 1.0,
     up: float = 1.0,
     middle: tuple[float, float] = (0.0, 0.0),
@@ -74,7 +74,7 @@ def placed(
     if (right, up) != (1.0, 1.0):
         steps = Step("scale", (right, up, 1.0)), *steps
     return {
-        "to_world": to_world(steps, in_file, double=True),
+        "to_world": context.to_world(*steps, double=True),
         "near_clip": camera.near or NEAR,
         "far_clip": camera.far or FAR,
     }

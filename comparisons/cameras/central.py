@@ -5,6 +5,7 @@ import math
 
 from comparisons.cameras.camera import Data, Edges, placed
 from comparisons.cameras.film import Frame
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.node import Node
 from reference_rt.cameras.film import Film
 from reference_rt.cameras.view_rectangle import CentralCamera
@@ -78,10 +79,10 @@ def principal_point(camera: CentralCamera) -> tuple[float, float]:
     return (l + r) / 2.0 / (r - l), -(b + t) / 2.0 / (t - b)
 
 
-def view_rectangle(camera: CentralCamera, film: Film, in_file: bool) -> Data:
+def view_rectangle(camera: CentralCamera, film: Film, context: TranslationContext) -> Data:
     """Our plugin `comparisons.mitsuba.plugins.view_rectangle`."""
     named = zip(("left", "right", "bottom", "top"), edges_of(camera, film), strict=True)
-    return {"type": "view_rectangle", **dict(named), **placed(camera, in_file)}
+    return {"type": "view_rectangle", **dict(named), **placed(camera, context)}
 
 
 # ---- reading -------------------------------------------------------------------------------------

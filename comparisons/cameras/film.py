@@ -2,9 +2,9 @@
 
 from typing import Any, NamedTuple
 
+from comparisons.mitsuba.context import UntranslatableError
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.plugin_table import INTEGER, NUMBER, PluginTable, Row
-from comparisons.textures.translate import UntranslatableError
 from reference_rt.cameras.film import (
     AnyFilter,
     BoxFilter,

@@ -5,6 +5,7 @@ import numpy as np
 from comparisons.cameras.camera import CameraType, Data, Edges, placed, read_place, read_planes
 from comparisons.cameras.central import centred
 from comparisons.cameras.film import Frame
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.node import Node, Reading, triple
 from reference_rt.cameras import Orthographic
 from reference_rt.cameras.film import Film
@@ -18,14 +19,14 @@ def _edges(camera: Orthographic, film: Film) -> Edges:
     return centred(_width(camera) / 2.0, film) if camera.view is None else camera.view
 
 
-def _to_mitsuba(camera: Orthographic, film: Film, in_file: bool) -> Data:
+def _to_mitsuba(camera: Orthographic, film: Film, context: TranslationContext) -> Data:
     l, r, b, t = _edges(camera, film)
     # Mitsuba's picture is 2 wide and 2 height / width high in the sensor's coordinates.
     right, up = (r - l) / 2.0, (t - b) / 2.0 * (film.width / film.height)
-    if in_file and camera.view is None:
+    if context.files is not None and camera.view is None:
         up = right  # to the last bit, so that the reader finds a width
     middle = (l + r) / 2.0, (b + t) / 2.0
-    return {"type": "orthographic", **placed(camera, in_file, right, up, middle)}
+    return {"type": "orthographic", **placed(camera, context, right, up, middle)}
 
 
 def _from_mitsuba(reading: Reading, node: Node, frame: Frame) -> Orthographic:

@@ -12,19 +12,20 @@ from comparisons.cameras.central import (
     view_rectangle,
 )
 from comparisons.cameras.film import Frame
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.node import Node, Reading
 from reference_rt.cameras import Perspective, Pinhole
 from reference_rt.cameras.film import Film
 
 
-def _to_mitsuba(camera: Perspective, film: Film, in_file: bool) -> Data:
+def _to_mitsuba(camera: Perspective, film: Film, context: TranslationContext) -> Data:
     if camera.view is not None and not is_square(camera, film):
-        return view_rectangle(camera, film, in_file)
+        return view_rectangle(camera, film, context)
     found: Data = {"type": "perspective", **angle_of(camera, film)}
-    if camera.view is not None or not in_file:
+    if camera.view is not None or context.files is None:
         x, y = principal_point(camera)
         found |= {"principal_point_offset_x": x, "principal_point_offset_y": y}
-    return {**found, **placed(camera, in_file)}
+    return {**found, **placed(camera, context)}
 
 
 def _from_mitsuba(reading: Reading, node: Node, frame: Frame) -> Perspective:
@@ -54,9 +55,9 @@ def _half(camera: Pinhole) -> float:
     return camera.film_width / camera.film_distance / 2.0
 
 
-def _pinhole_to_mitsuba(camera: Pinhole, film: Film, in_file: bool) -> Data:
+def _pinhole_to_mitsuba(camera: Pinhole, film: Film, context: TranslationContext) -> Data:
     """A perspective camera, upside down."""
-    upside_down = placed(camera, in_file, right=-1.0, up=-1.0)
+    upside_down = placed(camera, context, right=-1.0, up=-1.0)
     return {"type": "perspective", **spanning(_half(camera)), **upside_down}
 
 

@@ -3,8 +3,8 @@
 import math
 from typing import Any
 
+from comparisons.mitsuba.context import UntranslatableError
 from comparisons.mitsuba.node import Node
-from comparisons.textures.translate import UntranslatableError
 from reference_rt.sampling import AnySampler, Grid, Independent, Sobol
 
 STRATIFIED = ("stratified", "multijitter", "orthogonal", "ldsampler")

@@ -1,4 +1,4 @@
-"""Cameras with a lens: Mitsuba's `thinlens`, and our `view_rectangle` where that has no such view."""
+"""Cameras with a lens: Mitsuba's `thinlens`, or our `view_rectangle` where that has no such view."""
 
 import math
 
@@ -13,6 +13,7 @@ from comparisons.cameras.central import (
     view_rectangle,
 )
 from comparisons.cameras.film import Frame
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.node import Node, Reading
 from reference_rt.cameras import Perspective, ThinLens
 from reference_rt.cameras.film import Film
@@ -26,12 +27,12 @@ def _lens(camera: ThinLens) -> Lens:
     )
 
 
-def _to_mitsuba(camera: ThinLens, film: Film, in_file: bool) -> Data:
+def _to_mitsuba(camera: ThinLens, film: Film, context: TranslationContext) -> Data:
     off_axis = max(map(abs, principal_point(camera))) > UNIT_ROUNDOFF
     if camera.view is not None and (off_axis or not is_square(camera, film)):
-        found = view_rectangle(camera, film, in_file)
+        found = view_rectangle(camera, film, context)
     else:
-        found = {"type": "thinlens", **angle_of(camera, film), **placed(camera, in_file)}
+        found = {"type": "thinlens", **angle_of(camera, film), **placed(camera, context)}
     lens = _lens(camera)
     return {**found, "aperture_radius": lens.radius, "focus_distance": lens.focus}
 

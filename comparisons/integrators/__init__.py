@@ -11,8 +11,8 @@ from comparisons.integrators.integrator import Data, IntegratorType
 from comparisons.integrators.path import PATH
 from comparisons.integrators.ray_cast import LAYER_OF, RAY_CAST, SHOWN
 from comparisons.integrators.whitted import WHITTED
+from comparisons.mitsuba.context import UntranslatableError
 from comparisons.mitsuba.node import Node, Reading
-from comparisons.textures.translate import UntranslatableError
 from reference_rt.integrators import AnyIntegrator, Direct, Path, RayCast
 
 INTEGRATORS: tuple[IntegratorType[Any], ...] = (PATH, DIRECT, WHITTED, RAY_CAST)

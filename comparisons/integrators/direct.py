@@ -1,9 +1,9 @@
 """Direct light: Mitsuba's `direct`."""
 
 from comparisons.integrators.integrator import Data, IntegratorType, hiding
+from comparisons.mitsuba.context import UntranslatableError
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.renderers import NoCounterpartError
-from comparisons.textures.translate import UntranslatableError
 from reference_rt.integrators import Direct
 
 

@@ -9,7 +9,7 @@ from comparisons.mitsuba.node import Node, Reading
 from reference_rt.core.model import Description
 from reference_rt.integrators import AnyIntegrator
 
-I = TypeVar("I", bound=Description)  # noqa: E741
+I = TypeVar("I", bound=Description)
 
 Data = dict[str, Any]
 

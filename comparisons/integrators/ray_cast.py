@@ -1,6 +1,6 @@
 """Ray casting, and the layers of a film: Mitsuba's `depth`, and the values (AOVs) of its `aov`."""
 
-from comparisons.integrators.integrator import IntegratorType
+from comparisons.integrators.integrator import Data, IntegratorType
 from comparisons.mitsuba.node import Node, Reading
 from reference_rt.integrators import RayCast
 
@@ -17,6 +17,13 @@ LAYER_OF = {aov: layer for layer, aov in LAYERS.items()}
 
 SHOWN = {"depth": "distance", **{aov: show for show, aov in CAST.items()}}
 """What ray casting shows for an AOV without another integrator."""
+
+
+def shown_by(integrator: RayCast) -> Data:
+    """The dictionary of a scene file's integrator that shows the same."""
+    if integrator.show == "distance":
+        return {"type": "depth"}
+    return {"type": "aov", "aovs": f"{integrator.show}:{CAST[integrator.show]}"}
 
 
 def _from_mitsuba(reading: Reading, node: Node) -> RayCast:

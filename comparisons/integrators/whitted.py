@@ -1,8 +1,9 @@
 """Whitted's ray tracing: our plugin `comparisons.mitsuba.plugins.whitted`, to which the rung and
 scene files add the parameters of lights."""
 
-from comparisons.integrators.integrator import Data, IntegratorType
+from comparisons.integrators.integrator import IntegratorType
 from comparisons.mitsuba.node import Node, Reading
+from comparisons.mitsuba.plugin_table import INTEGER, NUMBER, PluginTable, Row
 from reference_rt.integrators import Whitted
 from reference_rt.lights import Ambient
 
@@ -10,30 +11,29 @@ AMBIENT = ("ambient_r", "ambient_g", "ambient_b")
 """The parameters for ambient light."""
 
 
-def _to_mitsuba(integrator: Whitted) -> Data:
-    return {
-        "type": "whitted",
-        "max_depth": integrator.max_depth,
-        "min_contribution": integrator.min_contribution,
-    }
+_DEFAULT = Whitted()
+
+TABLE = PluginTable(
+    "whitted",
+    (
+        Row("max_depth", "max_depth", INTEGER, _DEFAULT.max_depth),
+        Row("min_contribution", "min_contribution", NUMBER, _DEFAULT.min_contribution),
+    ),
+    ignored=("components", "unlit"),
+)
 
 
 def _from_mitsuba(reading: Reading, node: Node) -> Whitted:
     """In files that we have written."""
-    node.ignore("components", "unlit")
     r, g, b = (node.number(name, 0.0) for name in AMBIENT)
     if any((r, g, b)):
         reading.lights.append(Ambient(radiance=(r, g, b)))
-    default = Whitted()
-    return Whitted(
-        max_depth=node.integer("max_depth", default.max_depth),
-        min_contribution=node.number("min_contribution", default.min_contribution),
-    )
+    return Whitted(**TABLE.read(reading, node))
 
 
 WHITTED = IntegratorType(
     of=Whitted,
-    to_mitsuba=_to_mitsuba,
+    to_mitsuba=TABLE.write,
     of_solids=None,
     from_mitsuba={"whitted": _from_mitsuba},
     edges=None,

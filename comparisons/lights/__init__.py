@@ -13,8 +13,8 @@ from comparisons.lights.light import Data, LightType
 from comparisons.lights.point import POINT
 from comparisons.lights.projector import PROJECTOR
 from comparisons.lights.spot import SPOT
+from comparisons.mitsuba.context import TranslationContext, UntranslatableError
 from comparisons.mitsuba.node import Node, Reading
-from comparisons.textures.translate import TranslationContext, UntranslatableError
 
 LIGHTS: tuple[LightType[Any], ...] = (
     POINT,
@@ -27,14 +27,14 @@ LIGHTS: tuple[LightType[Any], ...] = (
 )
 """All types of lights that are no shapes."""
 
-_BY_TYPE = {of.of: of for of in LIGHTS}
+BY_TYPE = {of.of: of for of in LIGHTS}
 
 _BY_PLUGIN = {plugin: read for of in LIGHTS for plugin, read in of.from_mitsuba.items()}
 
 
 def type_of(light: Any) -> LightType[Any]:
-    """What is known of a light's type.  Raises UntranslatableError for one that is not in LIGHTS."""
-    found = _BY_TYPE.get(type(light))
+    """What is known of a light's type.  Raises UntranslatableError for one not in LIGHTS."""
+    found = BY_TYPE.get(type(light))
     if found is None:
         raise UntranslatableError(light, "light")
     return found

@@ -5,8 +5,9 @@ from typing import Any
 from comparisons.geometry import affine
 from comparisons.geometry.affine import is_similarity
 from comparisons.geometry.flatten import Copy, Leaf, Member
+from comparisons.mitsuba.colours import Rgb
 from comparisons.mitsuba.node import Node, Reading
-from comparisons.textures.reading import Rgb, colour_or_texture
+from comparisons.textures.reading import colour_or_texture
 from reference_rt.integrators import Direct
 from reference_rt.shapes import Box, Disk, Mesh, Rectangle, Sphere, Triangle
 from reference_rt.shapes.shape import TabulationContext

@@ -6,16 +6,14 @@ from typing import Any
 import numpy as np
 
 from comparisons.lights.light import (
-    Data,
     LightType,
     Motion,
     brightest_of,
-    plain,
     shows_no_image,
 )
 from comparisons.mitsuba.files import Losses
 from comparisons.mitsuba.node import Node, Reading
-from comparisons.textures.translate import TranslationContext, rgb
+from comparisons.mitsuba.plugin_table import EMISSION, PluginTable, Row
 from reference_rt.lights import Ambient, Constant
 
 
@@ -25,13 +23,11 @@ def ambient_of(lights: tuple[Any, ...]) -> list[float]:
     return [float(x) for x in np.sum(radiances, axis=0)] if radiances else [0.0, 0.0, 0.0]
 
 
-def _to_mitsuba(light: Constant, context: TranslationContext) -> Data:
-    return {"type": "constant", "radiance": rgb(light.radiance)}
+TABLE = PluginTable("constant", (Row("radiance", "radiance", EMISSION, 1.0),), ("to_world",))
 
 
 def _from_mitsuba(reading: Reading, node: Node) -> Constant:
-    node.ignore("to_world")
-    return Constant(radiance=plain(node, "radiance"))
+    return Constant(**TABLE.read(reading, node))
 
 
 def leave_out_environment(light: Any, name: str, losses: Losses) -> None:
@@ -49,7 +45,7 @@ def _stays(light: Any, motion: Motion) -> Any:
 
 CONSTANT = LightType(
     of=Constant,
-    to_mitsuba=_to_mitsuba,
+    to_mitsuba=TABLE.write,
     from_mitsuba={"constant": _from_mitsuba},
     to_cycles=lambda light: {"type": "BACKGROUND", "colour": list(light.radiance)},
     to_gltf=leave_out_environment,

@@ -9,27 +9,29 @@ from comparisons.lights.light import (
     Punctual,
     across,
     brightest_of,
-    given_or_placed,
-    plain,
+    by_column,
+    check_size,
     shows_no_image,
 )
 from comparisons.mitsuba.files import Losses
 from comparisons.mitsuba.node import Node, Reading
-from comparisons.textures.translate import TranslationContext, rgb
+from comparisons.mitsuba.plugin_table import EMISSION, VECTOR, PluginTable, Row
 from reference_rt.lights import Directional
 
-
-def _to_mitsuba(light: Directional, context: TranslationContext) -> Data:
-    return {
-        "type": "directional",
-        "direction": list(light.direction),
-        "irradiance": rgb(light.irradiance),
-    }
+TABLE = PluginTable(
+    "directional",
+    (
+        Row("direction", "direction", VECTOR, (0.0, 0.0, 1.0)),
+        Row("irradiance", "irradiance", EMISSION, 1.0),
+    ),
+)
 
 
 def _from_mitsuba(reading: Reading, node: Node) -> Directional:
-    direction = given_or_placed(node, "direction", (0.0, 0.0, 1.0), 2, unit=True)
-    return Directional(direction=direction, irradiance=plain(node, "irradiance"))
+    axis = by_column(node, "direction", 2)
+    for given in axis.values():
+        check_size(node, np.array(given))
+    return Directional(**TABLE.read(reading, node) | axis)
 
 
 def _to_cycles(light: Directional) -> Data:
@@ -52,7 +54,7 @@ def _moved(light: Directional, motion: Motion) -> Directional:
 
 DIRECTIONAL = LightType(
     of=Directional,
-    to_mitsuba=_to_mitsuba,
+    to_mitsuba=TABLE.write,
     from_mitsuba={"directional": _from_mitsuba},
     to_cycles=_to_cycles,
     to_gltf=_to_gltf,

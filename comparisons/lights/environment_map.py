@@ -19,11 +19,11 @@ from comparisons.lights.light import (
 )
 from comparisons.lights.sunsky import read_sunsky
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.files import Files, transform_steps, written_image
+from comparisons.mitsuba.context import TranslationContext, transform_steps
+from comparisons.mitsuba.files import Files
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.parse import as_transform
 from comparisons.mitsuba.second import described_image
-from comparisons.textures.translate import TranslationContext
 from reference_rt.core.transform import is_similarity
 from reference_rt.lights import EnvironmentMap
 from reference_rt.textures.image_file import read_image
@@ -31,7 +31,7 @@ from reference_rt.textures.image_file import read_image
 
 def _to_mitsuba(light: EnvironmentMap, context: TranslationContext) -> Data:
     if context.files is not None:
-        return _in_file(light, context.files)
+        return _in_file(light, context, context.files)
     path = context.folder / light.file
     ours = read_image(path, light.encoding, light.scale, light.layer)
     texels = described_image(path, light.encoding, light.scale, light.layer, ours)
@@ -40,16 +40,16 @@ def _to_mitsuba(light: EnvironmentMap, context: TranslationContext) -> Data:
     to_world[:3, :3] = polar(affine.of_steps(light.transform)[:, :3])[0]
     return {
         "type": "envmap",
-        "bitmap": mitsuba().Bitmap(np.ascontiguousarray(texels, dtype=np.float32)),
+        **context.image("", texels),
         "to_world": mitsuba().ScalarTransform4f(to_world),
     }
 
 
-def _in_file(light: EnvironmentMap, files: Files) -> Data:
+def _in_file(light: EnvironmentMap, context: TranslationContext, files: Files) -> Data:
     found: Data = {"type": "envmap", "scale": light.scale}
     if light.encoding == "radiance":
-        texels = read_image(files.scene.folder / light.file, "radiance")
-        found["filename"] = written_image(files, Path(light.file).stem, texels)
+        texels = read_image(context.folder / light.file, "radiance")
+        found |= context.image(Path(light.file).stem, texels)
     else:
         number = files.scene.lights.index(light)
         found["filename"] = files.copy(light.file, "lights", number, "file")

@@ -6,10 +6,10 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
+from comparisons.mitsuba.colours import Rgb, colour
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.files import Losses
 from comparisons.mitsuba.node import Node, Reading, Triple, triple
-from comparisons.textures.reading import Rgb, colour
-from comparisons.textures.translate import TranslationContext
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Description
 
@@ -34,14 +34,17 @@ class Motion(NamedTuple):
         return bool(self.steps)
 
 
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
 class Punctual(NamedTuple):
     """A light of glTF's.  data: what its kind has besides colour and intensity;  power: intensity
     or irradiance;  axis: the way in which it shines, unit."""
 
     power: Rgb
     place: Triple = (0.0, 0.0, 0.0)
-    axis: FloatArray = np.array([0.0, 0.0, -1.0])
-    data: Data = {}
+    axis: FloatArray = DOWN
+    data: Data | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,13 +80,20 @@ class LightType(Generic[L]):
     brightest: Callable[[L], float]
     """The largest radiance, irradiance or intensity, where an image counts as 1."""
     float32: Callable[[L, FloatArray], FloatArray] | None
-    """(n,): the relative error, at most 1, of Mitsuba's intensity towards points (n, 3), beyond that
-    of a few rounded products."""
+    """(n,): the relative error, at most 1, of Mitsuba's intensity towards points (n, 3), beyond
+    that of a few rounded products."""
 
     @property
     def has_no_extent(self) -> bool:
         """Whether it arrives from one direction alone, which Mitsuba's emitter itself gives."""
         return self.at is not None or self.along is not None
+
+    def towards(self, light: L, p: FloatArray) -> FloatArray:
+        """(n, 3): from points (n, 3) towards a light without extent, of any length."""
+        if self.at is not None:
+            return np.asarray(np.array(self.at(light)) - p)
+        assert self.along is not None
+        return np.broadcast_to(-np.array(self.along(light)), p.shape)
 
 
 def shows_no_image(light: Any) -> bool:
@@ -126,17 +136,14 @@ def plain(node: Node, key: str) -> Rgb:
     return colour(node, key, 1.0, "emission")
 
 
-def given_or_placed(node: Node, key: str, default: Triple, column: int, unit: bool) -> Triple:
-    """A vector, or the column of to_world that says the same;  unit: of length 1.  Raises SceneError
-    for both."""
-    if node.has(key):
-        if node.has("to_world"):
-            raise node.error(f"has both '{key}' and 'to_world'; expected one of them")
-        return node.vector(key, default)
-    axis = node.transform()[:, column]
-    if unit:
-        check_size(node, axis)
-    return triple(axis)
+def by_column(node: Node, key: str, column: int) -> dict[str, Triple]:
+    """The column of to_world that says the same as this parameter, where that is not given.  Raises
+    SceneError for both."""
+    if not node.has(key):
+        return {key: triple(node.transform()[:, column])}
+    if node.has("to_world"):
+        raise node.error(f"has both '{key}' and 'to_world'; expected one of them")
+    return {}
 
 
 def check_size(node: Node, axis: FloatArray) -> None:

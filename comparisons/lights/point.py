@@ -11,23 +11,26 @@ from comparisons.lights.light import (
     Punctual,
     brighter,
     brightest_of,
-    given_or_placed,
-    plain,
+    by_column,
     shows_no_image,
 )
 from comparisons.mitsuba.files import Losses
 from comparisons.mitsuba.node import Node, Reading
-from comparisons.textures.translate import TranslationContext, rgb
+from comparisons.mitsuba.plugin_table import EMISSION, VECTOR, PluginTable, Row
 from reference_rt.lights import Point
 
-
-def _to_mitsuba(light: Point, context: TranslationContext) -> Data:
-    return {"type": "point", "position": list(light.position), "intensity": rgb(light.intensity)}
+TABLE = PluginTable(
+    "point",
+    (
+        Row("position", "position", VECTOR, (0.0, 0.0, 0.0)),
+        Row("intensity", "intensity", EMISSION, 1.0),
+    ),
+)
 
 
 def _from_mitsuba(reading: Reading, node: Node) -> Point:
-    position = given_or_placed(node, "position", (0.0, 0.0, 0.0), 3, unit=False)
-    return Point(position=position, intensity=plain(node, "intensity"))
+    place = by_column(node, "position", 3)
+    return Point(**TABLE.read(reading, node) | place)
 
 
 def _to_cycles(light: Point) -> Data:
@@ -48,7 +51,7 @@ def _moved(light: Point, motion: Motion) -> Point:
 
 POINT = LightType(
     of=Point,
-    to_mitsuba=_to_mitsuba,
+    to_mitsuba=TABLE.write,
     from_mitsuba={"point": _from_mitsuba},
     to_cycles=_to_cycles,
     to_gltf=_to_gltf,

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from comparisons.cameras.film import Frame
 from comparisons.cameras.central import read_angle
+from comparisons.cameras.film import Frame
 from comparisons.lights.light import (
     TOLERANCE,
     Data,
@@ -17,11 +17,11 @@ from comparisons.lights.light import (
     check_upright,
     similarity,
 )
-from comparisons.mitsuba.files import to_world
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.node import Node, Reading, triple
 from comparisons.mitsuba.parse import LookAt, Step
 from comparisons.textures.reading import projected as read_projected
-from comparisons.textures.translate import TranslationContext, projected
+from comparisons.textures.translate import projected
 from reference_rt.core.image_files import open_image
 from reference_rt.lights import Projector
 from reference_rt.textures import Bitmap
@@ -38,11 +38,10 @@ def _to_mitsuba(light: Projector, context: TranslationContext) -> Data:
         width, height = _size(context.folder / texture.file)
     shape = float(width) / float(height)
     stretch = _such_that(shape / light.aspect, lambda x: shape / x == light.aspect)
-    look = LookAt(light.origin, light.target, light.up)
-    steps = (look,) if stretch == 1.0 else (Step("scale", (1.0, stretch, 1.0)), look)
+    steps = () if stretch == 1.0 else (Step("scale", (1.0, stretch, 1.0)),)
     return {
         "type": "projector",
-        "to_world": to_world(steps, context.files is not None),
+        "to_world": context.to_world(*steps, LookAt(light.origin, light.target, light.up)),
         "irradiance": irradiance,
         "scale": _such_that(light.scale / math.pi, lambda x: math.pi * x == light.scale),
         "fov": float(light.fov),

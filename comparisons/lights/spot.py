@@ -17,11 +17,12 @@ from comparisons.lights.light import (
     plain,
     similarity,
 )
-from comparisons.mitsuba.files import Losses, UnwritableError, to_world
+from comparisons.mitsuba.context import TranslationContext, rgb
+from comparisons.mitsuba.files import Losses, UnwritableError
 from comparisons.mitsuba.node import Node, Reading, Triple, triple
 from comparisons.mitsuba.parse import LookAt
 from comparisons.textures.reading import projected as read_projected
-from comparisons.textures.translate import TranslationContext, projected, rgb
+from comparisons.textures.translate import projected
 from reference_rt.core.arrays import FloatArray
 from reference_rt.lights import Spot
 
@@ -46,7 +47,7 @@ def _to_mitsuba(light: Spot, context: TranslationContext) -> Data:
         found["texture"] = projected(light.texture, context)
     return {
         "type": "spot",
-        "to_world": to_world((LookAt(light.origin, light.target, up),), context.files is not None),
+        "to_world": context.to_world(LookAt(light.origin, light.target, up)),
         "intensity": rgb(light.intensity),
         "cutoff_angle": float(light.cutoff_angle),
         "beam_width": float(beam_of(light)),

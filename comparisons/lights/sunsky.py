@@ -134,5 +134,3 @@ def _solid_angles() -> FloatArray:
     inner = 2.0 * np.sin(polar) * (1.0 - np.cos(step)) / step
     inner[[0, -1]] = 1.0 - np.sin(step) / step
     return np.asarray(inner * 2.0 * np.pi / WIDTH)
-
-

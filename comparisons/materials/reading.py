@@ -3,14 +3,13 @@
 from collections.abc import Callable
 from typing import Any
 
+from comparisons.mitsuba.colours import index_of_refraction, metal
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.plugins.materials import GLTF_COLOURS, GLTF_NUMBERS
 from comparisons.textures.reading import (
     colour_or_texture,
     fields_of,
-    index_of_refraction,
     is_checker_of_textures,
-    metal,
     number_or_texture,
     texture_name,
 )

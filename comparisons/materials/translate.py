@@ -10,16 +10,14 @@ import numpy as np
 import reference_rt as rt
 from comparisons.geometry import affine
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.context import TranslationContext, UntranslatableError, rgb
 from comparisons.mitsuba.plugins.exact_coat import COLOURS, SUBSTITUTE, accepted
 from comparisons.mitsuba.plugins.materials import GLTF_COLOURS, GLTF_NUMBERS
 from comparisons.textures.translate import (
-    TranslationContext,
-    UntranslatableError,
     colour,
     depends_on_uv,
     number,
     product,
-    rgb,
     texels_of,
     translate_texture,
 )
@@ -313,7 +311,7 @@ def _(material: NormalMap, context: TranslationContext) -> dict[str, Any]:
     texture = context.textures[material.normals]
     if not isinstance(texture, Bitmap) or texture.cutoff is not None:
         raise UntranslatableError("NormalMap of a texture that is no image", "material")
-    if context.in_file is not None and (material.follow_v or material.scale != 1.0):
+    if context.files is not None and (material.follow_v or material.scale != 1.0):
         raise UntranslatableError("NormalMap with 'scale' or 'follow_v'", "material")
     normals = colour(material.normals, context)
     if material.scale != 1.0:

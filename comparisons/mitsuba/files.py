@@ -12,11 +12,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.parse import LookAt, Step
-from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.exr import write_exr
 from reference_rt.core.transform import Affine
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.model import SceneModel
@@ -133,41 +130,6 @@ def matrix_step(m: Affine) -> Step:
     return Step("matrix", tuple(float(x) for x in m.ravel()))
 
 
-def transform_steps(steps: Any) -> tuple[Step, ...]:
-    """Our transform as steps of Mitsuba's: a rotation about any axis but x, y and z as a matrix, as
-    Mitsuba does not make the axis a unit vector."""
-    found = []
-    for step in steps:
-        match step:
-            case transform.Translate(translate=v):
-                found.append(Step("translate", v))
-            case transform.Scale(scale=v):
-                found.append(Step("scale", v))
-            case transform.Rotate(rotate=turn) if sorted(map(abs, turn.axis)) == [0.0, 0.0, 1.0]:
-                found.append(Step("rotate", (*turn.axis, turn.degrees)))
-            case _:
-                found.append(matrix_step(step.matrix_of()))
-    return tuple(found)
-
-
-def to_world(steps: tuple[Step | LookAt, ...], in_file: bool, double: bool = False) -> Any:
-    """A map that begins with the first step: its steps for a scene file, else Mitsuba's transform;
-    double: of float64."""
-    if in_file:
-        return steps
-    known = mitsuba().ScalarTransform4d if double else mitsuba().ScalarTransform4f
-    *first, last = (_transform(step, known) for step in steps)
-    for one in reversed(first):
-        last = last @ one
-    return last
-
-
-def _transform(step: Step | LookAt, known: Any) -> Any:
-    if isinstance(step, LookAt):
-        return known().look_at(*map(list, step))
-    return getattr(known(), step.kind)(list(step.numbers))  # a scale or a translation
-
-
 # ---- files ---------------------------------------------------------------------------------------
 
 
@@ -273,12 +235,6 @@ class Files:
         self.folder.mkdir(exist_ok=True)
         make(self.folder / name)
         return f"{self.name}/{name}"
-
-
-def written_image(files: Files, stem: str, texels: FloatArray) -> str:
-    """The name of an image file of linear radiance."""
-    planes = dict(zip("RGB", np.moveaxis(texels, -1, 0), strict=True))
-    return files.write(f"{stem}.exr", lambda file: write_exr(file, planes, {}))
 
 
 # ---- what a format cannot express ----------------------------------------------------------------

@@ -21,15 +21,15 @@ from scipy.ndimage import map_coordinates
 
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import Leaf, Member, copies_of
+from comparisons.integrators import type_of as type_of_integrator
 from comparisons.mitsuba.files import Files, UnwritableError, check_name, ply, write_files
 from comparisons.pbrt.surfaces import Params, Writing, words
+from comparisons.renderers import NoCounterpartError
 from comparisons.translator.resolved import Tessellated, placed, tessellated
 from reference_rt import lights
 from reference_rt.cameras import Orthographic, Pinhole, ThinLens, film
 from reference_rt.cameras.view_rectangle import by_width
 from reference_rt.core.arrays import FloatArray
-from reference_rt.integrators import Direct
-from reference_rt.integrators import Path as PathTracing
 from reference_rt.lights.emitters.environment_map import orthogonal
 from reference_rt.materials import Emissive
 from reference_rt.rendering.scene import Scene
@@ -97,17 +97,14 @@ def integrator_of(integrator: Any) -> str:
     """pbrt counts the surfaces between the camera and a light, we the edges."""
     if getattr(integrator, "hide_emitters", False):
         raise UnwritableError("lamps that cameras do not see")
-    match integrator:
-        case Direct(shadows=False):
-            raise UnwritableError("direct light without shadows")
-        case Direct(light_samples=0) | Direct(bsdf_samples=0):
-            raise UnwritableError("direct light by one strategy alone")
-        case Direct():
-            depth = 1
-        case PathTracing(max_depth=edges):
-            depth = ENDLESS if edges is None else edges - 1
-        case _:
-            raise UnwritableError(f"the integrator '{integrator.type}'")
+    edges_of = type_of_integrator(integrator).edges
+    if edges_of is None:
+        raise UnwritableError(f"the integrator '{integrator.type}'")
+    try:
+        edges = edges_of(integrator)
+    except NoCounterpartError as error:
+        raise UnwritableError(str(error)) from None
+    depth = ENDLESS if edges is None else edges - 1
     return words("Integrator", "path", params={"integer maxdepth": depth, "bool regularize": False})
 
 

@@ -1,41 +1,21 @@
-"""Textures -> Mitsuba, parameters that may be textures, the `TranslationContext`, and the error for
-parts of a scene that have no counterpart."""
+"""Textures -> Mitsuba, in memory and in scene files, and parameters that may be textures."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from functools import singledispatch
-from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from comparisons.geometry import affine
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.files import Files
+from comparisons.mitsuba.context import TranslationContext, UntranslatableError, rgb
+from comparisons.mitsuba.files import Files, matrix_step
+from comparisons.mitsuba.parse import FLIP as FLIP_STEPS
+from comparisons.mitsuba.parse import Step
 from comparisons.mitsuba.second import described_image
-from comparisons.renderers import NoCounterpartError
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, luminance
-from reference_rt.materials.material import Material
-from reference_rt.rendering.scene import Scene
 from reference_rt.textures import Bitmap, Checker, Product, Texture, VertexColours
 from reference_rt.textures.texture import UvMap
-
-
-class UntranslatableError(NoCounterpartError):
-    """A part of a scene has no counterpart in Mitsuba."""
-
-    def __init__(self, part: Any, kind: str) -> None:
-        name = part if isinstance(part, str) else type(part).__name__
-        self.part, self.kind = name, kind
-        super().__init__(
-            f"the {kind} {name} cannot be compared: comparisons.translator has no "
-            "translation for it"
-        )
-
-
-# ----  --------------------------------------------------------------------------------------------
-
 
 FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
 """The map of (u, v) to (u, 1 - v): v = 0 is the top row of Mitsuba's images, the bottom of ours."""
@@ -44,56 +24,23 @@ VERTEX_COLOUR, VERTEX_LUMINANCE = "vertex_color", "vertex_luminance"
 """Names of mesh attributes."""
 
 
-@dataclass(frozen=True)
-class TranslationContext:
-    """The context of a translation: the scene's materials and textures, by name; the folder of its
-    files;  has_colours: whether the material belongs to a mesh with vertex colours;  native: use
-    Mitsuba's own materials even where our plugins are more exact;  images: cache of Mitsuba's
-    bitmaps;  in_file: the texture with a name, as colours or as numbers, and whether a light
-    projects it, in a scene file;  files: beside the scene file;  None: in memory."""
-
-    materials: Mapping[str, Material]
-    textures: Mapping[str, Texture]
-    folder: Path
-    has_colours: bool = False
-    native: bool = False
-    images: dict[Any, Any] = field(default_factory=dict)
-    in_file: Callable[[str, "TranslationContext", bool, bool], dict[str, Any]] | None = None
-    files: Files | None = None
-
-    @classmethod
-    def of(cls, scene: Scene, native: bool = False) -> Self:
-        return cls(scene.materials, scene.textures, scene.folder, native=native)
-
-
-def rgb(colour: tuple[float, float, float]) -> dict[str, Any]:
-    """Linear sRGB, which rgb variants use unchanged."""
-    return {"type": "rgb", "value": list(colour)}
-
-
 def colour(value: tuple[float, float, float] | str, context: TranslationContext) -> dict[str, Any]:
     """A colour, or the texture with that name.  Raises UntranslatableError, ValueError for a file
     that cannot be used."""
     if isinstance(value, str):
-        return _translated(value, context, False)
+        return translate_texture(context.textures[value], value, context, False)
     return rgb(value)
-
-
-def _translated(name: str, context: TranslationContext, as_number: bool) -> dict[str, Any]:
-    if context.in_file is not None:
-        return context.in_file(name, context, as_number, False)
-    return translate_texture(context.textures[name], name, context, as_number)
 
 
 def projected(
     value: tuple[float, float, float] | str, context: TranslationContext
 ) -> dict[str, Any]:
     """The same for a light that projects it: Mitsuba's v is 0 at the top of such an image."""
-    if isinstance(value, str) and context.in_file is not None:
-        return context.in_file(value, context, False, True)
     found = colour(value, context)
-    if "to_uv" in found:
-        found["to_uv"] = _to_uv(np.array(found["to_uv"].matrix, np.float64) @ FLIP)
+    if context.files is not None and found["type"] in ("bitmap", "checkerboard"):
+        found["to_uv"] = (*FLIP_STEPS, *found.get("to_uv", ()))
+    elif "to_uv" in found:
+        found["to_uv"] = _transform(np.array(found["to_uv"].matrix, np.float64) @ FLIP)
     return found
 
 
@@ -104,7 +51,7 @@ def number(value: float | str, context: TranslationContext) -> float | dict[str,
     0.2126).  Raises as `colour` does.
     """
     if isinstance(value, str):
-        return _translated(value, context, True)
+        return translate_texture(context.textures[value], value, context, True)
     return value
 
 
@@ -123,29 +70,38 @@ def _(texture: Checker, name: str, context: TranslationContext, as_number: bool)
         # Mitsuba's checkerboard limits its colours to reflectances; an image of four texels is the
         # same texture.
         rows = np.array([[second, first], [first, second]])
-        return _lookup(_image(rows, as_number), "nearest", "repeat", texture.uv)
+        four = _image(rows, "checker", context, as_number)
+        return _lookup(four, "nearest", "repeat", texture.uv, context)
     places: tuple[Any, Any] = (rgb(first), rgb(second))
     if as_number:
         # Mitsuba's `eval_1` swaps the two colours of its `eval` (3.9.1).
-        places = (float(luminance(Vec3(*second))), float(luminance(Vec3(*first))))
+        places = places[::-1]
+        if context.files is None:
+            places = (float(luminance(Vec3(*second))), float(luminance(Vec3(*first))))
     return {
         "type": "checkerboard",
         "color0": places[0],
         "color1": places[1],
-        "to_uv": _to_uv(affine.of_uv(texture.uv)),
+        **_to_uv(texture.uv, context, is_image=False),
     }
 
 
 @translate_texture.register
 def _(texture: Bitmap, name: str, context: TranslationContext, as_number: bool) -> dict[str, Any]:
     along_u, along_v = texture.wraps
+    if context.files is not None and (along_u != along_v or texture.cutoff is not None):
+        raise UntranslatableError("Bitmap with two wraps or a cutoff", "texture")
     if along_u != along_v:
         raise UntranslatableError("Bitmap that is continued otherwise along u than v", "texture")
     as_grey = as_number and texture.cutoff is None
-    key = (name, as_grey)
+    key = (name, as_grey and context.files is None)
     if key not in context.images:
-        context.images[key] = _image(texels_of(texture, context), as_grey)
-    found = _lookup(context.images[key], texture.filter, along_u, texture.uv)
+        context.images[key] = (
+            _image(texels_of(texture, context), name, context, as_grey)
+            if context.files is None
+            else _file_of(texture, name, context, context.files)
+        )
+    found = _lookup(context.images[key], texture.filter, along_u, texture.uv, context)
     return found if texture.cutoff is None else product([found], cutoff=texture.cutoff)
 
 
@@ -158,7 +114,9 @@ def texels_of(texture: Bitmap, context: TranslationContext) -> FloatArray:
 
 @translate_texture.register
 def _(texture: Product, name: str, context: TranslationContext, as_number: bool) -> dict[str, Any]:
-    return product([_translated(of, context, False) for of in texture.of], texture.factor)
+    if context.files is not None:
+        raise UntranslatableError(texture, "texture")
+    return product([colour(of, context) for of in texture.of], texture.factor)
 
 
 def product(
@@ -182,30 +140,84 @@ def _(
         if as_number:
             return {"type": "uniform", "value": float(luminance(Vec3(*texture.without)))}
         return rgb(texture.without)
-    attribute = VERTEX_LUMINANCE if as_number else VERTEX_COLOUR
+    # Files of meshes have no luminance: Mitsuba takes that of the colour.
+    in_memory = as_number and context.files is None
+    attribute = VERTEX_LUMINANCE if in_memory else VERTEX_COLOUR
     return {"type": "mesh_attribute", "name": attribute, "scale": texture.scale}
 
 
-def _image(texels: FloatArray, as_number: bool) -> Any:
+# ---- images --------------------------------------------------------------------------------------
+
+
+IMAGES = (".exr", ".png", ".jpg", ".jpeg", ".hdr", ".pfm", ".bmp", ".tga")
+"""Files that Mitsuba reads, and to the same values as we do."""
+
+
+def _image(
+    texels: FloatArray, stem: str, context: TranslationContext, as_number: bool
+) -> dict[str, Any]:
+    """Linear texels as parameters of a bitmap, which are never half floats."""
+    if context.files is not None:
+        return {**context.image(stem, texels), "raw": True}
     if as_number:
         texels = np.asarray(luminance(Vec3(*np.moveaxis(texels, -1, 0))))[..., None]
-    return mitsuba().Bitmap(np.ascontiguousarray(texels, dtype=np.float32))
+    return {**context.image(stem, texels), "raw": True, "format": "variant"}
 
 
-def _lookup(image: Any, filter_type: str, wrap: str, uv: UvMap) -> dict[str, Any]:
+def _file_of(
+    texture: Bitmap, name: str, context: TranslationContext, files: Files
+) -> dict[str, Any]:
+    """A texture's own file where Mitsuba reads the same values from it; else one of its values."""
+    path = context.folder / texture.file
+    suffix = path.suffix.lower()
+    is_integer = suffix in (".png", ".jpg", ".jpeg", ".bmp", ".tga")
+    is_plain = suffix in IMAGES and (texture.scale, texture.channel) == (1.0, "all")
+    if is_plain and (is_integer or texture.encoding not in ("srgb", "radiance")):
+        raw = texture.encoding == "raw" or not is_integer
+        return {"filename": files.copy(texture.file, "textures", name, "file"), "raw": raw}
+    context.note(f"the image {texture.file} is written as linear float32 values")
+    return _image(texture.read(context.folder).linear, path.stem, context, False)
+
+
+def _lookup(
+    image: dict[str, Any], filter_type: str, wrap: str, uv: UvMap, context: TranslationContext
+) -> dict[str, Any]:
     return {
         "type": "bitmap",
-        "bitmap": image,
-        "raw": True,
-        "format": "variant",  # never half floats
+        **image,
         "filter_type": filter_type,
         "wrap_mode": wrap,
-        "to_uv": _to_uv(FLIP @ affine.of_uv(uv)),
+        **_to_uv(uv, context, is_image=True),
     }
 
 
-def _to_uv(matrix: FloatArray) -> Any:
+def _to_uv(uv: UvMap, context: TranslationContext, is_image: bool) -> dict[str, Any]:
+    """A texture's map, none for the identity in a file.  is_image: its v is 0 at the top."""
+    if context.files is None:
+        m = affine.of_uv(uv)
+        return {"to_uv": _transform(FLIP @ m if is_image else m)}
+    steps = (*steps_of(uv), *(FLIP_STEPS if is_image else ()))
+    return {"to_uv": steps} if steps else {}
+
+
+def _transform(matrix: FloatArray) -> Any:
     return mitsuba().ScalarTransform3f(matrix)
+
+
+def steps_of(uv: UvMap) -> tuple[Step, ...]:
+    """A map of texture coordinates as steps, none for the identity."""
+    if uv.matrix is not None:
+        (a, b, c), (d, e, f) = uv.matrix
+        rows = np.array([[a, b, 0.0, c], [d, e, 0.0, f], [0.0, 0.0, 1.0, 0.0]])
+        return (matrix_step(rows),)
+    found = []
+    if uv.scale != (1.0, 1.0):
+        found.append(Step("scale", (*uv.scale, 1.0)))
+    if uv.rotate != 0.0:
+        found.append(Step("rotate", (0.0, 0.0, 1.0, uv.rotate)))
+    if uv.offset != (0.0, 0.0):
+        found.append(Step("translate", (*uv.offset, 0.0)))
+    return tuple(found)
 
 
 def depends_on_uv(texture: Texture) -> bool:

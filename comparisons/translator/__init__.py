@@ -30,6 +30,7 @@ from comparisons.materials.translate import (
     parts_of,
 )
 from comparisons.mitsuba.backend import mitsuba, scalar
+from comparisons.mitsuba.context import TranslationContext, UntranslatableError
 from comparisons.mitsuba.counterpart import Counterpart, InstancedGroup
 from comparisons.mitsuba.csg import Operand, SolidCounterpart
 from comparisons.mitsuba.hits import MitsubaShape, Plugin
@@ -38,7 +39,6 @@ from comparisons.mitsuba.scene import light_id, shape_id
 from comparisons.renderers import ReferenceSampler
 from comparisons.shapes import Site, translate_shape
 from comparisons.shapes.meshes import MOST_INSTANCES
-from comparisons.textures.translate import TranslationContext, UntranslatableError
 from comparisons.translator.moved import frame_of, moved
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
@@ -113,7 +113,8 @@ def _groups(mi_shapes: Mapping[str, MitsubaShape]) -> dict[str, Any]:
 
 
 def _translated(scene: Scene, native: bool = False) -> _Translated:
-    sensor = translate_camera(scene.camera, scene.film)
+    context = TranslationContext.of(scene, native)
+    sensor = translate_camera(scene.camera, scene.film, context)
     sensor["film"] = translate_film(scene.film)
     sensor["sampler"] = translate_sampler(scene.resolved_sampler)
     plain: dict[str, Any] = {"type": "scene", **ROBUST, "sensor": sensor}
@@ -126,7 +127,6 @@ def _translated(scene: Scene, native: bool = False) -> _Translated:
     copies = copies_of(scene)
     count = {group: sum(c.group == group for c in copies) for group in {c.group for c in copies}}
     shared: dict[Any, Any] = {}
-    context = TranslationContext.of(scene, native)
     reach = _reach(scene, copies)
     for copy in copies:
         try:

@@ -12,8 +12,8 @@ import numpy as np
 from comparisons.geometry.frame import UNIT_ROUNDOFF
 from comparisons.materials.translate import translate_material
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.scene import for_rays
-from comparisons.textures.translate import TranslationContext
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.materials import (

@@ -14,36 +14,18 @@ from comparisons.cameras import translate_camera
 from comparisons.cameras.film import translate_film
 from comparisons.cameras.samplers import translate_sampler
 from comparisons.integrators import translate_integrator
-from comparisons.integrators.ray_cast import CAST, LAYERS
+from comparisons.integrators.ray_cast import LAYERS, shown_by
 from comparisons.integrators.whitted import AMBIENT
 from comparisons.lights import translate_light
 from comparisons.lights.constant import ambient_of
 from comparisons.materials.translate import translate_material
-from comparisons.mitsuba.files import (
-    Element,
-    Files,
-    Reference,
-    Rgb,
-    Vector,
-    matrix_step,
-    written_image,
-)
-from comparisons.mitsuba.parse import FLIP, Step
+from comparisons.mitsuba.context import TranslationContext
+from comparisons.mitsuba.files import Element, Files, Reference, Rgb, Vector, matrix_step
 from comparisons.mitsuba.plugins.whitted import MOST_COMPONENTS
-from comparisons.textures.translate import (
-    VERTEX_COLOUR,
-    TranslationContext,
-    UntranslatableError,
-    rgb,
-)
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.materials import most_branches
 from reference_rt.rendering.scene import Scene
-from reference_rt.textures import Bitmap, Checker, VertexColours
-from reference_rt.textures.texture import UvMap
-
-IMAGES = (".exr", ".png", ".jpg", ".jpeg", ".hdr", ".pfm", ".bmp", ".tga")
-"""Files that Mitsuba reads, and to the same values as we do."""
+from reference_rt.textures import VertexColours
 
 OURS = (
     "the {} '{}' is ours: before Mitsuba loads the file, call "
@@ -51,7 +33,12 @@ OURS = (
 )
 """A note on a plugin."""
 
+OUR_PLUGINS = ("textbook_phong", "gltf_pbr", "view_rectangle", "whitted", "mesh_area")
+
 TEXTURES = ("bitmap", "checkerboard", "mesh_attribute", "uniform")
+
+TAGS = ("film", "rfilter", "sampler", "integrator", "emitter")
+"""Names of nested plugins that are their elements' tags, too."""
 
 
 class Surfaces:
@@ -62,9 +49,7 @@ class Surfaces:
         self.elements: dict[Any, Element] = {}
         self.textures: dict[str, Element] = {}
         self.ids: set[str] = set()
-        self.notes: list[str] = []
-        context = TranslationContext.of(scene, native=True)
-        self.context = replace(context, in_file=self.texture, files=files)
+        self.context = TranslationContext.of(scene, native=True, files=files)
 
     def id_for(self, name: str) -> str:
         """An id that no element has: the name, if Mitsuba takes it for one."""
@@ -87,7 +72,7 @@ class Surfaces:
                 found = translate_material(self.scene.materials[name], context)
             except ValueError as error:
                 raise self.scene.error(str(error), "materials", name) from None
-            element = self.element(found)
+            element = self.element(found, "bsdf")
             element.id = self.id_for(name)
             self.elements[key] = element
         return Reference(self.elements[key].id)
@@ -95,26 +80,29 @@ class Surfaces:
     def _uses_colours(self) -> bool:
         return any(isinstance(t, VertexColours) for t in self.scene.textures.values())
 
-    def element(self, value: dict[str, Any], tag: str = "bsdf") -> Element:
-        """A plugin's dictionary as an element, nested ones too."""
+    def element(self, value: dict[str, Any], tag: str) -> Element:
+        """A plugin's dictionary as an element, nested ones too: textures as elements of their own,
+        others by the names of their parameters, which are tags but for BSDFs."""
         plugin = value["type"]
-        if plugin in ("textbook_phong", "gltf_pbr"):
-            self.note(OURS.format("BSDF", plugin))
+        if plugin in OUR_PLUGINS:
+            self.context.note(OURS.format("BSDF" if tag == "bsdf" else tag, plugin))
         element = Element(tag, plugin)
         for key, part in value.items():
-            if key == "type":
-                continue
-            if isinstance(part, list):
-                element.values[key] = Vector(*part)
-            elif not isinstance(part, dict):
-                element.values[key] = part
-            elif part["type"] == "rgb":
-                element.values[key] = Rgb(*part["value"])
-            elif part["type"] in TEXTURES:
-                element.values[key] = self.shared(part)
-            else:
-                element.children.append(self.element(part))
+            if isinstance(part, dict) and part["type"] not in ("rgb", *TEXTURES):
+                element.children.append(self.element(part, key if key in TAGS else "bsdf"))
+            elif key != "type":
+                element.values[key] = self.value(part)
         return element
+
+    def value(self, value: Any) -> Any:
+        """A parameter as an element has it."""
+        if isinstance(value, list):
+            return Vector(*value)
+        if isinstance(value, dict):
+            return Rgb(*value["value"]) if value["type"] == "rgb" else self.shared(value)
+        if hasattr(value, "matrix"):
+            return (matrix_step(np.array(value.matrix, np.float64)[:3]),)
+        return value
 
     def shared(self, value: dict[str, Any]) -> Reference:
         """A texture's dictionary as an element, which is one however often it is used."""
@@ -125,129 +113,30 @@ class Surfaces:
         return Reference(self.textures[key].id)
 
     def note(self, text: str) -> None:
-        if text not in self.notes:
-            self.notes.append(text)
-
-    # ---- textures -------------------------------------------------------------------------------
-
-    def texture(
-        self, name: str, context: TranslationContext, as_number: bool, projected: bool = False
-    ) -> dict[str, Any]:
-        """A texture's dictionary, with steps as its map.  projected: by a light, whose image has
-        v = 0 at the top."""
-        texture = self.scene.textures[name]
-        first = FLIP if projected else ()
-        match texture:
-            case Checker():
-                return self._checker(texture, first, as_number)
-            case Bitmap():
-                return self._bitmap(texture, name, first)
-            case VertexColours():
-                if not context.has_colours:
-                    return (
-                        {"type": "uniform", "value": texture.without[0]}
-                        if as_number
-                        else rgb(texture.without)
-                    )
-                return {"type": "mesh_attribute", "name": VERTEX_COLOUR, "scale": texture.scale}
-        raise UntranslatableError(texture, "texture")
-
-    def _checker(
-        self, texture: Checker, first: tuple[Step, ...], as_number: bool
-    ) -> dict[str, Any]:
-        one, two = texture.first, texture.second
-        if max(*one, *two) > 1.0:  # Mitsuba's are reflectances; an image of four texels is the same
-            texels = np.array([[two, one], [one, two]])
-            return self._image(written_image(self.files, "checker", texels), "nearest", "repeat", first, texture)
-        if as_number:
-            one, two = two, one  # see `translate.textures`
-        values = {"color0": rgb(one), "color1": rgb(two)}
-        steps = (*first, *steps_of(texture.uv))
-        return {"type": "checkerboard", **values, **({"to_uv": steps} if steps else {})}
-
-    def _bitmap(self, texture: Bitmap, name: str, first: tuple[Step, ...]) -> dict[str, Any]:
-        along_u, along_v = texture.wraps
-        if along_u != along_v or texture.cutoff is not None:
-            raise UntranslatableError("Bitmap with two wraps or a cutoff", "texture")
-        path = self.scene.folder / texture.file
-        suffix = path.suffix.lower()
-        is_integer = suffix in (".png", ".jpg", ".jpeg", ".bmp", ".tga")
-        is_plain = suffix in IMAGES and (texture.scale, texture.channel) == (1.0, "all")
-        if is_plain and (is_integer or texture.encoding not in ("srgb", "radiance")):
-            file = self.files.copy(texture.file, "textures", name, "file")
-            raw = texture.encoding == "raw" or not is_integer
-        else:
-            file, raw = written_image(self.files, path.stem, texture.read(self.scene.folder).linear), True
-            self.note(f"the image {texture.file} is written as linear float32 values")
-        return self._image(file, texture.filter, along_u, first, texture, raw)
-
-    def _image(
-        self,
-        file: str,
-        filter_type: str,
-        wrap: str,
-        first: tuple[Step, ...],
-        texture: Bitmap | Checker,
-        raw: bool = True,
-    ) -> dict[str, Any]:
-        return {
-            "type": "bitmap",
-            "filename": file,
-            "raw": raw,
-            "filter_type": filter_type,
-            "wrap_mode": wrap,
-            "to_uv": (*first, *steps_of(texture.uv), *FLIP),
-        }
-
-
-def steps_of(uv: UvMap) -> tuple[Step, ...]:
-    """A map of texture coordinates as steps, none for the identity."""
-    if uv.matrix is not None:
-        (a, b, c), (d, e, f) = uv.matrix
-        rows = np.array([[a, b, 0.0, c], [d, e, 0.0, f], [0.0, 0.0, 1.0, 0.0]])
-        return (matrix_step(rows),)
-    found = []
-    if uv.scale != (1.0, 1.0):
-        found.append(Step("scale", (*uv.scale, 1.0)))
-    if uv.rotate != 0.0:
-        found.append(Step("rotate", (0.0, 0.0, 1.0, uv.rotate)))
-    if uv.offset != (0.0, 0.0):
-        found.append(Step("translate", (*uv.offset, 0.0)))
-    return tuple(found)
+        self.context.note(text)
 
 
 # ---- camera, film, sampler, integrator and lights ------------------------------------------------
 
+
 def sensor(scene: Scene, surfaces: Surfaces) -> Element:
     """The camera, with film and sampler.  Raises UntranslatableError."""
-    values = translate_camera(scene.camera, scene.film, in_file=True)
-    if values["type"] == "view_rectangle":
-        surfaces.note(OURS.format("sensor", values["type"]))
-    found = surfaces.element(values, "sensor")
-    film = translate_film(scene.film)
-    rfilter = film.pop("rfilter")
-    found.children += [
-        surfaces.element(film, "film"),
-        surfaces.element(translate_sampler(scene.resolved_sampler, in_file=True), "sampler"),
-    ]
-    found.children[0].children.append(surfaces.element(rfilter, "rfilter"))
-    return found
+    values = translate_camera(scene.camera, scene.film, surfaces.context)
+    values["film"] = translate_film(scene.film)
+    values["sampler"] = translate_sampler(scene.resolved_sampler, in_file=True)
+    return surfaces.element(values, "sensor")
 
 
 def integrator(scene: Scene, surfaces: Surfaces) -> Element:
     """The integrator, inside another one for layers.  Raises UntranslatableError."""
     chosen = scene.integrator
     if isinstance(chosen, RayCast):
-        if chosen.show == "distance":
-            return Element("integrator", "depth")
-        return Element("integrator", "aov", {"aovs": f"{chosen.show}:{CAST[chosen.show]}"})
-    values = dict(translate_integrator(chosen) or {})
-    found = Element("integrator", values.pop("type"), values)
+        return surfaces.element(shown_by(chosen), "integrator")
+    found = dict(translate_integrator(chosen) or {})
     if isinstance(chosen, Whitted):
         ambient = zip(AMBIENT, ambient_of(scene.lights), strict=True)
-        values |= {name: x for name, x in ambient if x != 0.0}
-        values["components"] = MOST_COMPONENTS * int(most_branches(scene.tables.materials))
-        surfaces.note(OURS.format("integrator", "whitted"))
+        found |= {name: x for name, x in ambient if x != 0.0}
+        found["components"] = MOST_COMPONENTS * int(most_branches(scene.tables.materials))
     if getattr(chosen, "sampling", "both") != "both":
         surfaces.note("'sampling' of the integrator is left out: the mean is the same")
     layers = [name for name in scene.film.layers if name in LAYERS]
@@ -255,8 +144,8 @@ def integrator(scene: Scene, surfaces: Surfaces) -> Element:
         surfaces.note(f"the layer '{name}' is left out: Mitsuba has none")
     if layers:
         aovs = ", ".join(f"{name}:{LAYERS[name]}" for name in layers)
-        return Element("integrator", "aov", {"aovs": aovs}, [found])
-    return found
+        found = {"type": "aov", "aovs": aovs, "integrator": found}
+    return surfaces.element(found, "integrator")
 
 
 def lights(scene: Scene, surfaces: Surfaces) -> list[Element]:

@@ -10,6 +10,7 @@ import numpy as np
 from comparisons.integrators.mistakes import notes_of_integrator
 from comparisons.materials.translate import has_delta
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.plugins.exact_coat import (
     CELLS,
     accepted,
@@ -17,7 +18,6 @@ from comparisons.mitsuba.plugins.exact_coat import (
     rough_coat,
     smooth_reflectance,
 )
-from comparisons.textures.translate import TranslationContext
 from comparisons.translator.accuracy import accuracy
 from reference_rt.materials import (
     Blend,

@@ -15,12 +15,13 @@ from comparisons.integrators.mistakes import (
     notes_of_integrator,
 )
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.colours import index_of_refraction
+from comparisons.mitsuba.context import TranslationContext, UntranslatableError
 from comparisons.mitsuba.node import Node
 from comparisons.mitsuba.parse import Parsed, parse_file
 from comparisons.mitsuba.plugins.exact_coat import COLOURS, SUBSTITUTE
 from comparisons.renderers import ReferenceSampler
-from comparisons.textures.reading import index_of_refraction, to_uv
-from comparisons.textures.translate import TranslationContext, UntranslatableError
+from comparisons.textures.reading import to_uv
 from comparisons.translator.notes import note_of
 from comparisons.translator.reading import read_supported
 from reference_rt.materials import (

@@ -18,7 +18,18 @@ FLOORS = {
     ),
     "comparisons": (
         *("results", "geometry", "statistics", "renderers", "mitsuba", "textures", "materials"),
-        *("cameras", "lights", "shapes", "translator", "pbrt", "gltf", "runs", "cycles", "rungs"),
+        *(
+            "cameras",
+            "lights",
+            "integrators",
+            "shapes",
+            "translator",
+            "pbrt",
+            "gltf",
+            "runs",
+            "cycles",
+            "rungs",
+        ),
         *("report", "compare", "gate", "truth", "suites", "experiments", "commands"),
     ),
 }

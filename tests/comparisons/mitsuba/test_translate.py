@@ -9,7 +9,7 @@ import pytest
 
 import reference_rt as rt
 from comparisons.cycles.translate import bounces_of
-from comparisons.lights.translate import ambient_of
+from comparisons.lights.constant import ambient_of
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import trace
 from comparisons.mitsuba.scene import render
