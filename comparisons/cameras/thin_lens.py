@@ -1,4 +1,4 @@
-"""Cameras with a lens: Mitsuba's `thinlens`, or our `view_rectangle` where that has no such view."""
+"""Cameras with a lens: Mitsuba's `thinlens`, or our `view_rectangle` for views that it lacks."""
 
 import math
 

@@ -168,14 +168,9 @@ class _Document(Surfaces):
         if found is None:
             return
         axis, most = found.axis, max(found.power)
-        data = {
-            "type": light.type,
-            "name": name,
-            **(found.data or {}),
-            "color": colour,
-            "intensity": most,
-        }
-        data["color"] = [x / most for x in found.power] if most else [0.0] * 3
+        colour = [x / most for x in found.power] if most else [0.0] * 3
+        data = {"type": light.type, "name": name, **(found.data or {})}
+        data |= {"color": colour, "intensity": most}
         self.used.add("KHR_lights_punctual")
         aside = np.cross(axis, across(axis))
         aside /= np.linalg.norm(aside)
