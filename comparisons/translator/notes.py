@@ -94,25 +94,25 @@ def base_error(eta: float, distribution: str = "", alpha: float = 0.0) -> tuple[
 def notes_of(scene: Scene) -> list[str]:
     """The notes on a scene's materials, each text once."""
     context = TranslationContext.of(scene)
-    found = [note_of(material, context) for material in scene.materials.values()]
+    notes = [note_of(material, context) for material in scene.materials.values()]
     for name in scene.materials:
         off = accuracy(scene, name)
         if off > 0.0:
-            found.append(
+            notes.append(
                 f"'{name}': a relative error of {off:.2g} of its light is allowed for (tables, "
                 "float32: comparisons.translator.accuracy)"
             )
-    found += notes_of_integrator(scene)
-    return list(dict.fromkeys(note for note in found if note))
+    notes += notes_of_integrator(scene)
+    return list(dict.fromkeys(note for note in notes if note))
 
 
 def notes_of_integrator(scene: Scene) -> list[str]:
     """The notes on errors of Mitsuba's integrators."""
-    found = (
+    notes = (
         *(note_of_samples(scene), note_of_masks(scene), note_of_passing(scene)),
         note_of_hiding(scene),
     )
-    return [note for note in found if note]
+    return [note for note in notes if note]
 
 
 def note_of_passing(scene: Scene) -> str:
