@@ -20,7 +20,7 @@ from comparisons.mitsuba.node import Node
 from comparisons.mitsuba.parse import Parsed, parse_file
 from comparisons.mitsuba.plugins.exact_coat import COLOURS, SUBSTITUTE
 from comparisons.renderers import ReferenceSampler
-from comparisons.textures.reading import to_uv
+from comparisons.textures.texture import matrix_of
 from comparisons.translator.notes import note_of, notes_of_integrator
 from comparisons.translator.reading import read_supported
 from reference_rt.materials import (
@@ -103,7 +103,7 @@ def _bump(state: Any, index: int, node: Node) -> None:
     mi, props = mitsuba(), state.nodes[index].props
     ((base, _),) = node.named_children("BSDF")
     ((height, image),) = node.named_children("Texture")
-    m = to_uv(image)
+    m = matrix_of(image)
     copied = mi.parser.SceneNode()
     old = state.nodes[props[height].index()]
     copied.type, copied.props = old.type, mi.Properties(old.props)
