@@ -7,7 +7,7 @@ What no reader has taken at the end is an error: nothing of a file is silently l
 import itertools
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -297,9 +297,11 @@ class Node:
 
 @dataclass
 class Reading:
-    """What has been read of a scene so far; notes: what the reader should know of it."""
+    """What has been read of a scene so far; material_name: reads a BSDF, if it is not yet, and says
+    its name; notes: what the reader should know of the scene."""
 
     parsed: Parsed
+    material_name: Callable[["Reading", Node], str]
     textures: dict[str, Any] = field(default_factory=dict)
     materials: dict[str, Any] = field(default_factory=dict)
     groups: dict[str, Any] = field(default_factory=dict)
@@ -316,6 +318,10 @@ class Reading:
     """Files of meshes, as read."""
     numbers: dict[Any, Iterator[int]] = field(default_factory=dict)
     """The numbers that `unused` appends next, by table and name: "diffuse_2", "diffuse_3"."""
+
+    def bsdf(self, node: Node) -> str:
+        """The name of a BSDF among `materials`.  Raises SceneError."""
+        return self.material_name(self, node)
 
     def file(self, node: Node, key: str = "filename") -> Path:
         """The file that an element names.  Raises SceneError if there is none."""

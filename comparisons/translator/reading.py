@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 from comparisons.cameras.reading import read_sensor
 from comparisons.lights.reading import belongs_to_shape, read_light
+from comparisons.materials.reading import material_name
 from comparisons.mitsuba.node import MissingError, Node, Reading
 from comparisons.mitsuba.parse import Parsed, module, parse_dict, parse_file
 from comparisons.shapes.reading import read_shape
@@ -122,7 +123,7 @@ def read_supported(parsed: Parsed, cls: type[M]) -> tuple[M, list[str]]:
 
 
 def _scene(parsed: Parsed, cls: type[M]) -> M:
-    reading = Reading(parsed)
+    reading = Reading(parsed, material_name)
     for index, text in parsed.notes:
         reading.note(Node(parsed, index), text)
     root = Node(parsed, 0)

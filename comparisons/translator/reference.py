@@ -14,12 +14,13 @@ from comparisons.lights.translate import (
     in_place_of,
 )
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.colours import index_of_refraction
+from comparisons.mitsuba.context import TranslationContext, UntranslatableError
 from comparisons.mitsuba.node import Node
 from comparisons.mitsuba.parse import Parsed, parse_file
 from comparisons.mitsuba.plugins.exact_coat import COLOURS, SUBSTITUTE
 from comparisons.renderers import ReferenceSampler
-from comparisons.textures.reading import index_of_refraction, to_uv
-from comparisons.textures.translate import TranslationContext, UntranslatableError
+from comparisons.textures.texture import matrix_of
 from comparisons.translator.notes import note_of, notes_of_integrator
 from comparisons.translator.reading import read_supported
 from reference_rt.materials import (
@@ -102,7 +103,7 @@ def _bump(state: Any, index: int, node: Node) -> None:
     mi, props = mitsuba(), state.nodes[index].props
     ((base, _),) = node.named_children("BSDF")
     ((height, image),) = node.named_children("Texture")
-    m = to_uv(image)
+    m = matrix_of(image)
     copied = mi.parser.SceneNode()
     old = state.nodes[props[height].index()]
     copied.type, copied.props = old.type, mi.Properties(old.props)

@@ -19,8 +19,8 @@ from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, 
 from comparisons.geometry.exact.crossings import IntArray
 from comparisons.materials.translate import translate_material
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.scene import for_rays
-from comparisons.textures.translate import TranslationContext
 from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.materials import (
