@@ -94,6 +94,7 @@ SCHEMA = 1
 
 KIND = "convergence"
 
+
 class Rung(NamedTuple):
     """A method at a number of samples.  A grid of a deterministic scene is a rung of ours with one
     replicate and neither bands nor variance."""

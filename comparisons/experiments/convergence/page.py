@@ -136,6 +136,7 @@ def _view(one: Curves, targets: Sequence[str]) -> dict[str, Any]:
     view["rungs"] = Table(RUNGS, [*rungs_of(one)]) if one.findings else None
     return view
 
+
 _EXTRAPOLATED = (
     "Extrapolated: beyond the last rung, the relMSE is modelled as a / n + c / n^1.5 for n samples "
     "(c = 0 for independent ones), fitted to the last rungs."
