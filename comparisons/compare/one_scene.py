@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import fields
 from html import escape
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -68,7 +69,8 @@ class NotebookCase(Case):
         table = biases_of(self)
         if table is None:
             return ""
-        rows = [("th", table.head), *(("td", row) for row in table.cells)]
+        rows: list[tuple[str, list[Any]]] = [("th", table.head)]
+        rows += [("td", row) for row in table.cells]
         body = "".join(
             f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in row)}</tr>"
             for tag, row in rows

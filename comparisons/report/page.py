@@ -265,9 +265,10 @@ def _biases(case: Case) -> Table[Any] | None:
     """The numbers of the statistics, each with a capital letter; None if there are none."""
     if (table := biases_of(case)) is None:
         return None
+    texts: list[list[Any]] = [table.head, *table.cells]
     head, *rows = (
         [f"{cell[:1].upper()}{cell[1:]}".replace(" %", "\N{NO-BREAK SPACE}%") for cell in row]
-        for row in (table.head, *table.cells)
+        for row in texts
     )
     return table_of(head, rows)
 

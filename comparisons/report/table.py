@@ -123,5 +123,7 @@ def table_of(
     head: Sequence[str], rows: Iterable[Sequence[Shown]], right: Container[int] = ()
 ) -> Table[Sequence[Shown]]:
     """A table whose cells are written already;  right: the columns that are aligned there."""
-    columns = [Column(name, itemgetter(k), right=k in right) for k, name in enumerate(head)]
+    columns: list[Column[Sequence[Shown]]] = [
+        Column(name, itemgetter(k), right=k in right) for k, name in enumerate(head)
+    ]
     return Table(columns, list(rows))

@@ -115,14 +115,14 @@ def summarise(
     console.print(f"{how_many(len(cases), len(missing))}{verdicts}", markup=False)
     shown = [case for case in ranked(cases) if every or case.verdict not in PASSING]
     if shown:
-        columns = (
+        columns: tuple[Column[Case], ...] = (
             Column("case", lambda case: case.scene),
             Column("verdict", lambda case: Text(case.verdict, _STYLES[case.verdict])),
             Column("likeliest cause", lambda case: "" if case.cause is None else case.cause.name),
             Column("first difference", lambda case: named(first_difference(case), case.sides)),
             Column("seconds", lambda case: walls.get(case.scene), _wall, right=True),
         )
-        console.print(Table[Case](columns, shown).terminal(console.width))
+        console.print(Table(columns, shown).terminal(console.width))
     slowest = sorted(walls, key=lambda name: walls[name], reverse=True)[:_SLOWEST]
     if slowest:
         times = ", ".join(f"{name} {walls[name]:.1f} s" for name in slowest)

@@ -123,9 +123,9 @@ def rungs_of(one: Curves) -> Iterator[Rung]:
             who = one.scene, one.size, name, method.title, method.sampler
             yield Rung(*who, *counts, s.seconds, s.mse, s.relmse, s.variance, s.efficiency)
     for g in one.grids.steps if one.grids is not None else ():
-        errors = [(value, None, None) for value in (g.seconds, g.mse, g.relmse)]
-        ours = one.scene, one.size, "ours", "ours", "grid"
-        yield Rung(*ours, g.spp, g.spp, 1, *errors, None, None)
+        seconds, mse, relmse = ((value, None, None) for value in (g.seconds, g.mse, g.relmse))
+        who = one.scene, one.size, "ours", "ours", "grid"
+        yield Rung(*who, g.spp, g.spp, 1, seconds, mse, relmse, None, None)
 
 
 def _timed(seconds: float) -> str:

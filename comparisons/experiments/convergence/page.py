@@ -178,15 +178,15 @@ def _tables(one: Curves, targets: Sequence[str]) -> list[tuple[str, Table[Any], 
         finest = f"ours, {one.grids.finest} samples"
         some: list[tuple[str, Any, str]] = [("ours", step, finest) for step in one.grids.steps]
         some += [(f"Mitsuba {p.variant}", p, f"ours, {p.spp} samples") for p in one.grids.points]
-        columns = (
+        grid: list[Column[tuple[str, Any, str]]] = [
             Column("Renderer", lambda row: row[0]),
             Column("samples per pixel", lambda row: row[1].spp, shown),
             Column("seconds", lambda row: row[1].seconds, _seconds),
             Column("MSE", lambda row: row[1].mse, shown),
             Column("relMSE", lambda row: row[1].relmse, shown),
             Column("against", lambda row: row[2]),
-        )
-        tables.append(("Grids", Table(columns, some), ""))
+        ]
+        tables.append(("Grids", Table(grid, some), ""))
     return tables
 
 
@@ -344,7 +344,7 @@ def markdown(curves: Sequence[Curves], provenance: Mapping[str, Any]) -> str:
             lines.append(one.problem or "no method has two rungs of samples")
             continue
         errors = [percent(target.error) for target in next(iter(one.findings.values())).targets]
-        rows = [
+        rows: list[list[Any]] = [
             [one.methods[name].title, *map(_reached, found.targets)]
             for name, found in one.findings.items()
         ]

@@ -84,17 +84,14 @@ def _table(rows: Sequence[Row], *first: Column[str], between: str) -> Table[str]
     """Of one family: a row for each method, and below its columns those of the settings, in
     nanoseconds per ray;  between: what stands between a setting's series and its x."""
     times = {(row.method, row.series, row.x): row.time.median for row in rows}
+
+    def setting(series: str, axis: str, x: float) -> Column[str]:
+        name = f"{series}{between}{x:g} {axis}" if axis else series
+        return Column(name, lambda method: times[method, series, x], nanoseconds, right=True)
+
     settings = dict.fromkeys((row.series, row.axis, row.x) for row in rows)
-    of_settings = [
-        Column[str](
-            f"{series}{between}{x:g} {axis}" if axis else series,
-            lambda method, place=(series, x): times[method, *place],
-            nanoseconds,
-            right=True,
-        )
-        for series, axis, x in settings
-    ]
-    return Table((*first, *of_settings), list(dict.fromkeys(row.method for row in rows)))
+    columns = (*first, *(setting(*each) for each in settings))
+    return Table(columns, list(dict.fromkeys(row.method for row in rows)))
 
 
 def nanoseconds(value: float) -> str:
