@@ -16,7 +16,7 @@ from reference_rt.materials import Bump
 from reference_rt.textures import Bitmap
 from reference_rt.textures.texture import UvMap
 
-TABLE = PluginTable("bumpmap", Bump, (Row("scale", "scale", NUMBER, 1.0), *TILT))
+TABLE = PluginTable("bumpmap", (Row("scale", "scale", NUMBER, 1.0), *TILT))
 
 
 def _to_mitsuba(material: Bump, context: TranslationContext) -> dict[str, Any] | Nested:

@@ -22,7 +22,7 @@ from comparisons.renderers.vocabulary import (
 )
 from reference_rt.materials import Conductor, Material, Mirror
 
-TABLE = PluginTable("conductor", Conductor, METAL)
+TABLE = PluginTable("conductor", METAL)
 
 
 def _from_mitsuba(reading: Reading, node: Node) -> Material:

@@ -6,7 +6,7 @@ from comparisons.mitsuba.plugin_table import PluginTable
 from comparisons.renderers.vocabulary import CyclesWriter, Data, only
 from reference_rt.materials import Dielectric
 
-TABLE = PluginTable("dielectric", Dielectric, GLASS)
+TABLE = PluginTable("dielectric", GLASS)
 
 
 def _to_cycles(material: Dielectric, writing: CyclesWriter) -> Data:
@@ -17,7 +17,7 @@ def _to_cycles(material: Dielectric, writing: CyclesWriter) -> Data:
 DIELECTRIC = MaterialType(
     description=Dielectric,
     to_mitsuba=TABLE.write,
-    from_mitsuba={"dielectric": TABLE.make},
+    from_mitsuba={"dielectric": TABLE.reader(Dielectric)},
     note=None,
     errors=None,
     to_cycles=_to_cycles,

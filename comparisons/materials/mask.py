@@ -11,7 +11,7 @@ from comparisons.textures.kinds import NUMBER_OR_TEXTURE
 from comparisons.textures.texture import Nested
 from reference_rt.materials import Diffuse, Mask
 
-TABLE = PluginTable("mask", Mask, (Row("opacity", "opacity", NUMBER_OR_TEXTURE, 0.5),))
+TABLE = PluginTable("mask", (Row("opacity", "opacity", NUMBER_OR_TEXTURE, 0.5),))
 
 
 def _to_mitsuba(material: Mask, context: TranslationContext) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from comparisons.renderers.vocabulary import (
 )
 from reference_rt.materials import Mirror
 
-TABLE = PluginTable("conductor", Mirror, (REFLECTANCE,))
+TABLE = PluginTable("conductor", (REFLECTANCE,))
 """Without a material Mitsuba's conductor has eta = 0, k = 1, and reflects everything."""
 
 

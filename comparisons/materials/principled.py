@@ -24,7 +24,6 @@ def numbers(*names: str) -> tuple[Row, ...]:
 
 TABLE = PluginTable(
     "principled",
-    Principled,
     (
         BASE,
         *numbers("roughness", "metallic", "spec_tint", "anisotropic", "sheen", "sheen_tint"),

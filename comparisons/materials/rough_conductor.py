@@ -34,7 +34,7 @@ from comparisons.renderers.vocabulary import (
 )
 from reference_rt.materials import RoughConductor
 
-TABLE = PluginTable("roughconductor", RoughConductor, (DISTRIBUTION, *METAL), SAMPLING)
+TABLE = PluginTable("roughconductor", (DISTRIBUTION, *METAL), SAMPLING)
 
 
 def _to_mitsuba(material: RoughConductor, context: TranslationContext) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from comparisons.mitsuba.plugin_table import PluginTable
 from comparisons.renderers.vocabulary import Params, PbrtWriter
 from reference_rt.materials import RoughDielectric
 
-TABLE = PluginTable("roughdielectric", RoughDielectric, (DISTRIBUTION, *GLASS), SAMPLING)
+TABLE = PluginTable("roughdielectric", (DISTRIBUTION, *GLASS), SAMPLING)
 
 
 def _to_mitsuba(material: RoughDielectric, context: TranslationContext) -> dict[str, Any]:
