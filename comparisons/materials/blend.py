@@ -54,6 +54,7 @@ def _to_pbrt(material: Blend, writing: PbrtWriter, both_sides: bool) -> Params:
 
 BLEND = MaterialType(
     description=Blend,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"blendbsdf": _from_mitsuba},
     note=_note,

@@ -64,6 +64,7 @@ def _note(material: Bump, context: TranslationContext) -> str:
 
 BUMP = MaterialType(
     description=Bump,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"bumpmap": _from_mitsuba},
     note=_note,

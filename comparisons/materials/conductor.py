@@ -45,6 +45,7 @@ def _to_pbrt(material: Conductor, writing: PbrtWriter, both_sides: bool) -> Para
 
 CONDUCTOR = MaterialType(
     description=Conductor,
+    table=TABLE,
     to_mitsuba=TABLE.write,
     from_mitsuba={"conductor": _from_mitsuba},
     note=None,

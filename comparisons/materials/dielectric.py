@@ -16,6 +16,7 @@ def _to_cycles(material: Dielectric, writing: CyclesWriter) -> Data:
 
 DIELECTRIC = MaterialType(
     description=Dielectric,
+    table=TABLE,
     to_mitsuba=TABLE.write,
     from_mitsuba={"dielectric": TABLE.reader(Dielectric)},
     note=None,

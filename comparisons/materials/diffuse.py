@@ -20,6 +20,7 @@ def _to_pbrt(material: Diffuse, writing: PbrtWriter, both_sides: bool) -> Params
 
 DIFFUSE = MaterialType(
     description=Diffuse,
+    table=TABLE,
     to_mitsuba=TABLE.write,
     from_mitsuba={"diffuse": TABLE.reader(Diffuse)},
     note=None,

@@ -33,6 +33,7 @@ def _look(material: GltfPbr, name: str, writing: GltfWriter) -> Look:
 
 GLTF_PBR = MaterialType(
     description=GltfPbr,
+    table=TABLE,
     to_mitsuba=TABLE.write,
     from_mitsuba={"gltf_pbr": TABLE.reader(GltfPbr)},
     note=lambda material, context: "Mitsuba has no glTF material: our plugin is used instead",

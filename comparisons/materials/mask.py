@@ -45,6 +45,7 @@ def _look(material: Mask, name: str, writing: GltfWriter) -> Look:
 
 MASK = MaterialType(
     description=Mask,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"mask": _from_mitsuba, "null": _null},
     note=lambda material, context: "shadow rays treat masks as opaque, in both renderers",

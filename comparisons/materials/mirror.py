@@ -33,6 +33,7 @@ def _to_pbrt(material: Mirror, writing: PbrtWriter, both_sides: bool) -> Params:
 
 MIRROR = MaterialType(
     description=Mirror,
+    table=TABLE,
     to_mitsuba=TABLE.write,
     from_mitsuba={},
     note=None,

@@ -67,6 +67,7 @@ def _look(material: NormalMap, name: str, writing: GltfWriter) -> Look:
 
 NORMAL_MAP = MaterialType(
     description=NormalMap,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"normalmap": _from_mitsuba},
     note=_note,

@@ -31,6 +31,7 @@ def _look(material: Phong, name: str, writing: GltfWriter) -> Look:
 
 PHONG = MaterialType(
     description=Phong,
+    table=TABLE,
     to_mitsuba=TABLE.write,
     from_mitsuba={"textbook_phong": TABLE.reader(Phong)},
     note=lambda material, context: "Mitsuba has no Phong material: our plugin is used instead",

@@ -34,6 +34,7 @@ def _note(material: Plastic, context: TranslationContext) -> str:
 
 PLASTIC = MaterialType(
     description=Plastic,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"plastic": TABLE.reader(Plastic)},
     note=_note,

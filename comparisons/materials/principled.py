@@ -103,6 +103,7 @@ def _look(material: Principled, name: str, writing: GltfWriter) -> Look:
 
 PRINCIPLED = MaterialType(
     description=Principled,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"principled": _from_mitsuba},
     note=None,

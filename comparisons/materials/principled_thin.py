@@ -24,6 +24,7 @@ TABLE = PluginTable(
 
 PRINCIPLED_THIN = MaterialType(
     description=PrincipledThin,
+    table=TABLE,
     to_mitsuba=TABLE.write,
     from_mitsuba={"principledthin": TABLE.reader(PrincipledThin)},
     note=None,

@@ -70,6 +70,7 @@ def _to_pbrt(material: RoughConductor, writing: PbrtWriter, both_sides: bool) ->
 
 ROUGH_CONDUCTOR = MaterialType(
     description=RoughConductor,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"roughconductor": _from_mitsuba},
     note=note_of_beckmann,

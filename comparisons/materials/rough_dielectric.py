@@ -35,6 +35,7 @@ def _to_pbrt(material: RoughDielectric, writing: PbrtWriter, both_sides: bool) -
 
 ROUGH_DIELECTRIC = MaterialType(
     description=RoughDielectric,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"roughdielectric": _from_mitsuba},
     note=note_of_beckmann,

@@ -97,6 +97,7 @@ def _absolute(material: RoughPlastic) -> float:
 
 ROUGH_PLASTIC = MaterialType(
     description=RoughPlastic,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"roughplastic": _from_mitsuba},
     note=_note,

@@ -9,6 +9,7 @@ TABLE = PluginTable("thindielectric", GLASS)
 
 THIN_DIELECTRIC = MaterialType(
     description=ThinDielectric,
+    table=TABLE,
     to_mitsuba=TABLE.write,
     from_mitsuba={"thindielectric": TABLE.reader(ThinDielectric)},
     note=None,
