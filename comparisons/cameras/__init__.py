@@ -22,9 +22,9 @@ from reference_rt.sampling import AnySampler
 CAMERAS: tuple[CameraType[Any], ...] = (PERSPECTIVE, PINHOLE, THIN_LENS, ORTHOGRAPHIC)
 """All types of cameras."""
 
-_BY_TYPE = {of.of: of for of in CAMERAS}
+_BY_TYPE = {one.description: one for one in CAMERAS}
 
-_BY_PLUGIN = {plugin: read for of in CAMERAS for plugin, read in of.from_mitsuba.items()}
+_BY_PLUGIN = {plugin: read for one in CAMERAS for plugin, read in one.from_mitsuba.items()}
 
 _NO_CAMERAS = {
     "distant": "its rays start on a disk around the whole scene, or at a target from there; ",

@@ -37,7 +37,7 @@ class Lens(NamedTuple):
 class CameraType(Generic[C]):
     """A type of cameras.  A test holds that `CAMERAS` has a row for each member of `AnyCamera`."""
 
-    of: type[C]
+    description: type[C]
     to_mitsuba: Callable[[C, Film, TranslationContext], Data]
     """The dictionary of a sensor, without film and sampler."""
     from_mitsuba: Mapping[str, Callable[[Reading, Node, Frame], AnyCamera]]

@@ -73,7 +73,7 @@ def _scaled(camera: Orthographic, scale: float) -> Data:
 
 
 ORTHOGRAPHIC = CameraType(
-    of=Orthographic,
+    description=Orthographic,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"orthographic": _from_mitsuba, "radiancemeter": _radiance_meter},
     edges=_edges,

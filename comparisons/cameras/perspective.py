@@ -40,7 +40,7 @@ def _from_mitsuba(reading: Reading, node: Node, frame: Frame) -> Perspective:
 
 
 PERSPECTIVE = CameraType(
-    of=Perspective,
+    description=Perspective,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"perspective": _from_mitsuba},
     edges=edges_of,
@@ -66,7 +66,7 @@ def _pinhole_edges(camera: Pinhole, film: Film) -> Edges:
 
 
 PINHOLE = CameraType(
-    of=Pinhole,
+    description=Pinhole,
     to_mitsuba=_pinhole_to_mitsuba,
     from_mitsuba={},
     edges=_pinhole_edges,

@@ -71,7 +71,7 @@ def _scaled(camera: ThinLens, scale: float) -> Data:
 
 
 THIN_LENS = CameraType(
-    of=ThinLens,
+    description=ThinLens,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"thinlens": _from_mitsuba, "view_rectangle": _read_view_rectangle},
     edges=edges_of,

@@ -18,7 +18,7 @@ import numpy as np
 
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import Copy, Leaf, copies_of
-from comparisons.gltf.surfaces import MATTE, Surfaces
+from comparisons.gltf.surfaces import Surfaces
 from comparisons.lights import type_of
 from comparisons.lights.light import across
 from comparisons.mitsuba.files import (
@@ -27,6 +27,7 @@ from comparisons.mitsuba.files import (
     check_name,
     write_files,
 )
+from comparisons.renderers.vocabulary import MATTE
 from comparisons.translator.resolved import (
     Tessellated,
     camera_of,

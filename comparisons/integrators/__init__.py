@@ -18,9 +18,9 @@ from reference_rt.integrators import AnyIntegrator, Direct, Path, RayCast
 INTEGRATORS: tuple[IntegratorType[Any], ...] = (PATH, DIRECT, WHITTED, RAY_CAST)
 """All integrators."""
 
-_BY_TYPE = {of.of: of for of in INTEGRATORS}
+_BY_TYPE = {one.description: one for one in INTEGRATORS}
 
-_BY_PLUGIN = {plugin: read for of in INTEGRATORS for plugin, read in of.from_mitsuba.items()}
+_BY_PLUGIN = {plugin: read for one in INTEGRATORS for plugin, read in one.from_mitsuba.items()}
 
 
 def type_of(integrator: Any) -> IntegratorType[Any]:

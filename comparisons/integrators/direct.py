@@ -41,7 +41,7 @@ def _edges(integrator: Direct) -> int:
 
 
 DIRECT = IntegratorType(
-    of=Direct,
+    description=Direct,
     to_mitsuba=_to_mitsuba,
     of_solids=_of_solids,
     from_mitsuba={"direct": _from_mitsuba},

@@ -21,7 +21,7 @@ class IntegratorType(Generic[I]):
     A test holds that `INTEGRATORS` has a row for each member of our `AnyIntegrator`.
     """
 
-    of: type[I]
+    description: type[I]
     to_mitsuba: Callable[[I], Data] | None
     """An integrator's dictionary; None if there is no picture to compare.  Raises
     UntranslatableError."""

@@ -45,7 +45,7 @@ def _without_media(reading: Reading, node: Node) -> Path:
 
 
 PATH = IntegratorType(
-    of=Path,
+    description=Path,
     to_mitsuba=_to_mitsuba,
     of_solids=_of_solids,
     from_mitsuba={

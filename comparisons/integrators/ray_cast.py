@@ -32,7 +32,7 @@ def _from_mitsuba(reading: Reading, node: Node) -> RayCast:
 
 
 RAY_CAST = IntegratorType(
-    of=RayCast,
+    description=RayCast,
     to_mitsuba=None,  # the rung of geometry compares ray casting ray by ray
     of_solids=None,
     from_mitsuba={"depth": _from_mitsuba},

@@ -32,7 +32,7 @@ def _from_mitsuba(reading: Reading, node: Node) -> Whitted:
 
 
 WHITTED = IntegratorType(
-    of=Whitted,
+    description=Whitted,
     to_mitsuba=TABLE.write,
     of_solids=None,
     from_mitsuba={"whitted": _from_mitsuba},

@@ -27,9 +27,9 @@ LIGHTS: tuple[LightType[Any], ...] = (
 )
 """All types of lights that are no shapes."""
 
-BY_TYPE = {of.of: of for of in LIGHTS}
+BY_TYPE = {one.description: one for one in LIGHTS}
 
-_BY_PLUGIN = {plugin: read for of in LIGHTS for plugin, read in of.from_mitsuba.items()}
+_BY_PLUGIN = {plugin: read for one in LIGHTS for plugin, read in one.from_mitsuba.items()}
 
 
 def type_of(light: Any) -> LightType[Any]:

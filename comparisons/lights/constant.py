@@ -44,7 +44,7 @@ def _stays(light: Any, motion: Motion) -> Any:
 
 
 CONSTANT = LightType(
-    of=Constant,
+    description=Constant,
     to_mitsuba=TABLE.write,
     from_mitsuba={"constant": _from_mitsuba},
     to_cycles=lambda light: {"type": "BACKGROUND", "colour": list(light.radiance)},
@@ -60,7 +60,7 @@ CONSTANT = LightType(
 )
 
 AMBIENT = LightType(
-    of=Ambient,
+    description=Ambient,
     to_mitsuba=None,
     from_mitsuba={},
     to_cycles=None,

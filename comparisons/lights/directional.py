@@ -53,7 +53,7 @@ def _moved(light: Directional, motion: Motion) -> Directional:
 
 
 DIRECTIONAL = LightType(
-    of=Directional,
+    description=Directional,
     to_mitsuba=TABLE.write,
     from_mitsuba={"directional": _from_mitsuba},
     to_cycles=_to_cycles,

@@ -81,7 +81,7 @@ def _moved(light: EnvironmentMap, motion: Motion) -> EnvironmentMap:
 
 
 ENVIRONMENT_MAP = LightType(
-    of=EnvironmentMap,
+    description=EnvironmentMap,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"envmap": _from_mitsuba, "sunsky": read_sunsky},
     to_cycles=None,

@@ -54,7 +54,7 @@ class LightType(Generic[L]):
     A test holds that `LIGHTS` has a row for each member of our `AnyLight`.
     """
 
-    of: type[L]
+    description: type[L]
     to_mitsuba: Callable[[L, TranslationContext], Data] | None
     """The dictionary of an emitter, of a scene file's if the context has files.  None: a parameter
     of our own integrator.  Raises UntranslatableError, ValueError for a file that cannot be used.

@@ -50,7 +50,7 @@ def _moved(light: Point, motion: Motion) -> Point:
 
 
 POINT = LightType(
-    of=Point,
+    description=Point,
     to_mitsuba=TABLE.write,
     from_mitsuba={"point": _from_mitsuba},
     to_cycles=_to_cycles,

@@ -107,7 +107,7 @@ def _brightest(light: Projector) -> float:
 
 
 PROJECTOR = LightType(
-    of=Projector,
+    description=Projector,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"projector": _from_mitsuba},
     to_cycles=None,

@@ -114,7 +114,7 @@ def _float32(light: Spot, p: FloatArray) -> FloatArray:
 
 
 SPOT = LightType(
-    of=Spot,
+    description=Spot,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"spot": _from_mitsuba},
     to_cycles=None,

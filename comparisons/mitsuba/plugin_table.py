@@ -5,22 +5,25 @@ What a row cannot say stands in a function beside the table.  Kinds of values th
 are in `comparisons.textures`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from comparisons.mitsuba.colours import colour, index_of_refraction
 from comparisons.mitsuba.context import NO_CONTEXT, TranslationContext, rgb
 from comparisons.mitsuba.node import Node, Reading
 
+T = TypeVar("T")
+
 
 class Kind(NamedTuple):
     """A kind of value.  write: ours in Mitsuba's dictionary;  read: an element's parameter by its
-    name, or Mitsuba's default, the last argument.  Both raise what the functions that use them do.
-    """
+    name, or Mitsuba's default, the last argument;  expected: what an error says is missing.  Both
+    raise what the functions that use them do."""
 
     write: Callable[[Any, TranslationContext], Any]
     read: Callable[[Reading, Node, str, Any], Any]
+    expected: str = "one"
 
 
 def _as_it_is(value: Any, context: TranslationContext) -> Any:
@@ -81,12 +84,25 @@ class PluginTable:
         values = {row.name: row.kind.write(getattr(part, row.field), context) for row in self.rows}
         return {"type": self.plugin, **values}
 
-    def read(self, reading: Reading, node: Node) -> dict[str, Any]:
-        """The fields of our description.  Raises SceneError."""
+    def read(self, reading: Reading, node: Node, but: Container[str] = ()) -> dict[str, Any]:
+        """The fields of our description, without some.  Raises SceneError."""
         node.ignore(*self.ignored)
-        return {row.field: self._value(row, reading, node) for row in self.rows}
+        return {
+            row.field: self._value(row, reading, node) for row in self.rows if row.field not in but
+        }
+
+    def reader(self, description: Callable[..., T]) -> Callable[[Reading, Node], T]:
+        """What reads an element that the rows alone describe."""
+        return lambda reading, node: description(**self.read(reading, node))
 
     def _value(self, row: Row, reading: Reading, node: Node) -> Any:
         if row.default is None and not node.has(row.name):
-            raise node.error(f"has no '{row.name}'; expected one")
+            raise node.error(f"has no '{row.name}'; expected {row.kind.expected}")
         return row.kind.read(reading, node, row.name, row.default)
+
+
+def inserted(values: dict[str, Any], after: str, more: dict[str, Any]) -> dict[str, Any]:
+    """A dictionary with more values after the one with a name."""
+    names = list(values)
+    head = names[: names.index(after) + 1]
+    return {**{name: values[name] for name in head}, **more, **values}

@@ -18,6 +18,7 @@ from comparisons.rungs.rays.camera import camera_rays, ends
 from comparisons.rungs.rays.comparer import KINDS, Comparer
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.rays.resolution import slide
+from comparisons.textures.texture import Use
 from comparisons.textures.translate import translate_texture
 from reference_rt.cameras.film import Filter
 from reference_rt.core.arrays import FloatArray, IdArray, IntArray
@@ -157,7 +158,7 @@ class Seen:
 
         mi = mitsuba()
         if name not in self._textures:
-            described = translate_texture(self._scene.textures[name], name, self._context, False)
+            described = translate_texture(self._scene.textures[name], name, self._context, Use())
             self._textures[name] = mi.load_dict(described)
         texture = self._textures[name]
 

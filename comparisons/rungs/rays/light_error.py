@@ -10,12 +10,13 @@ from comparisons.geometry.frame import UNIT_ROUNDOFF
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.lights import BY_TYPE, type_of
 from comparisons.lights.light import LightType
+from comparisons.materials.coat import PASSED
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.hits import MitsubaHits, rows_of
 from comparisons.rungs.rays.coincidence import is_steep, moved, slopes, turned
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.rays.resolution import slide
-from comparisons.translator.accuracy import PASSED, accuracy, coat_error, is_tilted
+from comparisons.translator.accuracy import accuracy, coat_error, is_tilted
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.lights import ENVIRONMENT, TABLES
@@ -70,7 +71,7 @@ def number_of(context: LightContext, light: int) -> int:
     """Its index in the scene's lights: rows of our tables count those of its kind."""
     choice = context.tables.lights.choice
     row = 0 if choice is None else int(choice.row[light])
-    of = POINT_LIKE[kind_of(context, light)].of
+    of = POINT_LIKE[kind_of(context, light)].description
     return [i for i, x in enumerate(context.scene.lights) if isinstance(x, of)][row]
 
 

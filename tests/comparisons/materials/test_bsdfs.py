@@ -8,13 +8,15 @@ import pytest
 
 import reference_rt as rt
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
+from comparisons.materials.both_sides import both_sides, directions
+from comparisons.materials.material import MOST
+from comparisons.materials.principled import clearcoat_error
+from comparisons.materials.rough_plastic import MARGIN, table_error
 from comparisons.materials.translate import translate_material
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.plugins.exact_coat import approximate_g1, exact_g1, smooth_reflectance
 from comparisons.rungs.rays import arbiter
-from comparisons.translator import accuracy
-from comparisons.translator.accuracy import both_sides, clearcoat_error, directions, table_error
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.materials import Material
@@ -83,6 +85,10 @@ MITSUBA_LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
 """Mitsuba's weights (include/mitsuba/core/spectrum.h)."""
 
 
+def counterpart(material: Material) -> dict[str, Any]:
+    return translate_material(material, TranslationContext({}, {}, Path()))
+
+
 def pairs(material: Material) -> tuple[FloatArray, FloatArray]:
     """Half of them anywhere, half near the mirrored one; behind, too, where light passes."""
     wo, wi = directions(PAIRS, seed=4, both=material.transmits)
@@ -98,7 +104,7 @@ def float32_bound(material: Material, wo: FloatArray, wi: FloatArray, ours: Floa
     found = 128.0 * UNIT_ROUNDOFF * np.abs(ours).max(axis=1)
     for move in arbiter.directions(6):
         step = ROUNDINGS * UNIT_ROUNDOFF * move
-        moved = both_sides(material, wo + step, wi - step, theirs=False)[0]
+        moved = both_sides(material, wo + step, wi - step, None)[0]
         found += np.abs(moved - ours).max(axis=1)
     if isinstance(material, rt.Principled) and material.clearcoat != 0.0:
         found += clearcoat_error(material) * np.abs(ours).max(axis=1)
@@ -116,7 +122,7 @@ def float32_bound(material: Material, wo: FloatArray, wi: FloatArray, ours: Floa
 @pytest.mark.parametrize("material", MATERIALS, ids=lambda m: m.type)
 def test_the_same_is_scattered(material: Material) -> None:
     wo, wi = pairs(material)
-    ours, theirs = both_sides(material, wo, wi)
+    ours, theirs = both_sides(material, wo, wi, counterpart(material))
     bound = float32_bound(material, wo, wi, ours)
     if isinstance(material, rt.RoughPlastic):
         white = {"reflectance": (1.0, 1.0, 1.0), "specular": (0.0, 0.0, 0.0)}
@@ -150,8 +156,9 @@ def test_a_slightly_different_material_is_distinguished(
     material: Material, wrong: dict[str, Any]
 ) -> None:
     wo, wi = pairs(material)
-    ours, _ = both_sides(material, wo, wi)
-    _, theirs = both_sides(material.model_copy(update=wrong), wo, wi)
+    ours, _ = both_sides(material, wo, wi, None)
+    other = material.model_copy(update=wrong)
+    _, theirs = both_sides(other, wo, wi, counterpart(other))
     bound = float32_bound(material, wo, wi, ours)
     assert (np.abs(ours - theirs).max(axis=1) > bound).any()
 
@@ -167,7 +174,7 @@ def test_tables_of_rough_plastic_are_off_by_little() -> None:
         )
         for a, n in ((0.05, 2.0), (0.2, 1.5), (0.6, 1.3))
     )
-    assert 0.0 < accuracy.MARGIN * worst < 0.5 * accuracy.MOST
+    assert 0.0 < MARGIN * worst < 0.5 * MOST
 
 
 def test_how_far_mitsubas_masking_is_off() -> None:
@@ -215,7 +222,7 @@ def test_counterparts_draw_what_they_say(material: Material) -> None:
 
     if mi.variant().startswith("scalar"):
         pytest.skip("a million samples, one at a time")
-    bsdf = mi.load_dict(translate_material(material, TranslationContext({}, {}, Path())))
+    bsdf = mi.load_dict(counterpart(material))
     n = 1_000_000
     sampler = mi.load_dict({"type": "independent", "sample_count": 1})
     sampler.seed(7, n)
