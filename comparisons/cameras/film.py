@@ -1,10 +1,13 @@
 """Film and reconstruction filters: Mitsuba's `hdrfilm` and `rfilter`, in both directions."""
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from comparisons.mitsuba.context import UntranslatableError
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.plugin_table import INTEGER, NUMBER, PluginTable, Row
+from comparisons.renderers.vocabulary import Params
 from reference_rt.cameras.film import (
     AnyFilter,
     BoxFilter,
@@ -15,20 +18,70 @@ from reference_rt.cameras.film import (
     MitchellFilter,
     TentFilter,
 )
+from reference_rt.core.model import Description
 
 THIRD = 1.0 / 3.0
 
-FILTERS: dict[type[AnyFilter], PluginTable] = {
-    BoxFilter: PluginTable("box"),
-    TentFilter: PluginTable("tent", (Row("radius", "radius", NUMBER, 1.0),)),
-    GaussianFilter: PluginTable("gaussian", (Row("stddev", "stddev", NUMBER, 0.5),)),
-    MitchellFilter: PluginTable(
-        "mitchell", (Row("b", "B", NUMBER, THIRD), Row("c", "C", NUMBER, THIRD))
+F = TypeVar("F", bound=Description)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilterType(Generic[F]):
+    """What the comparison knows of a type of reconstruction filters.  to_pbrt: pbrt's plugin, its
+    radius in pixels, and its other parameters."""
+
+    description: type[F]
+    table: PluginTable
+    to_pbrt: Callable[[F], tuple[str, float, Params]]
+
+
+_THIRD = 1.0 / 3.0
+
+FILTERS: tuple[FilterType[Any], ...] = (
+    FilterType(
+        description=BoxFilter, table=PluginTable("box"), to_pbrt=lambda box: ("box", 0.5, {})
     ),
-    CatmullRomFilter: PluginTable("catmullrom"),
-    LanczosFilter: PluginTable("lanczos", (Row("lobes", "lobes", INTEGER, 3),)),
-}
-"""All filters."""
+    FilterType(
+        description=TentFilter,
+        table=PluginTable("tent", (Row("radius", "radius", NUMBER, 1.0),)),
+        to_pbrt=lambda tent: ("triangle", tent.radius, {}),
+    ),
+    FilterType(
+        description=GaussianFilter,
+        table=PluginTable("gaussian", (Row("stddev", "stddev", NUMBER, 0.5),)),
+        to_pbrt=lambda bell: ("gaussian", 4.0 * bell.stddev, {"float sigma": bell.stddev}),
+    ),
+    FilterType(
+        description=MitchellFilter,
+        table=PluginTable(
+            "mitchell", (Row("b", "B", NUMBER, _THIRD), Row("c", "C", NUMBER, _THIRD))
+        ),
+        to_pbrt=lambda cubic: ("mitchell", 2.0, {"float B": cubic.b, "float C": cubic.c}),
+    ),
+    FilterType(
+        description=CatmullRomFilter,
+        table=PluginTable("catmullrom"),
+        to_pbrt=lambda cubic: ("mitchell", 2.0, {"float B": 0.0, "float C": 0.5}),
+    ),
+    FilterType(
+        description=LanczosFilter,
+        table=PluginTable("lanczos", (Row("lobes", "lobes", INTEGER, 3),)),
+        to_pbrt=lambda sinc: ("sinc", float(sinc.lobes), {"float tau": float(sinc.lobes)}),
+    ),
+)
+"""All types of filters."""
+
+_BY_DESCRIPTION = {one.description: one for one in FILTERS}
+
+_BY_PLUGIN = {one.table.plugin: one for one in FILTERS}
+
+
+def type_of(film_filter: Any) -> FilterType[Any]:
+    """What is known of a filter's type.  Raises UntranslatableError for one not in FILTERS."""
+    known = _BY_DESCRIPTION.get(type(film_filter))
+    if known is None:
+        raise UntranslatableError(film_filter, "filter")
+    return known
 
 
 def translate_film(film: Film) -> dict[str, Any]:
@@ -48,9 +101,7 @@ def translate_film(film: Film) -> dict[str, Any]:
 
 def translate_filter(film_filter: Any) -> dict[str, Any]:
     """A reconstruction filter's dict.  Raises UntranslatableError."""
-    if type(film_filter) not in FILTERS:
-        raise UntranslatableError(film_filter, "filter")
-    return FILTERS[type(film_filter)].write(film_filter)
+    return type_of(film_filter).table.write(film_filter)
 
 
 # ---- reading -------------------------------------------------------------------------------------
@@ -125,11 +176,10 @@ def read_film(reading: Reading, node: Node | None) -> tuple[Frame, Film]:
 def _filter(reading: Reading, node: Node | None) -> AnyFilter:
     if node is None:
         return GaussianFilter()
-    by_plugin = {table.plugin: (of, table) for of, table in FILTERS.items()}
     with node.checking():
-        if node.plugin not in by_plugin:
-            raise node.unsupported(f"expected one of: {', '.join(by_plugin)}")
-        of, table = by_plugin[node.plugin]
-        found = of(**table.read(reading, node))
+        if node.plugin not in _BY_PLUGIN:
+            raise node.unsupported(f"expected one of: {', '.join(_BY_PLUGIN)}")
+        known = _BY_PLUGIN[node.plugin]
+        found: AnyFilter = known.description(**known.table.read(reading, node))
     node.finish()
     return found

@@ -11,9 +11,9 @@ from comparisons.lights.light import (
     brightest_of,
     shows_no_image,
 )
-from comparisons.mitsuba.files import Losses
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.plugin_table import EMISSION, PluginTable, Row
+from comparisons.renderers.vocabulary import GltfWriter
 from reference_rt.lights import Ambient, Constant
 
 
@@ -30,13 +30,13 @@ def _from_mitsuba(reading: Reading, node: Node) -> Constant:
     return Constant(**TABLE.read(reading, node))
 
 
-def leave_out_environment(light: Any, name: str, losses: Losses) -> None:
+def leave_out_environment(light: Any, name: str, writing: GltfWriter) -> None:
     """For `to_gltf`."""
-    losses.note(f"the environment ({name}) is left out: renderers of glTF are given one beside it")
+    writing.note(f"the environment ({name}) is left out: renderers of glTF are given one beside it")
 
 
-def _leave_out_ambient(light: Ambient, name: str, losses: Losses) -> None:
-    losses.note("the ambient light is left out")
+def _leave_out_ambient(light: Ambient, name: str, writing: GltfWriter) -> None:
+    writing.note("the ambient light is left out")
 
 
 def _stays(light: Any, motion: Motion) -> Any:
@@ -45,10 +45,12 @@ def _stays(light: Any, motion: Motion) -> Any:
 
 CONSTANT = LightType(
     description=Constant,
+    table=TABLE,
     to_mitsuba=TABLE.write,
     from_mitsuba={"constant": _from_mitsuba},
     to_cycles=lambda light: {"type": "BACKGROUND", "colour": list(light.radiance)},
     to_gltf=leave_out_environment,
+    to_pbrt=lambda light, writing: ("infinite", {"rgb L": light.radiance}),
     moved=_stays,
     at=None,
     along=None,
@@ -61,10 +63,12 @@ CONSTANT = LightType(
 
 AMBIENT = LightType(
     description=Ambient,
+    table=None,
     to_mitsuba=None,
     from_mitsuba={},
     to_cycles=None,
     to_gltf=_leave_out_ambient,
+    to_pbrt=lambda light, writing: None,
     moved=_stays,
     at=None,
     along=None,

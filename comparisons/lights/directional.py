@@ -13,9 +13,9 @@ from comparisons.lights.light import (
     check_size,
     shows_no_image,
 )
-from comparisons.mitsuba.files import Losses
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.plugin_table import EMISSION, VECTOR, PluginTable, Row
+from comparisons.renderers.vocabulary import GltfWriter, Params, PbrtWriter
 from reference_rt.lights import Directional
 
 TABLE = PluginTable(
@@ -43,9 +43,14 @@ def _to_cycles(light: Directional) -> Data:
     return {"type": "SUN", "colour": list(light.irradiance), "matrix": axes.tolist()}
 
 
-def _to_gltf(light: Directional, name: str, losses: Losses) -> Punctual:
+def _to_gltf(light: Directional, name: str, writing: GltfWriter) -> Punctual:
     axis = np.array(light.direction) / np.linalg.norm(light.direction)
     return Punctual(light.irradiance, axis=axis)
+
+
+def _to_pbrt(light: Directional, writing: PbrtWriter) -> tuple[str, Params]:
+    place = {"point3 from": (0.0, 0.0, 0.0), "point3 to": light.direction}
+    return "distant", {"rgb L": light.irradiance, **place}
 
 
 def _moved(light: Directional, motion: Motion) -> Directional:
@@ -54,10 +59,12 @@ def _moved(light: Directional, motion: Motion) -> Directional:
 
 DIRECTIONAL = LightType(
     description=Directional,
+    table=TABLE,
     to_mitsuba=TABLE.write,
     from_mitsuba={"directional": _from_mitsuba},
     to_cycles=_to_cycles,
     to_gltf=_to_gltf,
+    to_pbrt=_to_pbrt,
     moved=_moved,
     at=None,
     along=lambda light: light.direction,

@@ -8,6 +8,7 @@ from scipy.linalg import polar
 
 from comparisons.geometry import affine
 from comparisons.lights.constant import leave_out_environment
+from comparisons.lights.equal_area import image_of
 from comparisons.lights.light import (
     Data,
     LightType,
@@ -82,10 +83,12 @@ def _moved(light: EnvironmentMap, motion: Motion) -> EnvironmentMap:
 
 ENVIRONMENT_MAP = LightType(
     description=EnvironmentMap,
+    table=None,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"envmap": _from_mitsuba, "sunsky": read_sunsky},
     to_cycles=None,
     to_gltf=leave_out_environment,
+    to_pbrt=lambda light, writing: ("infinite", {"string filename": image_of(light, writing)}),
     moved=_moved,
     at=None,
     along=None,

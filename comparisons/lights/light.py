@@ -8,14 +8,13 @@ import numpy as np
 
 from comparisons.mitsuba.colours import Rgb, colour
 from comparisons.mitsuba.context import TranslationContext
-from comparisons.mitsuba.files import Losses
 from comparisons.mitsuba.node import Node, Reading, Triple, triple
+from comparisons.mitsuba.plugin_table import PluginTable
+from comparisons.renderers.vocabulary import Data, GltfWriter, Params, PbrtWriter
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Description
 
 L = TypeVar("L", bound=Description)
-
-Data = dict[str, Any]
 
 
 class Motion(NamedTuple):
@@ -55,6 +54,8 @@ class LightType(Generic[L]):
     """
 
     description: type[L]
+    table: PluginTable | None
+    """Of Mitsuba's plugin, as far as a table can say it."""
     to_mitsuba: Callable[[L, TranslationContext], Data] | None
     """The dictionary of an emitter, of a scene file's if the context has files.  None: a parameter
     of our own integrator.  Raises UntranslatableError, ValueError for a file that cannot be used.
@@ -63,8 +64,12 @@ class LightType(Generic[L]):
     """By Mitsuba's plugin: the light of an element.  Raises SceneError."""
     to_cycles: Callable[[L], Data] | None
     """Blender's light; "BACKGROUND" for the radiance of all directions."""
-    to_gltf: Callable[[L, str, Losses], Punctual | None] | None
-    """Of a light with this name, with notes; None for what is left out.  Raises UnwritableError."""
+    to_gltf: Callable[[L, str, GltfWriter], Punctual | None] | None
+    """Of a light with this name, with notes; it returns None for what is left out.  Raises
+    UnwritableError."""
+    to_pbrt: Callable[[L, PbrtWriter], tuple[str, Params] | None] | None
+    """pbrt's plugin and its parameters; it returns None for what is left out.  Raises
+    UnwritableError."""
     moved: Callable[[L, Motion], L | None]
     """The light of a moved world that lights it as before; None if ours cannot have it."""
     at: Callable[[L], Triple] | None

@@ -14,9 +14,9 @@ from comparisons.lights.light import (
     by_column,
     shows_no_image,
 )
-from comparisons.mitsuba.files import Losses
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.plugin_table import EMISSION, VECTOR, PluginTable, Row
+from comparisons.renderers.vocabulary import GltfWriter, Params, PbrtWriter
 from reference_rt.lights import Point
 
 TABLE = PluginTable(
@@ -40,8 +40,12 @@ def _to_cycles(light: Point) -> Data:
     return {"type": "POINT", "colour": watts, "matrix": place.tolist()}
 
 
-def _to_gltf(light: Point, name: str, losses: Losses) -> Punctual:
+def _to_gltf(light: Point, name: str, writing: GltfWriter) -> Punctual:
     return Punctual(light.intensity, light.position)
+
+
+def _to_pbrt(light: Point, writing: PbrtWriter) -> tuple[str, Params]:
+    return "point", {"rgb I": light.intensity, "point3 from": light.position}
 
 
 def _moved(light: Point, motion: Motion) -> Point:
@@ -51,10 +55,12 @@ def _moved(light: Point, motion: Motion) -> Point:
 
 POINT = LightType(
     description=Point,
+    table=TABLE,
     to_mitsuba=TABLE.write,
     from_mitsuba={"point": _from_mitsuba},
     to_cycles=_to_cycles,
     to_gltf=_to_gltf,
+    to_pbrt=_to_pbrt,
     moved=_moved,
     at=lambda light: light.position,
     along=None,

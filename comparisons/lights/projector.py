@@ -108,10 +108,12 @@ def _brightest(light: Projector) -> float:
 
 PROJECTOR = LightType(
     description=Projector,
+    table=None,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"projector": _from_mitsuba},
     to_cycles=None,
     to_gltf=None,
+    to_pbrt=None,
     moved=_moved,
     at=lambda light: light.origin,
     along=None,

@@ -18,9 +18,10 @@ from comparisons.lights.light import (
     similarity,
 )
 from comparisons.mitsuba.context import TranslationContext, rgb
-from comparisons.mitsuba.files import Losses, UnwritableError
+from comparisons.mitsuba.files import UnwritableError
 from comparisons.mitsuba.node import Node, Reading, Triple, triple
 from comparisons.mitsuba.parse import LookAt
+from comparisons.renderers.vocabulary import GltfWriter, Params, PbrtWriter
 from comparisons.textures.reading import projected as read_projected
 from comparisons.textures.translate import projected
 from reference_rt.core.arrays import FloatArray
@@ -80,14 +81,25 @@ def _from_mitsuba(reading: Reading, node: Node) -> Spot:
     )
 
 
-def _to_gltf(light: Spot, name: str, losses: Losses) -> Punctual:
+def _to_gltf(light: Spot, name: str, writing: GltfWriter) -> Punctual:
     if light.texture is not None or light.cutoff_angle > 90.0:
         raise UnwritableError("a spot with a texture, or wider than a half-space")
-    losses.note("renderers choose how spots fall off towards their rims")
+    writing.note("renderers choose how spots fall off towards their rims")
     outer = float(np.radians(light.cutoff_angle))
     inner = min(float(np.radians(beam_of(light))), outer * (1.0 - 1e-6))
     cone = {"spot": {"innerConeAngle": inner, "outerConeAngle": outer}}
     return Punctual(light.intensity, light.origin, light.axis, cone)
+
+
+def _to_pbrt(light: Spot, writing: PbrtWriter) -> tuple[str, Params]:
+    if light.texture is not None or light.beam_width != light.cutoff_angle:
+        raise UnwritableError(
+            "a spot with a texture, or with a beam_width below its cutoff_angle: its falloff "
+            "between them is linear in the angle"
+        )
+    place = {"point3 from": light.origin, "point3 to": light.target}
+    cone = {"float coneangle": light.cutoff_angle, "float conedeltaangle": 0.0}
+    return "spot", {"rgb I": light.intensity, **place, **cone}
 
 
 def _moved(light: Spot, motion: Motion) -> Spot | None:
@@ -115,10 +127,12 @@ def _float32(light: Spot, p: FloatArray) -> FloatArray:
 
 SPOT = LightType(
     description=Spot,
+    table=None,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"spot": _from_mitsuba},
     to_cycles=None,
     to_gltf=_to_gltf,
+    to_pbrt=_to_pbrt,
     moved=_moved,
     at=lambda light: light.origin,
     along=None,
