@@ -9,12 +9,16 @@ import numpy as np
 from comparisons.mitsuba.colours import Rgb, colour
 from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.node import Node, Reading, Triple, triple
+from comparisons.mitsuba.parse import LookAt
 from comparisons.mitsuba.plugin_table import PluginTable
-from comparisons.renderers.vocabulary import Data, GltfWriter, Params, PbrtWriter
+from comparisons.renderers.vocabulary import GltfWriter, Params, PbrtWriter
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Description
 
 L = TypeVar("L", bound=Description)
+
+Data = dict[str, Any]
+"""Of a plugin of Mitsuba's, or of a light for Cycles."""
 
 
 class Motion(NamedTuple):
@@ -149,6 +153,13 @@ def by_column(node: Node, key: str, column: int) -> dict[str, Triple]:
     if node.has("to_world"):
         raise node.error(f"has both '{key}' and 'to_world'; expected one of them")
     return {}
+
+
+def look_of(node: Node) -> tuple[LookAt | None, float]:
+    """The <lookat> of to_world, and how far the scale before it stretches y; None and 1 for any
+    other transform, and for a scale that turns or mirrors."""
+    look, scale = node.looks()
+    return (look, scale[1]) if look is not None and min(scale) > 0.0 else (None, 1.0)
 
 
 def check_size(node: Node, axis: FloatArray) -> None:

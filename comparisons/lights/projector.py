@@ -15,6 +15,7 @@ from comparisons.lights.light import (
     Motion,
     check_size,
     check_upright,
+    look_of,
     similarity,
 )
 from comparisons.mitsuba.context import TranslationContext
@@ -56,12 +57,12 @@ def _such_that(x: float, is_exact: Callable[[float], bool]) -> float:
 
 
 def _from_mitsuba(reading: Reading, node: Node) -> Projector:
-    m, (look, scale) = node.transform(), node.looks()
+    m, (look, stretched) = node.transform(), look_of(node)
     check_size(node, m[:, 2])
     # What is taller than the image's pixels is a scale of y alone.
     tall = float(np.linalg.norm(m[:, 1]) / np.linalg.norm(m[:, 2]))
     if look is not None:
-        tall = scale[1]
+        tall = stretched
     elif abs(tall - 1.0) <= TOLERANCE:
         tall = 1.0
     rotation = similarity(node, m[:, :3] / np.array([1.0, tall, 1.0]))

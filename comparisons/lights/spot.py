@@ -14,6 +14,7 @@ from comparisons.lights.light import (
     brighter,
     brightest_of,
     check_upright,
+    look_of,
     plain,
     similarity,
 )
@@ -68,7 +69,7 @@ def _from_mitsuba(reading: Reading, node: Node) -> Spot:
             raise node.error("'texture' is a colour, which Mitsuba refuses, too; expected an image")
         check_upright(node, rotation)
         image = {"texture": texture, "up": triple(-rotation[:, 1])}
-    look, _ = node.looks()
+    look, _ = look_of(node)
     if look is not None and image:
         image["up"] = _opposite(look.up)
     return Spot(
