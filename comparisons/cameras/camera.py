@@ -10,13 +10,13 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from comparisons.cameras.film import Frame
+from comparisons.geometry.affine import Affine
 from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.parse import LookAt, Step
 from reference_rt.cameras import AnyCamera
 from reference_rt.cameras.camera import Camera
 from reference_rt.cameras.film import Film
-from reference_rt.core.transform import Affine
 
 C = TypeVar("C", bound=Camera)
 

@@ -180,6 +180,7 @@ def _filter(reading: Reading, node: Node | None) -> AnyFilter:
         if node.plugin not in _BY_PLUGIN:
             raise node.unsupported(f"expected one of: {', '.join(_BY_PLUGIN)}")
         known = _BY_PLUGIN[node.plugin]
-        found: AnyFilter = known.description(**known.table.read(reading, node))
+        table = known.table
+        found: AnyFilter = known.description(**table.read(reading, node))
     node.finish()
     return found

@@ -1,9 +1,8 @@
-"""Scene -> Mitsuba: one `singledispatch` function per public type of `reference_rt`.
+"""Scene -> Mitsuba, by what `comparisons` knows of each public type of `reference_rt`.
 
-Contract: a function takes the description and, where it needs textures or other materials, the
-`TranslationContext`, and returns the dict of a Mitsuba plugin (shapes: a list of `Plugin`), with
-radiance and lengths unchanged.  None means that Mitsuba has no place for it.  To translate a new
-type: register a function in the file of its kind; until then it raises `UntranslatableError`, which
+Contract: a type's function takes the description and the `TranslationContext`, and returns the dict
+of a Mitsuba plugin (shapes: a list of `Plugin`), with radiance and lengths unchanged.  None means
+that Mitsuba has no place for it.  A type that no folder knows raises `UntranslatableError`, which
 makes a scene `not-comparable`.
 """
 

@@ -90,7 +90,9 @@ def test_cameras_in_files_send_the_same_rays(
     again = Scene.load(tmp_path / "scene.xml")
     assert (again.camera.near, again.camera.far) == (0.3, 9.0)
     x, y = (np.linspace(0.01, 0.99, 7) * length for length in size)
-    for ours, theirs in zip(*(camera_rays(one, x, y, (0.8, 0.3)) for one in (scene, again))):
+    for ours, theirs in zip(
+        *(camera_rays(one, x, y, (0.8, 0.3)) for one in (scene, again)), strict=True
+    ):
         np.testing.assert_allclose(theirs, ours, rtol=0.0, atol=1e-12 * np.abs(ours).max())
 
 
