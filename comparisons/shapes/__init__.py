@@ -1,4 +1,4 @@
-"""What the comparison knows of shapes: their equations and exact crossings, to and from Mitsuba, for
+"""What the comparison knows of shapes: equations and exact crossings, to and from Mitsuba, for
 Cycles and pbrt; a file per type, whose contract is `ShapeType`.
 
 A shape becomes a list of `Plugin`, each a Mitsuba shape and how to convert its hits; lengths in

@@ -10,7 +10,13 @@ from comparisons.mitsuba.hits import Plugin, same_uv
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.parse import as_transform
 from comparisons.mitsuba.plugins.exact_coordinates import of_cone
-from comparisons.shapes.reading_maps import TOLERANCE, composed, scaled, turned_inside_out
+from comparisons.shapes.reading_maps import (
+    TOLERANCE,
+    composed,
+    scaled,
+    transform_of,
+    turned_inside_out,
+)
 from comparisons.shapes.shape import OwnPlugin, PbrtPart, PbrtPlace, ShapeType, is_capped
 from comparisons.shapes.site import Site, curved_instance, in_float32, to_world
 from comparisons.shapes.stand_ins import stand_in
@@ -118,7 +124,7 @@ def _read(reading: Reading, node: Node, material: str | None) -> Shape:
         return turned_inside_out(
             reading, node, material, form, (-1.5, -1.5, 0.0), (1.5, 1.5, 1.0), m
         )
-    return Cylinder(capped=False, transform=steps(m), material=material)
+    return Cylinder(capped=False, transform=transform_of(m), material=material)
 
 
 def _frame(n: FloatArray) -> FloatArray:

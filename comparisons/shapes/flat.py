@@ -7,7 +7,7 @@ import numpy as np
 
 from comparisons.mitsuba.node import Node
 from comparisons.mitsuba.parse import as_transform
-from comparisons.shapes.reading_maps import composed, scaled, steps
+from comparisons.shapes.reading_maps import composed, scaled, transform_of
 from comparisons.shapes.shape import OwnPlugin
 from comparisons.shapes.surface import Surface
 from reference_rt.core.arrays import FloatArray
@@ -42,7 +42,7 @@ def flat_transform(node: Node) -> Any:
     """The transform of an element in the plane z = 0; flipping its normal mirrors z."""
     m = node.transform()
     if node.flag("flip_normals"):
-        return steps(composed(m, scaled(np.zeros(3), np.diag([1.0, 1.0, -1.0]))))
+        return transform_of(composed(m, scaled(np.zeros(3), np.diag([1.0, 1.0, -1.0]))))
     return as_transform(node.written(), m)
 
 

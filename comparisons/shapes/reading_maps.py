@@ -14,7 +14,7 @@ TOLERANCE = 1e-5
 """Of a similarity, relative: XML has about six digits, Mitsuba's own tolerance is 1e-6 of 1."""
 
 
-def steps(m: Affine) -> Any:
+def transform_of(m: Affine) -> Any:
     """The map as our transform."""
     return as_transform(None, m)
 
@@ -47,5 +47,5 @@ def turned_inside_out(
             "a grain, which is not supported; expected another shape or a plain material"
         )
     return Quadric(
-        coefficients=form, lower=lower, upper=upper, transform=steps(m), material=material
+        coefficients=form, lower=lower, upper=upper, transform=transform_of(m), material=material
     )

@@ -15,7 +15,13 @@ from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.parse import as_transform
 from comparisons.mitsuba.plugins.exact_coordinates import Round
 from comparisons.shapes.fine import FINE, fine, on_circle, widened
-from comparisons.shapes.reading_maps import TOLERANCE, composed, scaled, turned_inside_out
+from comparisons.shapes.reading_maps import (
+    TOLERANCE,
+    composed,
+    scaled,
+    transform_of,
+    turned_inside_out,
+)
 from comparisons.shapes.shape import (
     OwnPlugin,
     PbrtPart,
@@ -140,7 +146,7 @@ def _read(reading: Reading, node: Node, material: str | None) -> Shape:
         return turned_inside_out(
             reading, node, material, form, (-1.5, -1.5, -1.5), (1.5, 1.5, 1.5), m
         )
-    return Sphere(transform=steps(_orthogonal(m, lengths[0])), material=material)
+    return Sphere(transform=transform_of(_orthogonal(m, lengths[0])), material=material)
 
 
 def _orthogonal(m: Affine, size: float) -> Affine:

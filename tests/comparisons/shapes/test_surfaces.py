@@ -68,10 +68,8 @@ def test_gradients_are_derivatives(shape: Any) -> None:
 def test_lines_cross_shapes_at_points_of_their_patches(shape: Any) -> None:
     rng = np.random.default_rng(9)
     placed, surface = Placed(shape), type_of(shape).surface(shape)
-    points = []
-    for patch in surface.patches():
-        points.append(patch.point(*rng.uniform(0.01, 0.99, (2, 200))))
-    q = np.concatenate(points)
+    at = rng.uniform(0.01, 0.99, (2, 200))
+    q = np.concatenate([patch.point(*at) for patch in surface.patches()])
     if surface.ends is not None:
         low, high = surface.ends
         q = q[((q > low) & (q < high)).all(axis=1)]
