@@ -9,13 +9,9 @@ from scipy.linalg import polar
 
 from comparisons.geometry import affine
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.context import TranslationContext, UntranslatableError, rgb
 from comparisons.mitsuba.second import described_image
-from comparisons.textures.translate import (
-    TranslationContext,
-    UntranslatableError,
-    projected,
-    rgb,
-)
+from comparisons.textures.translate import projected
 from reference_rt.integrators import Direct, Path, RayCast, Whitted
 from reference_rt.lights import (
     Ambient,

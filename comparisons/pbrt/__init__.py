@@ -22,7 +22,8 @@ from scipy.ndimage import map_coordinates
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import Leaf, Member, copies_of
 from comparisons.mitsuba.files import Files, UnwritableError, check_name, ply, write_files
-from comparisons.pbrt.surfaces import Params, Writing, words
+from comparisons.pbrt.surfaces import Writing, words
+from comparisons.renderers.vocabulary import Params
 from comparisons.shapes import type_of
 from comparisons.shapes.shape import PbrtPart, PbrtPlace
 from comparisons.translator.resolved import Tessellated, placed, tessellated

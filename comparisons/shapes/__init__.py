@@ -11,6 +11,7 @@ To add a type: its file here, and a line in `SHAPES`.
 
 from typing import Any
 
+from comparisons.mitsuba.context import UntranslatableError
 from comparisons.mitsuba.hits import Plugin
 from comparisons.shapes.box import BOX
 from comparisons.shapes.cone import CONE
@@ -25,7 +26,6 @@ from comparisons.shapes.shape import ShapeType, TableType
 from comparisons.shapes.site import Site
 from comparisons.shapes.sphere import SPHERE
 from comparisons.shapes.torus import TORUS
-from comparisons.textures.translate import UntranslatableError
 
 SHAPES: tuple[ShapeType[Any], ...] = (
     SPHERE,

@@ -4,10 +4,10 @@ from typing import Any
 
 import numpy as np
 
+from comparisons.geometry.affine import Affine
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.parse import as_transform
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.transform import Affine
 from reference_rt.shapes import Quadric, Shape
 
 TOLERANCE = 1e-5

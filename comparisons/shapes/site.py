@@ -6,9 +6,9 @@ import numpy as np
 
 from comparisons.geometry import affine
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.context import UntranslatableError
 from comparisons.mitsuba.hits import Plugin, ShapeGroup
 from comparisons.shapes.soup import Soup
-from comparisons.textures.translate import UntranslatableError
 from reference_rt.core.arrays import FloatArray
 from reference_rt.shapes.shape import TabulationContext
 

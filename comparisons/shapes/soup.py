@@ -7,7 +7,7 @@ import numpy as np
 
 from comparisons.geometry import affine
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.textures.translate import VERTEX_COLOUR, VERTEX_LUMINANCE
+from comparisons.textures.vertex_colours import VERTEX_COLOUR, VERTEX_LUMINANCE
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.vec3 import Vec3, luminance
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.geometry import affine
+from comparisons.geometry.affine import Affine
 from comparisons.geometry.exact.crossings import Crossings, Row, column, ordered, where
 from comparisons.geometry.exact.dyadic import Dyadic, dot, roots
 from comparisons.geometry.frame import UNIT_ROUNDOFF
@@ -36,7 +37,6 @@ from comparisons.shapes.soup import Soup
 from comparisons.shapes.stand_ins import stand_in, tessellated
 from comparisons.shapes.surface import Patch, Surface
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.transform import Affine
 from reference_rt.shapes import Shape, Sphere
 
 ELLIPSOID_CELLS = (384, 192)

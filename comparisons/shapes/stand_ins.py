@@ -10,13 +10,13 @@ import numpy as np
 
 from comparisons.geometry import affine
 from comparisons.geometry.frame import round32
+from comparisons.mitsuba.context import UntranslatableError
 from comparisons.mitsuba.hits import Plugin, StandIn
 from comparisons.mitsuba.plugins.exact_coordinates import Coordinates, derivatives_at
 from comparisons.shapes.meshing import meshed
 from comparisons.shapes.site import MOST_INSTANCES, MOST_TRIANGLES, Site, placed, with_mesh_light
 from comparisons.shapes.soup import Soup, heights_of
 from comparisons.shapes.surface import Limits, Patch, Surface
-from comparisons.textures.translate import UntranslatableError
 from reference_rt.core.arrays import FloatArray
 from reference_rt.shapes.shape import Shape
 

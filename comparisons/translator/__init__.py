@@ -36,6 +36,7 @@ from comparisons.materials.translate import (
     parts_of,
 )
 from comparisons.mitsuba.backend import mitsuba, scalar
+from comparisons.mitsuba.context import TranslationContext, UntranslatableError
 from comparisons.mitsuba.counterpart import Counterpart, InstancedGroup
 from comparisons.mitsuba.csg import Operand, SolidCounterpart
 from comparisons.mitsuba.hits import MitsubaShape, Plugin
@@ -44,7 +45,6 @@ from comparisons.mitsuba.scene import light_id, shape_id
 from comparisons.renderers import ReferenceSampler
 from comparisons.shapes import translate_shape, type_of
 from comparisons.shapes.site import MOST_INSTANCES, Site
-from comparisons.textures.translate import TranslationContext, UntranslatableError
 from comparisons.translator.moved import frame_of, moved
 from reference_rt.integrators import Direct
 from reference_rt.rendering.scene import Scene

@@ -9,12 +9,12 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 from placed_shapes import Placed, anywhere
-from reference_rt.scene.examples import examples
 
 from comparisons.geometry import affine
 from comparisons.geometry.exact.dyadic import NEVER, nearest
 from comparisons.referee import all_hits
 from comparisons.shapes import SHAPES, type_of
+from reference_rt.scene.examples import examples
 from reference_rt.shapes.tables import Primitive
 
 WITH_EQUATION = [shape for shape in examples(Primitive) if type_of(shape).surface is not None]
