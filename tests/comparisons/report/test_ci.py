@@ -151,7 +151,7 @@ def test_the_summary_has_every_case_the_worst_first(tmp_path):
     assert text.startswith("before\n## smoke\n")
     assert "8 cases: **1** invalid, **2** differ, **1** inconclusive" in text
     rows = re.findall(r"^\| ([\w-]+) \|", text, re.MULTILINE)
-    assert rows == ["case", "---", "scene-invalid", "scene-differ", "z", "scene-inconclusive",
+    assert rows == ["case", "scene-invalid", "scene-differ", "z", "scene-inconclusive",
                     "scene-not-comparable", "scene-reference-limited", "scene-agree",
                     "scene-unchanged", "left"]  # fmt: skip
     assert "likeliest cause: gain" in text
