@@ -100,8 +100,9 @@ class Table(Generic[R]):
 
     def markdown(self, escaped: Callable[[str], str] = _without_bars) -> list[str]:
         """The lines of a table;  escaped: what is markup in the text of a cell."""
-        rows = [[escaped(_text(cell)) for cell in row] for row in (self.head, *self.cells)]
-        head, *body = [f"| {' | '.join(row)} |" for row in rows]
+        rows: list[list[Shown]] = [[*self.head], *self.cells]
+        lines = (" | ".join(escaped(_text(cell)) for cell in row) for row in rows)
+        head, *body = [f"| {line} |" for line in lines]
         return [head, "|---" * len(self.head) + "|", *body]
 
     def records(self) -> list[dict[str, Any]]:
