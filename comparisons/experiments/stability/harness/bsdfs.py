@@ -17,10 +17,10 @@ from scipy import stats
 
 from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Sweep
 from comparisons.geometry.exact.crossings import IntArray
+from comparisons.materials.translate import translate_material
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.scene import for_rays
-from comparisons.mitsuba.translate.materials import translate_material
-from comparisons.mitsuba.translate.textures import TranslationContext
 from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.materials import (
