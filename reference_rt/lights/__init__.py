@@ -65,6 +65,7 @@ from reference_rt.lights.selection.choice import LightSampler, Pick
 from reference_rt.lights.tables import (
     Lights,
     LinkedLights,
+    ahead_of,
     depends_on_normal,
     depends_on_point,
     map_of,
@@ -110,6 +111,7 @@ __all__ = [
     "Point",
     "Projector",
     "Spot",
+    "ahead_of",
     "ambient",
     "area_pdf",
     "background",

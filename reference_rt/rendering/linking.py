@@ -21,7 +21,7 @@ from reference_rt.materials.nested.flattened import flattened_materials
 from reference_rt.materials.textured import Textured
 from reference_rt.rendering.tiles import GivenRays, LinkedView
 from reference_rt.shapes import TABLES as SHAPES
-from reference_rt.shapes import Packets, Shapes
+from reference_rt.shapes import Shapes
 from reference_rt.shapes import tables as shape_tables
 from reference_rt.textures import Textures
 from reference_rt.textures.lookup import textures_operations
@@ -167,12 +167,10 @@ def _geometry(
 
 def linked_geometry(linker: Linker, geometry: Geometry, shapes: Any, wanted: Iterable[str]) -> Link:
     """A geometry behind a link, with the operations `wanted`.  shapes: the link to its shapes."""
-    nothing: Any = np.zeros((0, 1, 8))
-    packets = Packets(*(nothing if p is None else p for p in geometry.packets))
     bvh = geometry.bvh
     if bvh is not None and bvh.corners is None:  # one type less: without triangles none are read
         bvh = bvh._replace(corners=_NO_FLOATS)
-    table = geometry._replace(shapes=shapes, packets=packets, bvh=bvh, tracer=None)
+    table = geometry._replace(shapes=shapes, bvh=bvh, tracer=None)
     return linker.link(geometries.operations, wanted, {0: table})
 
 

@@ -27,7 +27,7 @@ scene; a row in the tests' tuple.  Step by step: docs/extending.md.
 
 from reference_rt.core.arrays import IntArray
 from reference_rt.shapes.box import Box
-from reference_rt.shapes.brute_force import Packets, nearest, nearest_of_ray, nearest_of_rays
+from reference_rt.shapes.brute_force import nearest, nearest_of_rays
 from reference_rt.shapes.curved.quadric import Cone, Cylinder, Quadric
 from reference_rt.shapes.curved.sphere import Sphere
 from reference_rt.shapes.curved.torus import Torus
@@ -84,7 +84,6 @@ __all__ = [
     "Disk",
     "IntArray",
     "Mesh",
-    "Packets",
     "Plane",
     "Polygon",
     "Primitive",
@@ -100,7 +99,6 @@ __all__ = [
     "face",
     "intersect",
     "nearest",
-    "nearest_of_ray",
     "nearest_of_rays",
     "owner",
     "pdf",

@@ -38,7 +38,7 @@ from reference_rt.util.errors import Brief
 
 BoolArray = npt.NDArray[np.bool_]
 
-OCCLUDED, OCCLUDED_BY_BLOCKS = ("occluded",), ("any_hits", "closest_of_packet")
+OCCLUDED, OCCLUDED_BY_BLOCKS = ("occluded",), ("any_hits",)
 """The operations of `occluded_of_few` and of `occluded_by_blocks`."""
 
 
