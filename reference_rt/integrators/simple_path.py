@@ -4,7 +4,6 @@ an order of work that saves time (PBR 4ed 13.2: `SimplePathIntegrator`).
 It renders nothing.  Tests hold `path.radiances` to it, bit for bit; docs/course/path.md quotes it.
 """
 
-
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt import sampling

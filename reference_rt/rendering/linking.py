@@ -107,7 +107,7 @@ def _shapes(
     if integrator == "cost":
         wanted = {"primitive_count", "intersect", "owner", "face"}
     elif geometry.bvh is None:
-        wanted |= {"nearest_of_block", "complete_block"} if blocks else {"nearest_of_type"}
+        wanted |= {"nearest_of_block", "found"} if blocks else {"nearest_of_type"}
     else:
         wanted |= {"intersect", "owner", "face"}
     if geometry.parts is not None:

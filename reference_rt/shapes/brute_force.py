@@ -22,6 +22,7 @@ from reference_rt.core.ray import (
 )
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.simd import VECTOR_WIDTH
+from reference_rt.shapes.dispatch import found
 from reference_rt.shapes.meshes.watertight import shear_of
 from reference_rt.shapes.ray_simd import load, store
 from reference_rt.shapes.tables import TABLES, TRIANGLE, Shapes, by_code
@@ -32,6 +33,10 @@ _KINDS = len(TABLES)
 SIDE_BY_SIDE = tuple(code for module, code in _CODES.items() if hasattr(module, "nearer"))
 """The types of which one shape is tested against VECTOR_WIDTH rays."""
 ONE_BY_ONE = tuple(code for code in _CODES.values() if code not in SIDE_BY_SIDE)
+
+
+KIND = 2**40
+"""Of types that are tested SIDE_BY_SIDE `nearest_of_block` writes kind * KIND + row as codes."""
 
 
 @kernel
@@ -53,8 +58,12 @@ def nearest_of_rays(shapes: Shapes, rays: RayBlock, hits: HitBlock, n: int, any_
     for kind in SIDE_BY_SIDE:
         nearest_of_block(shapes, kind, rays, hits, n, any_hit)
     if not any_hit:
-        for kind in SIDE_BY_SIDE:
-            complete_block(shapes, kind, rays, hits, n)
+        for j in range(n):
+            code = hits.codes[j]
+            if code >= 0:
+                kind, i = code // KIND, code % KIND
+                at = found(shapes, kind, i, ray_of(rays, j), hits.numbers[j])
+                put_hit(hits, j, Hit(at.t, kind, i, at.u, at.v, -1))
     for kind in ONE_BY_ONE:
         nearest_of_block(shapes, kind, rays, hits, n, any_hit)
 
@@ -69,10 +78,10 @@ def _nearest_by(module: Any) -> Callable[..., Hit]:
     @kernel
     def of_table(table: Any, ray: Any, closest: Hit) -> Hit:
         for i in range(len(table.face)):
-            found: Crossing = intersect(table, i, ray)
+            met: Crossing = intersect(table, i, ray)
             # Of a block's ray, types with SIMD kernels and greater codes are already in `closest`.
-            if found.t < closest.t or (found.t == closest.t and kind < closest.kind):
-                closest = Hit(found.t, kind, i, found.u, found.v, -1)
+            if met.t < closest.t or (met.t == closest.t and kind < closest.kind):
+                closest = Hit(met.t, kind, i, met.u, met.v, -1)
         return closest
 
     @kernel
@@ -86,10 +95,6 @@ def _nearest_by(module: Any) -> Callable[..., Hit]:
 def nearest_of_type(shapes: Shapes, kind: int, ray: Ray, closest: Hit) -> Hit:
     """The nearest of `closest` and a ray's hit with any shape of one type."""
     return closest
-
-
-KIND = 2**40
-"""`HitBlock.codes` are kind * KIND + row from `nearest_of_block` until `complete_block`."""
 
 
 def _of_block_by(module: Any) -> Callable[..., None]:
@@ -124,27 +129,3 @@ def nearest_of_block(
 ) -> None:
     """Updates the hits of the first n of `rays` with the shapes of one type; of types that are
     tested SIDE_BY_SIDE only t and the code."""
-
-
-def _complete_by(module: Any) -> Callable[..., None] | None:
-    """The kernel of `complete_block` for a type of shape with SIMD kernels."""
-    kind = _CODES[module]
-    if kind in ONE_BY_ONE:
-        return None
-    found = module.found
-
-    @kernel
-    def complete(table: Any, rays: RayBlock, hits: HitBlock, n: int) -> None:
-        for j in range(n):
-            code = hits.codes[j]
-            if code >= 0 and code // KIND == kind:
-                i = code % KIND
-                at: Crossing = found(table, i, ray_of(rays, j), hits.numbers[j])
-                put_hit(hits, j, Hit(at.t, kind, i, at.u, at.v, -1))
-
-    return complete
-
-
-@by_code(_complete_by)
-def complete_block(shapes: Shapes, kind: int, rays: RayBlock, hits: HitBlock, n: int) -> None:
-    """Completes the hits with the shapes of one type."""

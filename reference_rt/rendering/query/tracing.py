@@ -120,7 +120,7 @@ def _of_shapes(geometry: Geometry, operations: Iterable[str]) -> set[str]:
     if asked & (_ONE_RAY | _MANY_RAYS) and geometry.bvh is not None:
         wanted |= {"intersect", "owner", "face"}
     elif asked & _MANY_RAYS:
-        wanted |= {"nearest_of_block", "complete_block"}
+        wanted |= {"nearest_of_block", "found"}
     elif asked & _ONE_RAY:
         wanted |= {"nearest_of_type"}
     if asked & _CROSSINGS:
