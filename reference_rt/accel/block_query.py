@@ -13,13 +13,17 @@ from reference_rt.core.ray import (
     HIT_FLOATS,
     HIT_INTEGERS,
     RAY_FLOATS,
+    Hit,
     HitBlock,
+    Ray,
     RayBlock,
     put_hit,
     ray_of,
 )
+from reference_rt.core.ray import hit_of as hit_in_block
 from reference_rt.jit.function_pointer import call_pointer
-from reference_rt.jit.kernel import kernel, signature_of
+from reference_rt.jit.kernel import ByClass, kernel, signature_of
+from reference_rt.jit.links import Link
 from reference_rt.jit.parallel_compile import Call
 
 
@@ -40,7 +44,7 @@ def tracer_of(geometry: Geometry) -> Call | None:
 
 @geometries.operation
 def closest_hits(geometry: Geometry, rays: RayBlock, hits: HitBlock, n: int) -> None:
-    """`closest_hit` of the first n rays."""
+    """`closest_hit` of the first n rays; read the hits with `hit_of`."""
     _trace(geometry, rays, hits, n, False)
 
 
@@ -73,3 +77,23 @@ def _trace(geometry: Geometry, rays: RayBlock, hits: HitBlock, n: int, any_hit: 
         any_of_block(bvh, shapes, solids, rays, hits, n)
     else:
         closest_of_block(bvh, shapes, solids, rays, hits, n)
+
+
+@kernel
+def _hit_in_geometry(geometry: Geometry, ray: Ray, hits: HitBlock, j: int) -> Hit:
+    if geometry.bvh is None:
+        found: Hit = any_shape.completed(geometry.shapes, ray, hits, j)
+        return found
+    return hit_in_block(hits, j)
+
+
+@kernel
+def _hit_through_link(geometry: Link, ray: Ray, hits: HitBlock, j: int) -> Hit:
+    return hit_in_block(hits, j)
+
+
+_choice = ByClass("hit_of")
+_choice.register(Geometry, _hit_in_geometry)
+_choice.register(Link, _hit_through_link)
+hit_of = _choice.function
+"""hit_of(geometry, ray, hits, j): the hit of ray j after `closest_hits`."""

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
-from reference_rt.accel.block_query import closest_hits
+from reference_rt.accel.block_query import closest_hits, hit_of
 from reference_rt.core.model import Description
 from reference_rt.core.ray import (
     BLOCK,
@@ -23,7 +23,6 @@ from reference_rt.core.ray import (
     HitBlock,
     RayBlock,
     add_vector,
-    hit_of,
     put_ray,
     put_vector,
     ray_of,
@@ -166,7 +165,7 @@ def radiances(
     for j in range(n):
         put_vector(scratch.totals, 0, j, Vec3(0.0, 0.0, 0.0))
         ray = ray_of(rays, j)
-        hit = hit_of(hits, j)
+        hit = hit_of(scene.geometry, ray, hits, j)
         if hit.kind < 0:
             if not direct.hides_lamps:
                 put_vector(scratch.totals, 0, j, any_light.background(scene.lights, ray.d))
@@ -288,7 +287,7 @@ def _trace(direct: DirectSetup, scene: SceneTables, waiting: Waiting, queue: Scr
     closest_hits(scene.geometry, rays, hits, waiting.scattered)
     for k in range(waiting.scattered):
         state, ray, j = state_of(scene, queue, k), ray_of(rays, k), queue.samples[k]
-        hit = hit_of(hits, k)
+        hit = hit_of(scene.geometry, ray, hits, k)
         if hit.kind < 0:
             add_vector(queue.totals, 0, j, environment_emission(direct, scene, state, ray, None))
             continue

@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
-from reference_rt.accel.block_query import closest_hits
+from reference_rt.accel.block_query import closest_hits, hit_of
 from reference_rt.accel.geometry import occluded
-from reference_rt.core.ray import Hit, HitBlock, Ray, RayBlock, hit_of, put_ray, ray_from, ray_of
+from reference_rt.core.ray import Hit, HitBlock, Ray, RayBlock, put_ray, ray_from, ray_of
 from reference_rt.core.vec3 import Vec3, is_black, to_local
 from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
 from reference_rt.jit.kernel import kernel
@@ -44,7 +44,7 @@ def pass_lamps(scene: SceneTables, rays: RayBlock, hits: HitBlock, n: int) -> No
         is_going = False
         for j in range(n):
             ray = ray_of(rays, j)
-            going = onward(scene, ray, hit_of(hits, j))
+            going = onward(scene, ray, hit_of(scene.geometry, ray, hits, j))
             if going.is_lamp:
                 put_ray(rays, j, going.ray)
                 is_going = True

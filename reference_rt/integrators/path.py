@@ -27,7 +27,7 @@ from pydantic import Field
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt import sampling
-from reference_rt.accel.block_query import any_hits, closest_hits
+from reference_rt.accel.block_query import any_hits, closest_hits, hit_of
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.model import Description
 from reference_rt.core.ray import (
@@ -38,7 +38,6 @@ from reference_rt.core.ray import (
     Ray,
     RayBlock,
     add_vector,
-    hit_of,
     put_ray,
     put_vector,
     ray_from,
@@ -291,8 +290,9 @@ def radiances(
         alive, lit = 0, 0
         for j in range(n):
             k = scratch.samples[j]
-            state, ray, hit = state_of(scene, scratch, j), ray_of(rays, j), hit_of(hits, j)
-            sampler, ahead = sampler_of(samplers, k), any_light.ahead_of(lights, scratch.sky, j)
+            state, ray = state_of(scene, scratch, j), ray_of(rays, j)
+            hit, sampler = hit_of(scene.geometry, ray, hits, j), sampler_of(samplers, k)
+            ahead = any_light.ahead_of(lights, scratch.sky, j)
             edge = _edge(path, scene, state, ray, hit, sampler, depth, scratch.kept, ahead)
             add_vector(scratch.totals, 0, k, edge.emitted)
             if not is_black(edge.connection.light):

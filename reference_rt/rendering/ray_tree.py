@@ -41,7 +41,7 @@ from reference_rt.accel import geometry as geometries
 from reference_rt.accel.bvh import CENTER, CHILDREN, child_of, size_of
 from reference_rt.accel.leaf import nearer_primitive, nearest_of_triangle_leaf
 from reference_rt.accel.single_ray import enter
-from reference_rt.core.ray import Ray, at, hit_of
+from reference_rt.core.ray import Ray, at
 from reference_rt.core.vec3 import Vec3, is_black
 from reference_rt.integrators import (
     RayCast,
@@ -189,7 +189,7 @@ class _Recorder:
             tiles._camera_film_ray: self._film_ray,
             shading.shade: self._shade,
             geometries.closest_hit: self._closest_hit,
-            hit_of: self._hit_of_block,
+            block_query._hit_in_geometry: self._hit_of_block,
             scene_tables.surface: self._point,
             geometries.occluded: keep["occluded"],
             any_light.background: self._emission,
@@ -248,10 +248,10 @@ class _Recorder:
 
     def _hit_of_block(self, r: _Return) -> None:
         if r.caller is _DIRECT:
-            self._ray(CAMERA, None, r.outer["ray"], _WHOLE, found=r.result)
+            self._ray(CAMERA, None, r.own["ray"], _WHOLE, found=r.result)
         elif r.caller is _OF_SCATTERED:
             weight = r.outer["state"].throughput
-            self._ray(SCATTERED, 0, r.outer["ray"], weight, found=r.result)
+            self._ray(SCATTERED, 0, r.own["ray"], weight, found=r.result)
 
     def _emission(self, r: _Return) -> None:
         if r.caller in (_WHITTED, _DIRECT):

@@ -3,7 +3,7 @@
 - `flat/`, `curved/`, `meshes/`, `box.py`: the primitives, one file each;
 - `csg.py`: solids made of primitives; `instances.py`: copies of groups of shapes;
 - `tables.py`: all tables of a scene; `dispatch.py`: the kernels for any primitive;
-- `brute_force.py`: rays against all primitives of small scenes.
+- `brute_force.py`: rays against all primitives of small scenes, type by type.
 
 A file has a description (a `Shape`), its table (a NamedTuple of arrays, a row for each primitive,
 with the columns of `placement.owners`), `bounds(table)` and kernels.  Contract of the kernels, in
@@ -27,7 +27,7 @@ scene; a row in the tests' tuple.  Step by step: docs/extending.md.
 
 from reference_rt.core.arrays import IntArray
 from reference_rt.shapes.box import Box
-from reference_rt.shapes.brute_force import nearest, nearest_of_rays
+from reference_rt.shapes.brute_force import completed, nearest, nearest_of_rays
 from reference_rt.shapes.curved.quadric import Cone, Cylinder, Quadric
 from reference_rt.shapes.curved.sphere import Sphere
 from reference_rt.shapes.curved.torus import Torus
@@ -95,6 +95,7 @@ __all__ = [
     "Torus",
     "Triangle",
     "colour",
+    "completed",
     "enters",
     "face",
     "intersect",
