@@ -26,14 +26,13 @@ from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.shapes.dispatch import found
 from reference_rt.shapes.meshes.watertight import shear_of
 from reference_rt.shapes.ray_simd import load, store
-from reference_rt.shapes.tables import TABLES, TRIANGLE, Shapes, by_code
+from reference_rt.shapes.tables import CODES, TABLES, TRIANGLE, Shapes, by_code
 
-_CODES = {module: code for code, _, _, module in TABLES}
 _KINDS = len(TABLES)
 
-SIDE_BY_SIDE = tuple(code for module, code in _CODES.items() if hasattr(module, "nearer"))
+SIDE_BY_SIDE = tuple(code for module, code in CODES.items() if hasattr(module, "nearer"))
 """The types of which one shape is tested against VECTOR_WIDTH rays."""
-ONE_BY_ONE = tuple(code for code in _CODES.values() if code not in SIDE_BY_SIDE)
+ONE_BY_ONE = tuple(code for code in CODES.values() if code not in SIDE_BY_SIDE)
 
 
 KIND = 2**40
@@ -104,7 +103,7 @@ _complete_behind_link = _completing.function
 
 def _nearest_by(module: Any) -> Callable[..., Hit]:
     """The kernel of `nearest_of_type` for a type of shape."""
-    kind, intersect = _CODES[module], module.intersect
+    kind, intersect = CODES[module], module.intersect
 
     @kernel
     def of_table(table: Any, ray: Any, closest: Hit) -> Hit:
@@ -130,7 +129,7 @@ def nearest_of_type(shapes: Shapes, kind: int, ray: Ray, closest: Hit) -> Hit:
 
 def _of_block_by(module: Any) -> Callable[..., None]:
     """The kernel of `nearest_of_block` for a type of shape."""
-    kind, of_one = _CODES[module], _nearest_by(module)
+    kind, of_one = CODES[module], _nearest_by(module)
 
     @kernel
     def one_by_one(table: Any, rays: RayBlock, hits: HitBlock, n: int, any_hit: bool) -> None:

@@ -3,7 +3,7 @@ of those with masks: `{"type": "path_of_solids"}`.
 
 Mitsuba's own integrators trace Mitsuba's scene, in which there are no solids, and are wrong for
 masks and behind hidden lamps (`squares_opacity` and `misplaces` in
-`comparisons.mitsuba.translate.lights`).  This one traces a `LitScene`, and takes all else from
+`comparisons.lights.translate`).  This one traces a `LitScene`, and takes all else from
 Mitsuba: the camera, the film, random numbers, BSDFs and emitters.  The estimator is the textbook's:
 at each surface one sample of a light and one of the BSDF, combined with the power heuristic (Veach
 1997).  Its mean is that of Mitsuba's `path` and `direct`.
@@ -71,10 +71,10 @@ def register(mi: Any) -> None:
                 si, of_solid = lit.trace(ray, active)
                 # Density 0: the ray is the camera's or of a delta lobe, and has no competitor.
                 light_pdf = mi.Float(0.0)
-                found = mi.DirectionSample3f(scene, si, before)
+                sampled = mi.DirectionSample3f(scene, si, before)
                 if depth > 0 and self.samples_lights:
                     competes = active & (bsdf_pdf > 0.0) & (of_solid ^ True)
-                    light_pdf = scene.pdf_emitter_direction(before, found, competes)
+                    light_pdf = scene.pdf_emitter_direction(before, sampled, competes)
                     light_pdf = dr.select(competes, light_pdf, 0.0)
                 share = dr.select(bsdf_pdf > 0.0, weight(bsdf_pdf, light_pdf), 1.0)
                 if depth > 0 or not self.hides:

@@ -218,7 +218,7 @@ def intersect(rectangles: Rectangles, i: int, ray: Ray) -> Crossing:
     return miss()
 
 
-surface = base.surface
+surface, unit_normals = base.surface, base.unit_normals
 
 
 @kernel

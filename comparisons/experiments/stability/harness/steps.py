@@ -6,11 +6,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import reference_rt as rt
+from comparisons import translator
 from comparisons.experiments.stability.harness.core import MITSUBA, OURS, FloatArray, U
 from comparisons.geometry import frame
 from comparisons.geometry.affine import unit_vectors
 from comparisons.geometry.exact.crossings import Row
-from comparisons.mitsuba import counterpart, translate
+from comparisons.mitsuba import counterpart
 from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.hits import MitsubaHits
 from comparisons.mitsuba.scene import picture
@@ -95,12 +96,12 @@ def matrix(linear: FloatArray, center: FloatArray) -> tuple[Matrix]:
 
 def loaded(scene: rt.Scene) -> Any:
     """Mitsuba's scene, in the variant that is set."""
-    return translate.load(scene, frame.OURS).mi_scene
+    return translator.load(scene, frame.OURS).mi_scene
 
 
 def traced(scene: rt.Scene, o: FloatArray, d: FloatArray) -> MitsubaHits:
     """The closest hits of rays (n, 3) in it."""
-    return counterpart.trace(translate.load(scene, frame.OURS), o, d)
+    return counterpart.trace(translator.load(scene, frame.OURS), o, d)
 
 
 def rendered(scene: rt.Scene, spp: int, seed: int) -> FloatArray:

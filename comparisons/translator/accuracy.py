@@ -1,0 +1,52 @@
+"""Relative errors of a scene's materials that a comparison must allow for: of our tables, and of
+Mitsuba's formulas in float32."""
+
+from collections.abc import Iterator
+
+from comparisons.materials import type_of
+from comparisons.materials.material import Errors
+from reference_rt.materials import Bump, Emissive, Material, NormalMap, Wrapper
+from reference_rt.rendering.scene import Scene
+
+
+def accuracy(scene: Scene, name: str | None) -> float:
+    """The relative error of the light that material `name` scatters, by our tables or in Mitsuba; 0
+    for exact materials, and for None."""
+    errors = ((m, e) for m in _leaves(scene, name) if (e := _errors(m)) is not None)
+    return max((e.relative(m) for m, e in errors), default=0.0)
+
+
+def coat_error(scene: Scene, name: str | None) -> float:
+    """The absolute error of light that passes a coat, as a fraction of the brightest such light; 0
+    for materials without a coat, and for None."""
+    errors = ((m, e) for m in _leaves(scene, name) if (e := _errors(m)) is not None)
+    return max((e.absolute(m) for m, e in errors), default=0.0)
+
+
+def _errors(material: Material) -> Errors | None:
+    known = type_of(material)
+    return None if known is None else known.errors
+
+
+def is_tilted(scene: Scene, name: str | None) -> bool:
+    """Whether material `name` has a bump or normal map on the outside, under wrappers at most."""
+    if name is None:
+        return False
+    material = scene.materials[name]
+    if isinstance(material, Bump | NormalMap):
+        return True
+    fields = material.bases if isinstance(material, Wrapper) else ("base",)
+    return any(is_tilted(scene, getattr(material, field, None)) for field in fields)
+
+
+def _leaves(scene: Scene, name: str | None) -> Iterator[Material]:
+    """The materials that material `name` is made of."""
+    if name is None:
+        return
+    material: Material = scene.materials[name]
+    if isinstance(material, Wrapper | Emissive):
+        fields = material.bases if isinstance(material, Wrapper) else ("base",)
+        for field in fields:
+            yield from _leaves(scene, getattr(material, field))
+    else:
+        yield material
