@@ -92,8 +92,8 @@ class Surfaces(Losses):
             scale = np.prod([one.scale for one in rgb])
             codes, tint = self.coded(colour * tint, tint * scale, 1.0, name)
             if alpha:
-                grey = np.prod([grey(one.texels) for one in alpha], axis=0)
-                shares = self.rounded(grey * opacity.factor[0], name)
+                opacities = np.prod([grey(one.texels) for one in alpha], axis=0)
+                shares = self.rounded(opacities * opacity.factor[0], name)
                 codes = np.concatenate([codes, shares[..., None]], axis=2)
             pbr["baseColorTexture"] = self.texture(codes, sampler, uv, maps)
         share = 1.0 if opacity.images else float(opacity.factor[0])
@@ -112,10 +112,10 @@ class Surfaces(Losses):
             codes = np.full(shape, 255, np.uint8)
             for k, (key, some) in enumerate(planes.items(), 1):
                 if some:
-                    grey = np.prod([grey(one.texels) for one in some], axis=0)
-                    grey = grey * values[key].factor[0]
+                    numbers = np.prod([grey(one.texels) for one in some], axis=0)
+                    numbers = numbers * values[key].factor[0]
                     root = look.of_alpha and key == "roughnessFactor"
-                    codes[..., k] = self.rounded(np.sqrt(grey) if root else grey, name)
+                    codes[..., k] = self.rounded(np.sqrt(numbers) if root else numbers, name)
             pbr["metallicRoughnessTexture"] = self.texture(codes, sampler, uv, maps)
         for key, part in values.items():
             number = float(part.factor[0])
