@@ -12,7 +12,7 @@ from PIL import Image
 from comparisons.materials import type_of
 from comparisons.mitsuba.files import Losses, UnwritableError
 from comparisons.renderers.vocabulary import GltfImage, Look, matte
-from comparisons.textures import BY_DESCRIPTION
+from comparisons.textures import type_of as type_of_texture
 from comparisons.textures.texture import grey
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.image import srgb
@@ -193,9 +193,7 @@ class Surfaces(Losses):
         if name is None:
             return matte(Look().base)
         material = self.scene.materials[name]
-        known = type_of(material)
-        to_gltf = None if known is None else known.to_gltf
-        if to_gltf is None:
+        if (to_gltf := type_of(material).to_gltf) is None:
             raise UnwritableError(f"a material '{material.type}'")
         if to_gltf.nearly:
             what = f"the material '{name}' ({material.type})"
@@ -204,10 +202,9 @@ class Surfaces(Losses):
 
     def image(self, name: str) -> GltfImage:
         texture = self.scene.textures[name]
-        known = BY_DESCRIPTION.get(type(texture))
-        if known is None or known.to_gltf is None:
+        if (to_gltf := type_of_texture(texture).to_gltf) is None:
             raise UnwritableError(f"a texture '{texture.type}'")
-        return known.to_gltf(texture, name, self)
+        return to_gltf(texture, name, self)
 
     def coded(
         self, values: FloatArray, scale: FloatArray, most: float, name: str

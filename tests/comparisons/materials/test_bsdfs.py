@@ -82,12 +82,17 @@ def pairs(material: Material) -> tuple[FloatArray, FloatArray]:
 
 
 def float32_bound(material: Material, wo: FloatArray, wi: FloatArray, ours: FloatArray) -> Any:
-    """(n,): the products' roundings, and how far those of the directions move our value."""
+    """(n,): the products' roundings, and how far those of the directions and of the index of
+    refraction and its inverse move our value."""
     found = 128.0 * UNIT_ROUNDOFF * np.abs(ours).max(axis=1)
     for move in arbiter.directions(6):
         step = ROUNDINGS * UNIT_ROUNDOFF * move
         moved = both_sides(material, wo + step, wi - step, None)[0]
         found += np.abs(moved - ours).max(axis=1)
+    for name in ("interior_ior", "eta"):
+        if isinstance(index := getattr(material, name, None), float):
+            rounded = material.model_copy(update={name: index * (1.0 + 2.0 * UNIT_ROUNDOFF)})
+            found += np.abs(both_sides(rounded, wo, wi, None)[0] - ours).max(axis=1)
     if isinstance(material, rt.Principled) and material.clearcoat != 0.0:
         found += clearcoat_error(material) * np.abs(ours).max(axis=1)
     tint = max(getattr(material, "spec_tint", 0.0), getattr(material, "sheen_tint", 0.0))
