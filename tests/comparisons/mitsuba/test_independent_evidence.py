@@ -33,7 +33,7 @@ EXCEPTIONS = {
     "lights/translate.py": {"read_image"},
     "textures/bitmap.py": {"read"},
     "materials/both_sides.py": {"tabulate"},  # our side
-    "geometry/sizes.py": {"tabulate"},  # sizes, of which bounds of errors are made
+    "referee/sizes.py": {"tabulate"},  # sizes, of which bounds of errors are made
 }
 
 FOLDERS = (
@@ -43,6 +43,7 @@ FOLDERS = (
     "cameras",
     "lights",
     "shapes",
+    "referee",
     "translator",
     "cycles",
 )
