@@ -10,11 +10,12 @@ import numpy as np
 from comparisons.cameras import type_of as type_of_camera
 from comparisons.cameras.camera import MIRROR
 from comparisons.geometry.frame import Frame, frame_for
-from comparisons.geometry.sizes import ShapeSizes
 from comparisons.lights import type_of as type_of_light
 from comparisons.lights.light import Motion, with_steps
 from comparisons.mitsuba.node import Node, Reading, Triple, triple
-from comparisons.shapes.meshes import Soup, soup_of
+from comparisons.referee.sizes import ShapeSizes
+from comparisons.shapes.mesh import soup_of
+from comparisons.shapes.soup import Soup
 from reference_rt.core.transform import Scale, Translate
 from reference_rt.materials import Bump, NormalMap
 from reference_rt.rendering.scene import Scene

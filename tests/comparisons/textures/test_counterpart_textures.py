@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +15,7 @@ from comparisons.mitsuba.scene import for_rays
 from comparisons.textures.texture import Use
 from comparisons.textures.translate import translate_texture
 from comparisons.translator import load
+from reference_rt.core.model import types_of
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.lights import EnvironmentMap
 from reference_rt.lights.emitters import environment_map
@@ -112,7 +113,7 @@ def slots() -> list[tuple[type[Material], str]]:
     """All fields of materials that may name a texture."""
     return [
         (cls, field)
-        for cls in get_args(get_args(AnyMaterial)[0])
+        for cls in types_of(AnyMaterial)
         for field, info in cls.model_fields.items()
         if any(isinstance(data, MayBeTexture) for data in info.metadata)
     ]
