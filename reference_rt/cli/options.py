@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
+from reference_rt.cli.quantities import size_of
 from reference_rt.util.errors import SceneError, UsageError
 from reference_rt.util.workers import Workers
 
@@ -71,12 +72,7 @@ def adjusted(
     """The scene with the options of the command line.  Raises UsageError."""
     from reference_rt.rendering.render import with_settings
 
-    pixels = None
-    if size is not None:
-        width, _, height = size.lower().partition("x")
-        if not all(n.isdecimal() and len(n) < 11 for n in (width, height)):
-            raise UsageError(f"--size: expected WIDTHxHEIGHT, such as 640x480, got '{size}'")
-        pixels = int(width), int(height)
+    pixels = None if size is None else size_of(size)
     try:
         return with_settings(scene, spp=spp, size=pixels, integrator=integrator, seed=seed)
     except SceneError as error:

@@ -25,7 +25,7 @@ from reference_rt.materials.material import Emissive
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes import TABLES as SHAPE_TABLES
 from reference_rt.textures import Colours, Palette
-from reference_rt.textures.parameter import join
+from reference_rt.textures.parameter import join, joined
 
 _PLACED = (AREA, *(code for code, _, _, module in LIGHT_TABLES if hasattr(module, "bounds")))
 """The codes of lights that have a position: a light tree may hold them."""
@@ -52,7 +52,8 @@ def light_tables(scene: SceneModel, geometry: Geometry, palette: Palette) -> Lig
     tables: dict[str, Any] = {}
     for code, field, description, module in LIGHT_TABLES:
         found: list[Any] = [light for light in scene.lights if isinstance(light, description)]
-        tables[field] = join([light.tabulate(palette) for light in found]) if found else None
+        made = [light.tabulate(palette) for light in found]
+        tables[field] = joined(module, made) if found else None
         if found:
             kinds += [code] * len(found)
             rows += range(len(found))

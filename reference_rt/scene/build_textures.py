@@ -1,7 +1,6 @@
 """The textures of a scene -> Textures, and the palette by which parameters refer to them."""
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +8,7 @@ import numpy as np
 from reference_rt.scene.model import SceneModel
 from reference_rt.textures import TABLES as TEXTURE_TABLES
 from reference_rt.textures import Palette, Product, Textures, bitmap, product
-from reference_rt.textures.parameter import join
+from reference_rt.textures.parameter import joined
 
 
 def texture_tables(scene: SceneModel) -> tuple[Textures | None, Palette]:
@@ -45,12 +44,8 @@ def texture_tables(scene: SceneModel) -> tuple[Textures | None, Palette]:
         if isinstance(texture, Product):
             greatest[numbers[name]] *= math.prod(greatest[numbers[of]] for of in texture.of)
     tables = {
-        field: _joined(module, parts[code]) if code in parts else None
+        field: joined(module, parts[code]) if code in parts else None
         for code, field, _, module in TEXTURE_TABLES
     }
     textures = Textures(np.array(kinds), np.array(rows), np.array(maps), **tables)
     return textures, Palette(numbers, greatest)
-
-
-def _joined(module: Any, parts: Sequence[Any]) -> Any:
-    return getattr(module, "join", join)(parts)
