@@ -38,7 +38,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from comparisons.gate.reference import is_noise_free
 from comparisons.results.case import FloatArray, RungResult
-from comparisons.statistics.scales import CHANNELS
+from comparisons.statistics.cells import CHANNELS
 from reference_rt.cameras.film import BoxFilter
 from reference_rt.integrators import Direct, RayCast
 from reference_rt.rendering.image import srgb

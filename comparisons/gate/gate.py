@@ -19,8 +19,8 @@ from comparisons.gate.rim import without_rim, without_rim_later
 from comparisons.results.case import Case, FloatArray, Images, RungResult, Status, decide
 from comparisons.rungs.input import input_rung
 from comparisons.rungs.witness import Witness
+from comparisons.statistics.cells import TILE, cell_pixels, cell_sums
 from comparisons.statistics.metrics import image_metrics
-from comparisons.statistics.scales import TILE, cell_pixels, cell_sums
 from reference_rt.rendering.image import srgb
 from reference_rt.textures.image_file import linear
 from reference_rt.util.errors import ImageError, UsageError

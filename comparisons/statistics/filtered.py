@@ -7,8 +7,8 @@ from scipy import special
 from scipy.ndimage import correlate1d
 
 from comparisons.results.case import FloatArray
+from comparisons.statistics.cells import tile_sums
 from comparisons.statistics.metrics import ratio
-from comparisons.statistics.scales import tile_sums
 
 NEAR = 4
 """Pixels: beyond the diameter of usual filters, whose radii are 2 at most."""

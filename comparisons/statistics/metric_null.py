@@ -13,9 +13,9 @@ import numpy as np
 from scipy import special
 
 from comparisons.results.case import FloatArray, Images
+from comparisons.statistics.cells import HALF, TILE, tile_sums
 from comparisons.statistics.metrics import LocalErrors, local_errors, relative_squares
 from comparisons.statistics.rare import share_unmet, unmet_variance
-from comparisons.statistics.scales import HALF, TILE, tile_sums
 from comparisons.statistics.sides import side_of
 
 NOISE_LIMIT = 1.25

@@ -4,9 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from comparisons.results.case import FloatArray, ImageRegion
-from comparisons.statistics.decide import findings, read
-from comparisons.statistics.metrics import ratio
-from comparisons.statistics.scales import (
+from comparisons.statistics.cells import (
     CHANNELS,
     DARK,
     ROUNDING,
@@ -14,10 +12,12 @@ from comparisons.statistics.scales import (
     Margins,
     cell_means,
 )
-from comparisons.statistics.sides import Known, known_side, neighbourhood, side_of
+from comparisons.statistics.decide import findings, read
+from comparisons.statistics.metrics import ratio
+from comparisons.statistics.scales import PIXELS, Pair, pixel_test
+from comparisons.statistics.sides import Known, neighbourhood, side_of
 from comparisons.statistics.welch import (
     BiasTest,
-    pixel_test,
 )
 from comparisons.statistics.wording import (
     percent,
@@ -37,10 +37,9 @@ def standard_error(candidate: npt.ArrayLike, reference: npt.ArrayLike | Known) -
     ValueError for pictures of different sizes.
     """
     a, b = read(candidate, reference, finite=False)
-    if len(a) > 1 and isinstance(b, Known):
-        return pixel_test(side_of(a), known_side(b), Margins()).standard_error
-    if len(a) > 1 and not isinstance(b, Known) and len(b) > 1:
-        return pixel_test(side_of(a), side_of(b), Margins()).standard_error
+    if len(a) > 1 and (isinstance(b, Known) or len(b) > 1):
+        pair = Pair(side_of(a), side_of(b), Margins())
+        return pixel_test(pair, PIXELS.level).standard_error
     mean = b.mean if isinstance(b, Known) else b.mean(axis=0)
     difference = a.mean(axis=0) - mean
     variance = neighbourhood(difference**2) - neighbourhood(difference) ** 2
@@ -60,7 +59,7 @@ def worst_regions(
     if not isinstance(b, Known) and len(a) == len(b) == 1:
         return _of_single_pictures(a[0], b[0], tile, most)
     found = findings(a, b, tile, Margins())
-    side, tiles, pixels = found.tile, found.tiles, found.pixels
+    side, tiles, pixels = found.tile, found.tests["tiles"], found.tests["pixels"]
     worst_pixels = _cell_maxima(pixels.strength, side)
     strength = np.maximum(tiles.strength, worst_pixels)
     places = []

@@ -37,30 +37,30 @@ latter have none.
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from scipy import special
 from scipy.linalg import hadamard
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.order import shared_by_sides
-from comparisons.statistics.rare import Events
-from comparisons.statistics.scales import (
+from comparisons.statistics.cells import (
     DARK,
-    UNIFORMITY_LEVEL,
     Margins,
     cell_means,
-    cell_pixels,
-    cell_sums,
     ranks_of,
+    tiles,
 )
+from comparisons.statistics.order import shared_by_sides
+from comparisons.statistics.rare import Events
 from comparisons.statistics.sides import Side
 from comparisons.statistics.welch import are_unequal, noise_ratio
 
 BLOCK = 4
 """Side of a block in pixels: larger than a filter's radius, and many blocks even in small
 pictures."""
+
+LEVEL = 0.0001
+"""Chance of a false alarm of both tests together; see `scales` for the other families."""
 
 LEAST = 4
 """Least number of replicates on each side: fewer give too few Walsh functions."""
@@ -84,8 +84,7 @@ class Uniformity:
     replicates: int
     shared: bool = False
     """The blocks are `narrow` because the sides share noise."""
-    level: float = UNIFORMITY_LEVEL
-    """Chance of a false alarm of both tests together."""
+    level: float = LEVEL
 
     @property
     def wide(self) -> bool:
@@ -142,7 +141,7 @@ def uniformity(a: Side, b: Side, margins: Margins, level: float = 1.0) -> Unifor
         p_reversed=float(special.stdtr(of_reversed[1], -excess / of_reversed[0])),
         blocks=int(noisy.any(axis=-1).sum()),
         replicates=half,
-        level=level * UNIFORMITY_LEVEL,
+        level=level * LEVEL,
     )
     return replace(found, shared=found.narrow and shared_by_sides(*pictures))
 
@@ -172,7 +171,7 @@ def _unmet(a: Side, b: Side) -> FloatArray:
     ranks presume noise of one distribution on both sides; of a side that seldom meets a light, most
     blocks are darker, though none by more than a few events."""
     difference = cell_means(a.mean - b.mean, BLOCK)
-    events = Events.of_cells(a, b, partial(cell_sums, tile=BLOCK), cell_pixels(b.mean, BLOCK))
+    events = Events.of(a, b, tiles(b.mean, BLOCK))
     return np.asarray(8.0 * np.abs(difference) * events.missed_by(difference))
 
 

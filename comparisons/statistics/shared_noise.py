@@ -8,7 +8,7 @@ from scipy import ndimage, special
 from scipy.linalg import helmert
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.scales import HALF, tile_sums
+from comparisons.statistics.cells import HALF, tile_sums
 
 FEWEST_PIXELS = 256
 """Least number of noisy pixels for these tests."""

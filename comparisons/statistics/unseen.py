@@ -6,8 +6,8 @@ import numpy as np
 from scipy import special
 
 from comparisons.results.case import FloatArray
+from comparisons.statistics.cells import DARK
 from comparisons.statistics.metrics import ratio
-from comparisons.statistics.scales import DARK
 from comparisons.statistics.sides import met_once
 
 

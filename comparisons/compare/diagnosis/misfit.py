@@ -8,7 +8,7 @@ import numpy as np
 from scipy import ndimage, optimize
 
 from comparisons.results.case import FloatArray, Images
-from comparisons.statistics.scales import DARK
+from comparisons.statistics.cells import DARK
 
 # ---- a hypothesis about what is wrong with a picture ---------------------------------------------
 

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from comparisons.commands.gate import accept
 from comparisons.gate.baselines import MOST_KEPT
 from comparisons.gate.digest import Copies, fingerprint
-from comparisons.gate.gate import gate_pictures
+from comparisons.gate.gate import Question, gate_pictures
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import of_files
 from comparisons.results.files import sealed
@@ -164,7 +164,7 @@ def test_invalid_does_not_hide_a_bias(fault: str, gain: float) -> None:
     else:
         pictures[1] = 0.1 * pictures[1] + 0.9 * pictures[2]
     reference = of_files([Picture(p) for p in noisy(8, 2)], None, False)
-    case = gate_pictures([Picture(p) for p in pictures], reference, limit=0.02)
+    case = gate_pictures([Picture(p) for p in pictures], reference, Question(limit=0.02))
     assert case.verdict == "invalid"
     assert case.reason.startswith("input: ")
     assert ("; besides, statistics: the image mean differs: " in case.reason) == (gain > 1.0)

@@ -76,11 +76,8 @@ def differs(candidate, reference):
     """Whether anything is said to be wrong, at any scale."""
     found = findings(candidate, reference, 16, Margins())
     spread = found.uniformity
-    return (
-        found.image.differs.any()
-        or found.tiles.differs.any()
-        or found.pixels.differs.any()
-        or (spread is not None and (spread.wide or spread.narrow))
+    return any(test.differs.any() for test in found.tests.values()) or (
+        spread is not None and (spread.wide or spread.narrow)
     )
 
 

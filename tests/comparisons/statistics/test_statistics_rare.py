@@ -94,8 +94,8 @@ def test_a_known_mean_with_a_lamp_found_by_scattered_rays_alone():
     for event in EVENTS:
         found = findings(rare_light(rng, 16, event), known, 16, MARGINS)
         assert not found.image.differs.any()
-        assert not found.tiles.differs.any()
-        assert not found.pixels.differs.any()
+        assert not found.tests["tiles"].differs.any()
+        assert not found.tests["pixels"].differs.any()
 
 
 # What it costs
@@ -120,7 +120,7 @@ def test_a_wrong_tile_is_found_amid_rare_light(change):
         for side in (a, b):
             side[:, 32:] += 2.0 * (rng.random((16, 16, SIDE, 1)) < 1e-3)
         a[:, :16, :16] *= change
-        assert findings(a, b, 16, MARGINS).tiles.differs[0, 0].any()
+        assert findings(a, b, 16, MARGINS).tests["tiles"].differs[0, 0].any()
 
 
 def test_noise_without_rare_light_loses_no_power():
@@ -128,7 +128,7 @@ def test_noise_without_rare_light_loses_no_power():
     rng = np.random.default_rng(0)
     a, b = 1.0 + 0.3 * rng.standard_normal((2, 16, 48, 48, 3))
     found = findings(a, b, 16, MARGINS)
-    for test, margin in ((found.image, 0.001), (found.tiles, 0.01)):
+    for test, margin in ((found.image, 0.001), (found.tests["tiles"], 0.01)):
         ordinary = max(float(error.value.max()) for error in test.errors[:2])
         dof = [np.minimum(error.dof, 1000).astype(int).min() for error in test.errors[:2]]
         reach = float((test.detectable - margin * test.scale).max())

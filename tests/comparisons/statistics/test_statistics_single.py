@@ -59,7 +59,7 @@ def test_standard_error_of_a_tile_knows_of_noise_that_blocks_share():
     for _ in range(40):
         a, b = rng.standard_normal((2, 1, 64, 64, 3))
         a = sum(np.roll(a, shift, axis=2) for shift in range(4)) / 4.0
-        tiles = findings(5.0 + a, 5.0 + 0.01 * b, 16, MARGINS).tiles
+        tiles = findings(5.0 + a, 5.0 + 0.01 * b, 16, MARGINS).tests["tiles"]
         found.append(tiles.standard_error)
         differences.append(tiles.difference)
     assert 0.88 < np.sqrt(np.mean(np.square(found))) / np.std(differences) < 1.1
@@ -72,8 +72,8 @@ def test_a_firefly_leaves_a_single_picture_few_degrees_of_freedom():
     a[0, 30, 30] = 1e4
     found = findings(a, b, 16, MARGINS)
     assert np.all(found.image.errors[0].dof < 3)
-    assert np.all(found.tiles.errors[0].dof[1, 1] < 3)
-    assert np.all(found.tiles.errors[0].dof[0, 0] > 8)
+    assert np.all(found.tests["tiles"].errors[0].dof[1, 1] < 3)
+    assert np.all(found.tests["tiles"].errors[0].dof[0, 0] > 8)
 
 
 @pytest.mark.parametrize(
