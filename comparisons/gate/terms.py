@@ -11,6 +11,7 @@ from typing import Any
 
 from comparisons.compare.diagnosis import FLEXIBLE
 from comparisons.compare.diagnosis.misfit import Misfit
+from comparisons.compare.diagnosis.spots import FEW_PIXELS, ONE_PIXEL, ONE_TILE
 from comparisons.compare.judge import SURE
 from comparisons.compare.path_length import DIRECT, SAMPLES
 from comparisons.results.case import Case, Cause, FloatArray
@@ -29,7 +30,7 @@ from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
 
-UNSURE = ("one bad tile", "a few wrong pixels", "a single wrong pixel", *FLEXIBLE)
+UNSURE = (ONE_TILE, FEW_PIXELS, ONE_PIXEL, *FLEXIBLE)
 """Causes that missing terms look like, however well they explain the difference."""
 
 WORTH = 0.25

@@ -1,5 +1,4 @@
-"""Tests by ranks, exact whatever the law of the noise: `uniformity` of small blocks' p-values, and
-whether replicates depend on their order (`successive`).
+"""`uniformity`: a test by ranks of the p-values of small blocks, exact whatever the noise is.
 
 The candidate's and the reference's G replicates are 2G pictures. Their difference is one of 2G - 1
 orthogonal Walsh functions of these pictures; every other one has as many pictures of a side with a
@@ -16,23 +15,7 @@ Pareto noise with exponent 1.2, 32 pictures against 16 means of 16, 2 of 400 rig
 
 Too small a mean p-value means that blocks differ systematically, or that replicates are not
 independent of each other; too large a one that candidate and reference share their noise, or that
-the replicates of a side make up for each other (`shared_by_sides`).
-
-Pictures that go on from each other depend on their order: a history (nine tenths of the last
-picture and one tenth of new samples), prefixes of one accumulation, and pixels that are seeded by
-the seed plus the pixel's number, for which the picture of the next seed is the last one moved by a
-pixel. The spread of such replicates does not show the error of their mean.
-
-Independent replicates of one renderer are exchangeable: any order of them is equally likely. So the
-sum of the correlations of successive pictures (lag 1) is compared with those of the same pictures
-in other orders (Dwass 1957: exact for any number of random orders). The level is exact whatever the
-noise is: heavy tails, filters, pixels that share random numbers. The movement for which pictures
-are compared is the one with the largest correlation of any two, which does not depend on the order.
-
-If the means of two sides differ by less than independent replicates permit, either the sides share
-noise, as the same seeds do, or the replicates of a side make up for each other, as strata of one
-pattern do. The former have deviations that are correlated in the pixels where they belong; the
-latter have none.
+the replicates of a side make up for each other (`order.shared_by_sides`).
 """
 
 import math

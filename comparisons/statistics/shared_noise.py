@@ -9,6 +9,7 @@ from scipy.linalg import helmert
 
 from comparisons.results.case import FloatArray
 from comparisons.statistics.cells import HALF, tile_sums
+from comparisons.statistics.order import deviations
 
 FEWEST_PIXELS = 256
 """Least number of noisy pixels for these tests."""
@@ -72,13 +73,10 @@ def correlated_pair(pictures: FloatArray) -> tuple[int, int, float] | None:
     for its detail: a rare event that brightens two pictures is smooth, equal seeds repeat detail.
     """
     count = len(pictures)
-    deviation = pictures - pictures.mean(axis=0)
-    scale = np.sqrt((deviation**2).mean(axis=0))
-    noisy = scale > 1e-9 * max(float(np.abs(pictures).max()), 1e-300)
-    pixels = int(np.count_nonzero(noisy.any(axis=-1)))
+    z = deviations(pictures)
+    pixels = int(np.count_nonzero(z.any(axis=(0, 3))))
     if count < FEWEST_REPLICATES or pixels < FEWEST_PIXELS:
         return None
-    z = np.where(noisy, deviation / np.where(noisy, scale, 1.0), 0.0)
     products = [_products(band) for band in (z, _detail(z))]
     bands = [_correlations(band) for band in products]
     lowest = np.min([band - _highest_by_chance(band, pixels) for band in bands], axis=0)

@@ -15,7 +15,7 @@ from reference_rt.textures.image_file import linear
 
 CHANNELS = ("red", "green", "blue")
 
-A_CURVE, A_MATRIX = "a monotone tone curve", "a matrix of colours"
+A_CURVE, A_MATRIX = FLEXIBLE = "a monotone tone curve", "a matrix of colours"
 """Names of causes with so many parameters that they may fit what has a simpler cause."""
 
 LUMINANCE = to_xyz(SRGB)[1]

@@ -7,11 +7,12 @@ import pytest
 from planted import HEIGHT, LAMP, MARGINS, NONE, WIDTH, replicates, scene
 from scipy import stats
 
-from comparisons.statistics import Known, compare
+from comparisons.statistics import Known, compare, ranks
 from comparisons.statistics.advice import _known
 from comparisons.statistics.cells import tiles, whole
+from comparisons.statistics.order import ORDER_LEVEL
 from comparisons.statistics.ranks import uniformity
-from comparisons.statistics.scales import IMAGE, PIXELS, TILES, Pair, chance_of_parting
+from comparisons.statistics.scales import IMAGE, PIXELS, SCALES, TILES, Pair, chance_of_parting
 from comparisons.statistics.sides import side_of
 from comparisons.statistics.welch import (
     BiasTest,
@@ -272,6 +273,11 @@ def test_the_known_part_of_an_error_is_a_lower_bound_at_95_percent():
     estimates = np.sqrt(rng.chisquare(dof, 20_000) / dof)
     above = (_known(biases(np.zeros(20_000), estimates, dof)) > 1.0).mean()
     assert above == pytest.approx(0.05, abs=6.0 * np.sqrt(0.05 * 0.95 / 20_000))
+
+
+def test_all_levels_add_up_to_one_false_alarm_in_a_thousand():
+    total = sum(scale.level for scale in SCALES) + ranks.LEVEL + 2.0 * ORDER_LEVEL
+    assert total == pytest.approx(1e-3)
 
 
 @pytest.mark.parametrize("level", [1.0, 0.25])
