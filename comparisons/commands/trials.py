@@ -149,6 +149,7 @@ def stability(
     """
     with compare_extra():
         from comparisons.experiments.stability.harness import outputs
+        from comparisons.experiments.stability.harness import page as page_of
         from comparisons.experiments.stability.harness.core import MODULES, Effort, summaries
         from comparisons.experiments.stability.harness.core import family as family_of
         from comparisons.experiments.stability.harness.run import (
@@ -198,13 +199,13 @@ def stability(
         outputs.write_results(out, found, effort, seed, facts)
         display.line("pictures and page")
         pictures = shoot(choice, found, out, opened)
-        outputs.write_page(page, found, pictures, effort, seed, facts)
+        page_of.write_page(page, found, pictures, effort, seed, facts)
     console = terminal.console()
     console.print(outputs.terminal(found, console.width))
     if markdown is not None:
         templates.rewrite(markdown, "stability", outputs.markdown(found, effort, seed, facts))
     if plots is not None:
-        save(plots, outputs.failures(found), facts)
+        save(plots, page_of.failures(found), facts)
     holds = True
     for one in (s for some in summaries(found).values() for s in some):
         holds &= one.holds

@@ -11,7 +11,7 @@ import math
 from typing import Any, ClassVar, Literal, NamedTuple
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Description
+from reference_rt.core.model import Description, Examples
 from reference_rt.core.ray import UNIT_ROUNDOFF, SurfacePoint
 from reference_rt.core.vec3 import (
     Frame,
@@ -144,7 +144,7 @@ INV_PI = 1.0 / math.pi
 class Shading(NamedTuple):
     """point: of the surface;  frame: the shading frame, n = `point.ns`;  wo: towards the viewer,
     local;  at: where textures are looked up;  tangents: dp/du and dp/dv, local, 0 for a
-    material that is not `oriented`;  layers: the scratch buffer that `prepare` fills with the
+    material that is not `oriented`;  flat_leaves: the scratch buffer that `prepare` fills with the
     material's flattened leaves, empty if no material of the scene is nested."""
 
     point: SurfacePoint
@@ -198,6 +198,11 @@ def oriented_frame(ns: Vec3, tangents: Tangents) -> Frame:
 class Emissive(Material):
     """Emits the same radiance in all directions of its front: its shape is an area light."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {"radiance": 1.0},
+        {"radiance": (3.0, 2.0, 1.0), "base": "base"},
+        {"radiance": "texture"},
+    )
     type: Literal["emissive"] = "emissive"
     radiance: ColourParameter
     """Emitted radiance: W sr^-1 m^-2, linear sRGB, or a texture."""

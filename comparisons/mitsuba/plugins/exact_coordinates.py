@@ -21,7 +21,7 @@ slopes of a bump map are a tenth off.  Where the angle around the axis does not 
 of constant z, as on the diagonals of a saddle, the tangents of a mesh have any direction.
 
 This plugin gives the nested material the surface's own uv and derivatives, computed at the point
-that was hit (`comparisons.mitsuba.coordinates`), and the shading frame whose x axis follows dp/du.
+that was hit, and the shading frame whose x axis follows dp/du.
 It is not for instances, in which it does not know the place of the surface.
 """
 
@@ -149,8 +149,8 @@ class Maths(NamedTuple):
 
     def turns(self, y: Any, x: Any) -> Any:
         """The angle of (x, y), from 0 to 1."""
-        found = self.atan2(y, x) / FULL
-        return self.select(found < 0.0, found + 1.0, found)
+        share = self.atan2(y, x) / FULL
+        return self.select(share < 0.0, share + 1.0, share)
 
 
 NUMPY = Maths(np.sqrt, np.arctan2, np.where)
