@@ -191,9 +191,9 @@ def test_pixels_of_two_values_that_part_by_chance():
     coin = dim.copy()
     coin[:4, 14, 14] = 1.0
     coin[:4, 30, 30] = 1e5  # beside which its neighbours' noise is nothing
-    assert not findings(coin[:4], coin[4:], 16, Margins()).pixels.differs.any()
+    assert not findings(coin[:4], coin[4:], 16, Margins()).tests["pixels"].differs.any()
     rows = dim.copy()
     rows[:4, 20:22] = 1.0
-    differing = findings(rows[:4], rows[4:], 16, Margins()).pixels.differs
+    differing = findings(rows[:4], rows[4:], 16, Margins()).tests["pixels"].differs
     assert differing[20:22].all()
     assert differing.sum() == 2 * 48 * 3

@@ -108,7 +108,7 @@ def test_a_wrong_pixel_is_found_amid_rare_light(factor):
         rng = np.random.default_rng(seed)
         a, b = rare_light(rng, 16, 3.0), rare_light(rng, 16, 3.0)
         a[:, 4, 20] *= factor
-        assert findings(a, b, 16, MARGINS).pixels.differs[4, 20].any()
+        assert findings(a, b, 16, MARGINS).tests["pixels"].differs[4, 20].any()
 
 
 @pytest.mark.parametrize("change", [0.9, 1.1])
