@@ -19,7 +19,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from comparisons.gate.digest import fingerprint
+from comparisons.gate.copies import fingerprint
 from comparisons.gate.pictures_in import Picture, read_candidate
 from comparisons.gate.reference import Reference, stacked, usable
 from comparisons.results.files import sealed, unsealed

@@ -11,7 +11,7 @@ from comparisons.compare.diagnosis.misfit import Hypothesis
 from comparisons.compare.judge import Evidence, Lights, Rendered, at_look, judge, of_replicates
 from comparisons.compare.looks import Looks, level_of
 from comparisons.compare.path_length import Lengths
-from comparisons.gate.digest import Copies
+from comparisons.gate.copies import Copies
 from comparisons.gate.edges import Edges, edges_rung
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes, size_of, stacked

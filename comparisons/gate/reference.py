@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import platformdirs
 
-from comparisons.gate.digest import fingerprint, scene_digest, source_digest
+from comparisons.gate.copies import fingerprint
+from comparisons.gate.digest import scene_digest, source_digest
 from comparisons.gate.pictures_in import Picture, variance_of
 from comparisons.results.files import read_arrays, write_arrays
 from reference_rt.core.arrays import FloatArray

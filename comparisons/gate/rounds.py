@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from comparisons.compare import looks
-from comparisons.gate.digest import Copies
+from comparisons.gate.copies import Copies
 from comparisons.gate.driver import Driver
 from comparisons.gate.gate import first_fault, gate_pictures, judged, look, unchanged
 from comparisons.gate.pictures_in import Picture

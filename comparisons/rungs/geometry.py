@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.geometry import affine
-from comparisons.geometry.exact.referee import Referee, identity_of
+from comparisons.geometry.exact.referee import Referee
 from comparisons.geometry.frame import round32
 from comparisons.geometry.sizes import LeafSizes, ShapeSizes
 from comparisons.mitsuba.counterpart import Counterpart, trace
@@ -19,6 +19,7 @@ from comparisons.rungs.rays.any_hit import any_hits
 from comparisons.rungs.rays.camera import compare_camera
 from comparisons.rungs.rays.coincidence import coincident, in_one_place
 from comparisons.rungs.rays.comparer import DISCRETE, KINDS, Comparer
+from comparisons.rungs.rays.judgement import MOST_JUDGED, Judgement, judged
 from comparisons.rungs.rays.rays import Rays, described, joined, mixed_rays, random_rays
 from comparisons.rungs.rays.resolution import resolution
 from reference_rt.cameras.film import Film
@@ -149,65 +150,6 @@ def _flat(table: object, xy: FloatArray) -> Iterator[FloatArray]:
     yield table.center[0] + xy @ edges  # type: ignore[attr-defined]
 
 
-# ---- which tracer's hit is wrong where they differ: exact arithmetic decides ---------------------
-
-
-MOST_JUDGED = 400
-"""Most mismatches that are judged: each takes about 10 ms."""
-
-FEW = 1e-4
-"""Largest fraction of rays, not aimed at edges, that Mitsuba may get wrong by rounding.  More means
-that its scene is a different one."""
-
-SHARE = 1e-6
-"""Tolerance of Mitsuba's t, as a fraction of the distance and over the cosine: the question is only
-which surface was hit.  A thousandth of it is the tolerance of our t (`_slack`)."""
-
-
-class Judgement(NamedTuple):
-    """Indices of the rays on which the tracers disagree, by whose hit is wrong.
-
-    ours: our hit is wrong;  mitsuba: only Mitsuba's is;  both: neither is, the two surfaces are in
-    one place;  undecided: both hits are of the right surface, and the difference is elsewhere, or
-    the ray touches an edge exactly, or it is beyond MOST_JUDGED.
-    """
-
-    ours: IntArray
-    mitsuba: IntArray
-    both: IntArray
-    undecided: IntArray
-
-
-def judged(
-    referee: Referee, rays: Rays, ours: Intersections, theirs: MitsubaHits, mismatches: IntArray
-) -> Judgement:
-    """Judge the rays with the indices `mismatches`, in their order."""
-    some = mismatches[:MOST_JUDGED]
-    truths = referee.decide(rays.o[some], rays.d[some]) if len(some) else []
-    verdicts = []
-    for k, truth in zip(some.tolist(), truths, strict=True):
-        right = truth.agrees(ours, k, _slack(rays, ours, k))
-        also = truth.agrees(theirs, k, 1e3 * _slack(rays, theirs, k))
-        apart = identity_of(ours, k) != identity_of(theirs, k)
-        verdicts.append(("both" if apart else "undecided") if right and also else
-                        "mitsuba" if right else
-                        "undecided" if truth.touching else "ours")  # fmt: skip
-    named = np.array(verdicts + ["undecided"] * (len(mismatches) - len(some)), dtype="U9")
-    return Judgement(*(mismatches[named == name] for name in Judgement._fields))
-
-
-def _slack(rays: Rays, hits: Intersections, k: int) -> float:
-    d = rays.d[k]
-    length: float = float(np.linalg.norm(d))
-    cosine = abs(float(hits.n[k] @ d)) / length
-    scale = max(_largest(rays.o[k]), _largest(hits.p[k]))
-    return SHARE * 1e-3 * scale / length / max(cosine, 1e-6)
-
-
-def _largest(v: FloatArray) -> float:
-    return float(np.abs(v).max())
-
-
 PIXELS = 16_700
 """Most camera rays, evenly strided.  Random and secondary rays make them 50,000; 50,000 more are
 aimed at edges: see `mixed_rays` and `aimed_rays`."""
@@ -309,6 +251,10 @@ def geometry(
     return RungResult("geometry", status, reason, numbers)
 
 
+FEW = 1e-4
+"""Largest fraction of rays, not aimed at edges, that Mitsuba may get wrong by rounding.  More means
+that its scene is a different one."""
+
 TOGETHER = 2.0**-40
 """See `Referee`: a thousand times the rounding of tables, and a thousandth of the tolerance of our
 t, `SHARE`."""
@@ -391,11 +337,8 @@ def _traced(
     ratios[beyond | theirs.at_origin] = 0.0
     sizes = comparer.sizes
     reach = np.maximum(sizes.reach_of(ours.shape), sizes.reach_of(theirs.shape))
-    sag = np.zeros(len(sizes.reach) + 1)
-    for shape, distance in counterpart.sags().items():
-        sag[shape] = distance
     radius = sizes.frame.delta(rays.o, np.where(ours.shape[:, None] >= 0, ours.p, theirs.p), reach)
-    radius += np.maximum(sag[ours.shape], sag[theirs.shape])
+    radius += np.maximum(*(counterpart.off_by(hits.shape, "sag") for hits in (ours, theirs)))
     return TracedRays(rays, ours, theirs, ratios, radius), int(np.count_nonzero(beyond))
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.hits import MitsubaHits
 from comparisons.rungs.rays.rays import Rays
-from comparisons.rungs.rays.resolution import slide
+from comparisons.rungs.rays.slide import slide
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.query import Intersections
 from reference_rt.shapes import Cone, Cylinder, Disk, Sphere

@@ -11,9 +11,9 @@ from comparisons.geometry.sizes import ShapeSizes
 from comparisons.materials.coat import PASSED
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.hits import MitsubaHits, rows_of
-from comparisons.rungs.rays.coincidence import is_steep, moved, slopes, turned
 from comparisons.rungs.rays.rays import Rays
-from comparisons.rungs.rays.resolution import slide
+from comparisons.rungs.rays.slide import slide
+from comparisons.rungs.rays.slopes import is_steep, moved, slopes, turned
 from comparisons.translator.accuracy import accuracy, coat_error, is_tilted
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
@@ -67,6 +67,10 @@ class LightContext(NamedTuple):
             theirs=rows_of(self.theirs, rows),
         )
 
+    def off_by(self, error: str) -> FloatArray:
+        """(n,): an error of the meshes that stand in for the shapes that are hit; 0 for others."""
+        return self.counterpart.off_by(self.hits.shape, error)
+
 
 def kind_of(context: LightContext, light: int) -> int:
     choice = context.tables.lights.choice
@@ -118,7 +122,7 @@ def bounds(
     """
     value, theirs, their_cosine = values
     rays, hits = context.rays, context.hits
-    e = slide(context.sizes, rays.o, rays.d, hits, of_stand_ins(context, "sag"))
+    e = slide(context.sizes, rays.o, rays.d, hits, context.off_by("sag"))
     kind = kind_of(context, light)
     if kind in (ENVIRONMENT, DIRECTIONAL):
         w, distance = target, np.full(len(target), np.inf)
@@ -130,7 +134,7 @@ def bounds(
         # The cosine may be negative: refracted light arrives from behind.
         ours_full = np.nan_to_num(value.max(axis=1) / np.abs(cosine))
         theirs_full = np.nan_to_num(theirs.max(axis=1) / np.abs(their_cosine))
-    turn = 2.0 * e / _feature(context) + of_stand_ins(context, "turn")
+    turn = 2.0 * e / _feature(context) + context.off_by("turn")
     relative = turn + 4.0 * (e + _along(context)) / distance + 16.0 * UNIT_ROUNDOFF
     relative += _of_leaves(context, accuracy)
     full = np.maximum(ours_full, theirs_full)
@@ -263,12 +267,12 @@ def slopes_of(
     rays, hits = context.rays, context.hits
     bent = np.zeros(len(value))
     if is_steep(context.scene):
-        angle = of_stand_ins(context, "turn")
+        angle = context.off_by("turn")
         if context.tables.materials.oriented is not None:
-            angle += of_stand_ins(context, "twist")
+            angle += context.off_by("twist")
         radius = context.sizes.frame.delta(rays.o, hits.p, context.sizes.reach_of(hits.shape))
         angle += np.where(np.isfinite(context.theirs.height), radius / _feature(context), 0.0)
-        apart = of_stand_ins(context, "sag") + of_stand_ins(context, "shift") + _along(context)
+        apart = context.off_by("sag") + context.off_by("shift") + _along(context)
         others = [partial(value_of, other) for other in moved(rays, radius + apart)]
         if angle.any():
             for other in turned(rays, hits.p, TURNS * angle):
@@ -285,12 +289,3 @@ def _along(context: LightContext) -> FloatArray:
     rays, hits, sizes = context.rays, context.hits, context.sizes
     radius = sizes.frame.delta(rays.o, hits.p, sizes.reach_of(hits.shape))
     return radius * context.theirs.aspect
-
-
-def of_stand_ins(context: LightContext, field: str) -> FloatArray:
-    """(n,): a field of `StandIn`, of the meshes that stand in for the shapes that are hit; 0 for
-    other shapes."""
-    values = np.zeros(len(context.scene.shapes) + 1)
-    for shape, found in context.counterpart.stand_ins().items():
-        values[shape] = max(getattr(s, field) for s in found)
-    return np.asarray(values[context.hits.shape])

@@ -26,25 +26,6 @@ from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
 
-# ---- the error bound of a hit point, which the bounds of all rungs follow from -------------------
-
-
-def slide(
-    sizes: ShapeSizes,
-    o: FloatArray,
-    d: FloatArray,
-    hits: Intersections,
-    sag: FloatArray | float = 0.0,
-) -> FloatArray:
-    """(n,): how far a hit may slide along its ray and its surface: `Frame.delta`, the distance by
-    which float32 moves the surface, plus `sag`, the error of a mesh that stands in for it, over
-    the ray's cosine to n."""
-    cosine = np.abs(np.sum(d * hits.n, axis=1)) / np.linalg.norm(d, axis=1)
-    with np.errstate(divide="ignore"):
-        size = sizes.frame.delta(o, hits.p, sizes.reach_of(hits.shape)) + sag
-        return np.asarray(size / cosine)
-
-
 RAYS = 2000
 """A third of the rays whose hits are the starting points."""
 

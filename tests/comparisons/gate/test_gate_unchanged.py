@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from comparisons.commands.gate import accept
 from comparisons.gate.baselines import MOST_KEPT
-from comparisons.gate.digest import Copies, fingerprint
+from comparisons.gate.copies import Copies, fingerprint
 from comparisons.gate.gate import Question, gate_pictures
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import of_files
