@@ -16,6 +16,7 @@ from comparisons.gate.copies import fingerprint
 from comparisons.gate.digest import scene_digest, source_digest
 from comparisons.gate.pictures_in import Picture, variance_of
 from comparisons.results.files import read_arrays, write_arrays
+from comparisons.statistics.cells import divisor
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.render import Progress, render
 from reference_rt.rendering.scene import Scene
@@ -30,10 +31,6 @@ SHARE = 1 / 20
 """The reference's standard error as a fraction of the bias that must be detectable. Confidence
 intervals for a few tests at a level of 5e-4 are about five standard errors wide to either side: a
 quarter of that bias is given to the reference's noise, the rest is left to the candidate's."""
-
-DARK = 0.1
-"""Errors are relative to the channel's mean, or to this fraction of the picture's mean if that is
-larger: see `comparisons.statistics`."""
 
 MOST_SAMPLES = 1 << 30
 """Limit of a reference's camera samples, about ten minutes; if they do not suffice, the statistics
@@ -182,7 +179,7 @@ def relative_error(pictures: FloatArray) -> float:
     """The largest standard error of a channel's image mean, relative to that mean; of pictures
     (replicates >= 2, height, width, 3).  0 for black ones."""
     means = pictures.mean(axis=(1, 2))
-    scale = np.maximum(np.abs(means.mean(axis=0)), DARK * abs(means.mean()))
+    scale = divisor(means.mean(axis=0), means.mean())
     error = means.std(axis=0, ddof=1) / math.sqrt(len(means))
     return float(np.where(error > 0.0, error / np.where(scale > 0.0, scale, 1.0), 0.0).max())
 

@@ -58,8 +58,9 @@ add a scale: its test, and its row in `scales` (the levels must still sum to 1e-
 
 from comparisons.statistics.advice import noise_free_candidate, shortfall
 from comparisons.statistics.cells import CHANNELS, Margins
-from comparisons.statistics.decide import compare, read
+from comparisons.statistics.decide import compare
 from comparisons.statistics.places import standard_error, worst_regions
+from comparisons.statistics.reading import read
 from comparisons.statistics.sides import Known
 
 __all__ = [

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,12 @@ DARK = 0.1
 """The least value that a bias is divided by, as a fraction of the reference's mean over image and
 channels. A darker tile or channel hardly contributes to the picture, while light that leaks in by a
 ray epsilon is proportional to its surroundings."""
+
+
+def divisor(reference: FloatArray, mean: float | np.floating[Any]) -> FloatArray:
+    """What biases are divided by;  mean: the reference's, over image and channels."""
+    return np.maximum(np.abs(reference), DARK * abs(mean))
+
 
 ROUNDING = 2.0**-24
 """Half a unit in the last place of float32: the least relative standard error that is believed."""

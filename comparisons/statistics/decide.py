@@ -11,10 +11,10 @@ import numpy.typing as npt
 from comparisons.results.case import FloatArray, RungResult, Status
 from comparisons.statistics.advice import noise_free_candidate, wanted
 from comparisons.statistics.cells import POWER, TILE, Margins
-from comparisons.statistics.metrics import count_nonfinite
 from comparisons.statistics.ranks import Uniformity, uniformity
+from comparisons.statistics.reading import UnlikePicturesError, read
 from comparisons.statistics.scales import IMAGE, PIXELS, SCALES, TILES, Pair, Place, Scale
-from comparisons.statistics.sides import Known, known_side, picture_array, side_of
+from comparisons.statistics.sides import Known, known_side, side_of
 from comparisons.statistics.single import single_factor, single_tests
 from comparisons.statistics.unseen import Unseen, unseen, worse
 from comparisons.statistics.welch import BiasTest
@@ -111,24 +111,16 @@ def compare(
         raise ValueError(f"limit {limit}: expected more than the margin {margins.image}")
     if not 0.0 < level <= 1.0:
         raise ValueError(f"level {level}: expected a share above 0, and 1 at most")
-    a = picture_array(candidate, "candidate", 4)
-    b, variance = _reference(reference)
-    if a.shape[1:] != b.shape[1:]:
-        reason = f"candidate is {_size(a)}, reference {_size(b)} pixels (width x height)"
-        return RungResult("statistics", "invalid", reason)
-    if count_nonfinite(a) or count_nonfinite(b):
-        bad = f"{count_nonfinite(a)} of the candidate, {count_nonfinite(b)} of the reference"
-        return RungResult("statistics", "invalid", f"pixels not finite: {bad}")
-    if variance is not None and not (np.isfinite(variance).all() and variance.min() >= 0.0):
-        return RungResult(
-            "statistics", "invalid", "the reference's variance is negative or not finite"
-        )
-    if not a.any() and not b.any():
+    try:
+        a, b = read(candidate, reference)
+    except UnlikePicturesError as error:
+        return RungResult("statistics", "invalid", str(error))
+    pictures = b.mean[np.newaxis] if isinstance(b, Known) else b
+    if not a.any() and not pictures.any():
         return RungResult("statistics", "not-applicable", "every picture of either side is black")
-    known = None if variance is None else Known(b[0], variance)
-    found = findings(a, known or b, tile, margins, level)
-    alone = noise_free_candidate(known or b, margins, level) if fixed_reference else None
-    return _verdict(found, a, b, limit, alone)
+    found = findings(a, b, tile, margins, level)
+    alone = noise_free_candidate(b, margins, level) if fixed_reference else None
+    return _verdict(found, a, pictures, limit, alone)
 
 
 def findings(
@@ -155,37 +147,6 @@ def findings(
 
 def _unseen(pictures: FloatArray | Known, level: float) -> Unseen | None:
     return None if isinstance(pictures, Known) else unseen(pictures, level * IMAGE.level)
-
-
-def read(
-    candidate: npt.ArrayLike, reference: npt.ArrayLike | Known, *, finite: bool = True
-) -> tuple[FloatArray, FloatArray | Known]:
-    """The pictures as float64 arrays. Raises ValueError if they cannot be compared. With `finite`
-    false, pixels that are not finite become black; otherwise they raise ValueError."""
-    a = picture_array(candidate, "candidate", 4)
-    b, variance = _reference(reference)
-    if a.shape[1:] != b.shape[1:]:
-        raise ValueError(f"candidate is {_size(a)}, reference {_size(b)} pixels (width x height)")
-    if not finite:
-        a, b = _without_nan(a), _without_nan(b)
-    elif count_nonfinite(a) or count_nonfinite(b):
-        raise ValueError("pixels are not finite")
-    return a, (b if variance is None else Known(b[0], _without_nan(variance)))
-
-
-def _without_nan(values: FloatArray) -> FloatArray:
-    return values if np.isfinite(values).all() else np.nan_to_num(values, posinf=0.0, neginf=0.0)
-
-
-def _reference(reference: npt.ArrayLike | Known) -> tuple[FloatArray, FloatArray | None]:
-    """(S, h, w, 3) and None, or a known mean as (1, h, w, 3) and its variance."""
-    if not isinstance(reference, Known):
-        return picture_array(reference, "reference", 4), None
-    mean = picture_array(reference.mean, "reference's mean", 3)
-    variance = picture_array(reference.variance, "reference's variance", 3)
-    if mean.shape != variance.shape:
-        raise ValueError(f"reference: mean is {mean.shape}, its variance {variance.shape}")
-    return mean[None], variance
 
 
 def _verdict(
@@ -280,7 +241,3 @@ def _least(found: Findings, limit: float) -> float:
     if found.single:
         return single_factor(found.image, limit)
     return found.unseen.missing / limit if found.unseen is not None else 0.0
-
-
-def _size(images: FloatArray) -> str:
-    return f"{images.shape[2]} x {images.shape[1]}"

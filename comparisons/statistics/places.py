@@ -6,22 +6,19 @@ import numpy.typing as npt
 from comparisons.results.case import FloatArray, ImageRegion
 from comparisons.statistics.cells import (
     CHANNELS,
-    DARK,
     ROUNDING,
     TILE,
     Margins,
     cell_means,
+    divisor,
 )
-from comparisons.statistics.decide import findings, read
+from comparisons.statistics.decide import findings
 from comparisons.statistics.metrics import ratio
+from comparisons.statistics.reading import read
 from comparisons.statistics.scales import PIXELS, Pair, pixel_test
 from comparisons.statistics.sides import Known, neighbourhood, side_of
-from comparisons.statistics.welch import (
-    BiasTest,
-)
-from comparisons.statistics.wording import (
-    percent,
-)
+from comparisons.statistics.welch import BiasTest
+from comparisons.statistics.wording import percent
 
 NOTABLE = 0.5
 """Least strength (`BiasTest.strength`, 1 is a proof) of a tile that is listed. It is about three
@@ -81,7 +78,7 @@ def _of_single_pictures(
 ) -> tuple[ImageRegion, ...]:
     rms = np.sqrt(cell_means((a - b) ** 2, tile))
     bias = cell_means(a - b, tile)
-    scale = np.maximum(np.abs(cell_means(b, tile)), DARK * abs(float(b.mean())))
+    scale = divisor(cell_means(b, tile), float(b.mean()))
     places = []
     for row, column in _first(rms.max(axis=-1), most, np.finfo(np.float64).tiny):
         at = row, column, int(rms[row, column].argmax())

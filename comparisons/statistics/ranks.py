@@ -27,9 +27,9 @@ from scipy.linalg import hadamard
 
 from comparisons.results.case import FloatArray
 from comparisons.statistics.cells import (
-    DARK,
     Margins,
     cell_means,
+    divisor,
     ranks_of,
     tiles,
 )
@@ -96,7 +96,7 @@ def uniformity(a: Side, b: Side, margins: Margins, level: float = 1.0) -> Unifor
     contrasts = np.tensordot(hadamard(2 * half)[1:] / half, blocks, axes=1)
     difference = half - 1
     mean = cell_means(b.mean, BLOCK)
-    scale = np.maximum(np.abs(mean), DARK * abs(float(b.mean.mean())))
+    scale = divisor(mean, float(b.mean.mean()))
     size = np.abs(contrasts)
     size[size <= margins.constant * scale] = 0.0
     # If the sides are equal, only half of the other functions contain noise.

@@ -17,10 +17,10 @@ from scipy import special
 
 from comparisons.results.case import FloatArray
 from comparisons.statistics.cells import (
-    DARK,
     TILE,
     Cells,
     Margins,
+    divisor,
     lines,
     tiles,
     whole,
@@ -80,7 +80,7 @@ def pixel_test(pair: Pair, level: float) -> BiasTest:
     a, b, margins, _ = pair
     own, near = welch_errors(a.of_pixels(), b.of_pixels(), a, b, single_pixels=True)
     mean = float(b.mean.mean())
-    scale = np.maximum(np.abs(b.mean), DARK * abs(mean))
+    scale = divisor(b.mean, mean)
     spread = np.sqrt(np.maximum(a.variance, b.variance))
     hit = np.minimum(margins.pixel, 0.5 * np.minimum(ratio(spread, scale), 1.0))
     margin = margins.constant + np.maximum(hit, ratio(margins.stored * np.abs(b.mean), scale))
@@ -128,7 +128,7 @@ def line_test(pair: Pair, level: float) -> BiasTest | None:
         return None
     cells = lines(b.mean)
     steps = _steps(b.mean) / cells.pixels
-    scale = np.maximum(np.abs(cells.means(b.mean)), DARK * abs(float(b.mean.mean())))
+    scale = divisor(cells.means(b.mean), float(b.mean.mean()))
     edges = margins.pixel * ratio(steps, scale)
     return _of_means(pair, cells, np.minimum(margins.image + edges, margins.tile), level)
 

@@ -24,11 +24,11 @@ import numpy as np
 
 from comparisons.results.case import FloatArray
 from comparisons.statistics.cells import (
-    DARK,
     Margins,
     cell_means,
     cell_pixels,
     cell_sums,
+    divisor,
     tiles,
     whole,
 )
@@ -220,7 +220,7 @@ def _rare(
 
 def _pixels(difference: FloatArray, reference: FloatArray, margins: Margins) -> BiasTest:
     """The test of pixels without noise; all others get an infinite interval."""
-    scale = np.maximum(np.abs(reference), DARK * abs(float(reference.mean())))
+    scale = divisor(reference, float(reference.mean()))
     around = neighbourhood(difference)
     variance = neighbourhood(difference**2) - around**2
     whole = min(difference.shape[:2]) >= NEIGHBOURS

@@ -10,9 +10,9 @@ from scipy import special
 
 from comparisons.results.case import FloatArray
 from comparisons.statistics.cells import (
-    DARK,
     POWER,
     ROUNDING,
+    divisor,
 )
 from comparisons.statistics.metrics import ratio
 from comparisons.statistics.rare import Events
@@ -210,7 +210,7 @@ def bias_test(
     events: of rare light. They make a third standard error: the largest of the others, with the
     scatter of as much missing light as there is difference.
     """
-    scale = np.maximum(np.abs(reference), DARK * abs(image_mean))
+    scale = divisor(reference, image_mean)
     level_of_one = -math.expm1(math.log1p(-level) / difference.size)
     critical_of, reach_of = quantiles(level_of_one)
     half_width, reach = np.zeros_like(scale), np.zeros_like(scale)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import ndimage, optimize
 
 from comparisons.results.case import FloatArray, Images
-from comparisons.statistics.cells import DARK
+from comparisons.statistics.cells import divisor
 
 # ---- a hypothesis about what is wrong with a picture ---------------------------------------------
 
@@ -92,7 +92,7 @@ class Misfit:
         mean, and of the squares at any scale of blocks at which the difference is clear."""
         before, left = self.candidate - self.reference, self.candidate - picture
         mean = np.abs(self.reference.mean(axis=(0, 1)))
-        permitted = BIAS * np.maximum(mean, DARK * mean.mean())
+        permitted = BIAS * divisor(mean, mean.mean())
         noise = CLEARLY * np.sqrt(self._scales[0].error2.sum(axis=(0, 1))) / (before.size // 3)
         bias, rest = (np.abs(x.mean(axis=(0, 1))) for x in (before, left))
         if np.any(rest > np.maximum(REST * bias, permitted) + noise):
