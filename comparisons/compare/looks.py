@@ -118,17 +118,17 @@ def until_decided(
         each = (clock() - begun) / (count - before)
         look = len(counts)
         rung = judge(level_of(look))
-        found = f"look {look}, {count} replicates: {rung.status}"
+        told = f"look {look}, {count} replicates: {rung.status}"
         if rung.status != "inconclusive":
-            say(found)
+            say(told)
             return Looks(tuple(counts), level_of(look), rung)
         left = seconds - (clock() - start)
         fits = 2 * count if each <= 0.0 else min(2 * count, count + int(max(left, 0.0) / each))
         fits -= fits % step(fits)
         if fits < WORTH * count:
-            say(f"{found}; the time limit of {seconds:g} s is reached")
+            say(f"{told}; the time limit of {seconds:g} s is reached")
             return Looks(tuple(counts), level_of(look), rung, out_of_time=True)
-        say(f"{found}; goes on to {fits}, about {each * (fits - count):.0f} s")
+        say(f"{told}; goes on to {fits}, about {each * (fits - count):.0f} s")
         count = fits
 
 

@@ -46,15 +46,15 @@ class Copies:
 
     def others(self, candidates: Sequence[Picture]) -> list[Picture]:
         """The candidates that are no copies; the copies are counted."""
-        found = []
+        others = []
         for candidate in candidates:
             name = fingerprint(candidate.radiance) if self.total else ""
             if self.left[name] > 0:
                 self.left[name] -= 1
                 self.count += 1
             else:
-                found.append(candidate)
-        return found
+                others.append(candidate)
+        return others
 
     def note(self, others: int) -> str:
         """About copies among candidates of which so many are none; "" without copies."""

@@ -157,16 +157,16 @@ class Judge:
         """The verdict by `gate_pictures` or `judged`, whose candidates and reference are given
         already; a difference from our own pictures may be of terms that the renderer lacks."""
         request, candidates = self.request, gate.args[0]
-        found = self._case(gate)
+        case = self._case(gate)
         if request.tone_curve == ESTIMATE and self.curve is not None:
             where = str(self.curve).replace(":", " at exposure ")
-            reason = f"{UP_TO}the tone curve {where}, estimated: {found.reason}"
-            found = replace(found, reason=reason)
-        if found.verdict != "differ":
-            return found
-        toned = None if request.tone_curve == ESTIMATE else self._toned(candidates, found)
+            reason = f"{UP_TO}the tone curve {where}, estimated: {case.reason}"
+            case = replace(case, reason=reason)
+        if case.verdict != "differ":
+            return case
+        toned = None if request.tone_curve == ESTIMATE else self._toned(candidates, case)
         if toned is not None or request.references or request.baseline:
-            return found if toned is None else replace(found, cause=toned)
+            return case if toned is None else replace(case, cause=toned)
         assert self.scene is not None
 
         def judged(scene: Scene) -> Case:
@@ -174,8 +174,8 @@ class Judge:
             plain = Judge(replace(request, witness=None), ours, scene, self.curve)
             return plain._case(partial(gate_pictures, candidates, plain.reference), diagnosed=False)
 
-        cause = missing_terms(self.scene, found, request.rim, request.threads, judged, self.curve)
-        return found if cause is None else replace(found, cause=cause)
+        cause = missing_terms(self.scene, case, request.rim, request.threads, judged, self.curve)
+        return case if cause is None else replace(case, cause=cause)
 
     def _toned(self, candidates: Sequence[Picture], found: Case) -> Cause | None:
         """That the candidate of a case that differs went through another tone curve, or the same at
@@ -257,20 +257,20 @@ def prepared(
     if scene is not None:
         expected = f"{scene.film.width} x {scene.film.height}"
         check_sizes(candidates, expected, f"the size of the scene '{scene.name}'")
-    found, scene = _judge(request, scene, [picture.name for picture in candidates], say)
-    check_rim(found.pictures.shape, request.rim)
+    judge, scene = _judge(request, scene, [picture.name for picture in candidates], say)
+    check_rim(judge.pictures.shape, request.rim)
     if not request.tone_curve:
-        return Judge(request, found, scene)
-    if not found.noise_free:
+        return Judge(request, judge, scene)
+    if not judge.noise_free:
         raise UsageError("--tone-curve: the pictures have noise; expected those of a scene without")
     if request.tone_curve != ESTIMATE:
-        return Judge(request, found, scene, curve_of(request.tone_curve))
-    check_sizes(candidates, size_of(found.pictures[0]), "as the reference")
-    curve = estimated(candidates[0].radiance, found.pictures[0])
+        return Judge(request, judge, scene, curve_of(request.tone_curve))
+    check_sizes(candidates, size_of(judge.pictures[0]), "as the reference")
+    curve = estimated(candidates[0].radiance, judge.pictures[0])
     if curve is None or str(curve) == "linear":
         curve = None
-        found = replace(found, notes=(*found.notes, "no tone curve was recognised"))
-    return Judge(request, found, scene, curve)
+        judge = replace(judge, notes=(*judge.notes, "no tone curve was recognised"))
+    return Judge(request, judge, scene, curve)
 
 
 def _judge(
@@ -279,8 +279,8 @@ def _judge(
     """The reference, and the scene if it is known."""
     noise_free = request.noise_free or (scene is not None and reference.is_noise_free(scene))
     if request.references:
-        found = reference.of_files(request.references, request.variance, noise_free)
-        return found, scene
+        judge = reference.of_files(request.references, request.variance, noise_free)
+        return judge, scene
     if request.baseline:
         return _baseline(request, scene, files)
     assert scene is not None
@@ -290,11 +290,11 @@ def _judge(
 def _baseline(
     request: Request, scene: Scene | None, files: Sequence[str]
 ) -> tuple[Reference, Scene | None]:
-    found = baselines.load(request.baselines, request.baseline, files)
-    scene = scene or baselines.scene_of(found.record, request.baselines)
+    baseline = baselines.load(request.baselines, request.baseline, files)
+    scene = scene or baselines.scene_of(baseline.record, request.baselines)
     if scene is not None:
-        baselines.check_fresh(found, scene_digest(scene), f"the scene '{scene.name}'")
-    judge = found.reference()
+        baselines.check_fresh(baseline, scene_digest(scene), f"the scene '{scene.name}'")
+    judge = baseline.reference()
     if request.noise_free and len(judge.pictures) == 1:
         judge = replace(judge, noise_free=True)
     return judge, scene

@@ -106,7 +106,7 @@ def _in_rounds(
             return RungResult("statistics", "inconclusive", reason)
         return look(others, reference, request.limit, level, request.rim)
 
-    found = looks.until_decided(
+    looked = looks.until_decided(
         grow,
         judged_at,
         seconds=rounds.seconds,
@@ -118,7 +118,7 @@ def _in_rounds(
     if not others:
         return unchanged(request.name, copies, reference)
     notes = [copies.note(len(others))] if copies.count else []
-    return judge.case(partial(judged, others, reference, notes=notes, looks=found))
+    return judge.case(partial(judged, others, reference, notes=notes, looks=looked))
 
 
 class _NotFiniteError(Exception):
@@ -132,7 +132,7 @@ class _NotFiniteError(Exception):
 def _rendered(driver: Driver, seeds: Sequence[int], reference: Reference) -> list[Picture]:
     """Pictures of the reference's size, each checked before the next is made.  Raises ImageError
     for another size, _NotFiniteError."""
-    found: list[Picture] = []
+    pictures: list[Picture] = []
     for start in [seeds] if driver.together else [[seed] for seed in seeds]:
         new = driver.pictures(start) if start else []
         if new:
@@ -140,8 +140,8 @@ def _rendered(driver: Driver, seeds: Sequence[int], reference: Reference) -> lis
         for picture in new:
             if not np.isfinite(picture.radiance).all():
                 raise _NotFiniteError(picture)
-        found += new
-    return found
+        pictures += new
+    return pictures
 
 
 def _is_copy(picture: Picture, reference: Reference) -> bool:

@@ -103,7 +103,7 @@ def _at_spots(sizes: ShapeSizes, spots: FloatArray, n: int, rng: np.random.Gener
 
 def _spots(sizes: ShapeSizes, rng: np.random.Generator) -> FloatArray:
     """Corners and middles of edges (n, 3) of all shapes that have any."""
-    found = [np.zeros((0, 3))]
+    spots_of_copies = [np.zeros((0, 3))]
     copies = sizes.copies
     if len(copies) > MOST_SPOTS:
         copies = [copies[k] for k in rng.choice(len(copies), MOST_SPOTS, replace=False)]
@@ -116,8 +116,8 @@ def _spots(sizes: ShapeSizes, rng: np.random.Generator) -> FloatArray:
                 if len(spots) > MOST_SPOTS:
                     spots = spots[rng.choice(len(spots), MOST_SPOTS, replace=False)]
                 local[id(leaf)] = spots
-            found.append(affine.apply_points(copy.outer, local[id(leaf)][:share]))
-    return np.concatenate(found)
+            spots_of_copies.append(affine.apply_points(copy.outer, local[id(leaf)][:share]))
+    return np.concatenate(spots_of_copies)
 
 
 def _spots_of(leaf: LeafSizes) -> Iterator[FloatArray]:
@@ -353,8 +353,8 @@ def _explained(
     hit the back face from behind, as no single ray can.
     """
     rays, radius = traced.rays, traced.radius
-    found = arbiter.explained(wrong, radius[wrong], _same_hit(tables, comparer, traced))
-    rest = np.flatnonzero(~found & (traced.theirs.shape[wrong] >= 0))
+    explained = arbiter.explained(wrong, radius[wrong], _same_hit(tables, comparer, traced))
+    rest = np.flatnonzero(~explained & (traced.theirs.shape[wrong] >= 0))
     numbers = wrong[rest]
     theirs = rows_of(traced.theirs, numbers)
     near = rays.rows(numbers)
@@ -376,8 +376,8 @@ def _explained(
         open_ = np.flatnonzero(comes & ~meets)
         same = _same_hit(tables, comparer, beside)
         meets[open_] = arbiter.explained(open_, radius[numbers[open_]], same)
-    found[rest] = meets
-    return found
+    explained[rest] = meets
+    return explained
 
 
 STEEPEST = 64.0

@@ -72,11 +72,11 @@ def _of_one(
 def _expected(edges: FloatArray, integral: FloatArray) -> list[float]:
     """The value of a pixel of each phase."""
     starts = PERIOD * np.arange(-MARGIN, MARGIN + 1)
-    found = []
+    values = []
     for phase in range(PERIOD):
         begin, end = (np.interp(starts + at - phase - 0.5, edges, integral) for at in STRIPE)
-        found.append(float(np.sum(end - begin)))
-    return found
+        values.append(float(np.sum(end - begin)))
+    return values
 
 
 def _scene(film_filter: Filter, turned: bool) -> Scene:

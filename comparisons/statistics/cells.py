@@ -25,7 +25,7 @@ ray epsilon is proportional to its surroundings."""
 
 def divisor(reference: FloatArray, mean: float | np.floating[Any]) -> FloatArray:
     """What biases are divided by;  mean: the reference's, over image and channels."""
-    return np.maximum(np.abs(reference), DARK * abs(mean))
+    return np.maximum(np.abs(reference), DARK * abs(float(mean)))
 
 
 ROUNDING = 2.0**-24

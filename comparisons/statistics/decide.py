@@ -118,9 +118,9 @@ def compare(
     pictures = b.mean[np.newaxis] if isinstance(b, Known) else b
     if not a.any() and not pictures.any():
         return RungResult("statistics", "not-applicable", "every picture of either side is black")
-    found = findings(a, b, tile, margins, level)
+    tested = findings(a, b, tile, margins, level)
     alone = noise_free_candidate(b, margins, level) if fixed_reference else None
-    return _verdict(found, a, pictures, limit, alone)
+    return _verdict(tested, a, pictures, limit, alone)
 
 
 def findings(

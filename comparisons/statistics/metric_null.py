@@ -109,7 +109,7 @@ def noise_alone(
         expected[k] = np.mean(maps)
         allowance = max(0.0, float(more[k].mean() - maps[0].mean()))
         highest[k] = expected[k] + allowance + _scatter(np.stack(maps))
-    found = np.array([m.mean() for m in errors(images.candidate - images.reference)])
+    measured = np.array([m.mean() for m in errors(images.candidate - images.reference)])
     variance = _variance(*replicates)
     darker = np.minimum(images.candidate, images.reference)
     relative = relative_squares(Images(darker + np.sqrt(variance), darker), middle)
@@ -117,7 +117,7 @@ def noise_alone(
     for k, noise in ((-2, variance.mean(axis=-1)), (-1, relative)):
         if noise.sum() ** 2 < FEWEST_PIXELS * (noise**2).sum():
             highest[k] = math.inf
-    return found, expected, highest
+    return measured, expected, highest
 
 
 def _share(replicates: tuple[FloatArray, FloatArray]) -> FloatArray:

@@ -65,7 +65,7 @@ def successive(pictures: FloatArray) -> Successive | None:
     z = deviations(pictures[:MOST])
     if not all(picture.any() for picture in z):
         return None
-    found = {(0, 0): _correlations(z, z)}
+    correlations = {(0, 0): _correlations(z, z)}
     middle = _middle(z.sum(axis=-1))
     spectra = np.fft.rfft2(middle)
     height, width = middle.shape[1:]
@@ -74,8 +74,8 @@ def successive(pictures: FloatArray) -> Successive | None:
         2j * math.pi * (y * np.fft.fftfreq(height)[:, None] + x * np.fft.rfftfreq(width))
     )
     moved = np.fft.irfft2(spectra * phase, (height, width))
-    found[x, y] = _correlations(middle, moved)
-    excess = {by: _about_mean(pairs) for by, pairs in found.items()}
+    correlations[x, y] = _correlations(middle, moved)
+    excess = {by: _about_mean(pairs) for by, pairs in correlations.items()}
     orders = _orders(len(z))
     in_order = {by: _of_order(x, np.arange(len(z))[None])[:, 0] for by, x in excess.items()}
     extreme = np.max([np.abs(_of_order(pairs, orders)).max(0) for pairs in excess.values()], axis=0)

@@ -55,8 +55,8 @@ def worst_regions(
     a, b = read(candidate, reference)
     if not isinstance(b, Known) and len(a) == len(b) == 1:
         return _of_single_pictures(a[0], b[0], tile, most)
-    found = findings(a, b, tile, Margins())
-    side, tiles, pixels = found.tile, found.tests["tiles"], found.tests["pixels"]
+    tested = findings(a, b, tile, Margins())
+    side, tiles, pixels = tested.tile, tested.tests["tiles"], tested.tests["pixels"]
     worst_pixels = _cell_maxima(pixels.strength, side)
     strength = np.maximum(tiles.strength, worst_pixels)
     places = []

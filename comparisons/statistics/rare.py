@@ -68,15 +68,15 @@ class Events:
 def _in_cells(side: Side, seen: FloatArray, sums: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """The energy of an event of `side` in each cell of one picture;  seen: the other's radiance."""
     mean, noisy = float(seen.mean()), side.variance > (HALF * side.mean) ** 2
-    found = []
+    sizes = []
     for least, of_places in ((DARK, 0.0), (1.0, 0.0), (1.0, 2.0)):
         scale = np.maximum(seen, least * mean) if mean else np.ones_like(seen)
         lit = sums(scale * noisy)
         whole = sums(scale**2) / sums(scale)
         own = sums(scale**2 * noisy) / np.where(lit > 0.0, lit, 1.0)
         size = side.event(scale, (1.0 / scale) ** of_places)
-        found.append(size * np.where(lit > 0.0, own, whole))
-    return np.asarray(np.max(found, axis=0))
+        sizes.append(size * np.where(lit > 0.0, own, whole))
+    return np.asarray(np.max(sizes, axis=0))
 
 
 def image_missed(a: Side, b: Side) -> FloatArray:

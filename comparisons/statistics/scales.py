@@ -139,13 +139,13 @@ def _steps(mean: FloatArray) -> FloatArray:
     An edge that a renderer moves by a fraction of a pixel (`Margins.pixel`) changes its pixels by
     that fraction of the step there; where a line resembles its neighbours, none is to be moved.
     """
-    found = []
+    steps = []
     for axis in (0, 1):
         step = np.abs(np.diff(mean, axis=axis))
         none = np.zeros_like(step.take([0], axis=axis))
         before, after = (np.concatenate(x, axis=axis) for x in ((none, step), (step, none)))
-        found.append(np.maximum(before, after).sum(axis=1 - axis))
-    return np.concatenate(found)
+        steps.append(np.maximum(before, after).sum(axis=1 - axis))
+    return np.concatenate(steps)
 
 
 def mode_test(pair: Pair, level: float) -> BiasTest | None:

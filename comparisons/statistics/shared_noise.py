@@ -111,9 +111,9 @@ def _correlations(products: FloatArray) -> FloatArray:
     """
     count = len(products)
     length = np.sqrt(np.maximum(np.diag(products), 1e-300))
-    found = products / np.outer(length, length) * (count - 1) / count + 1.0 / count
-    np.fill_diagonal(found, -np.inf)
-    return np.asarray(found)
+    correlations = products / np.outer(length, length) * (count - 1) / count + 1.0 / count
+    np.fill_diagonal(correlations, -np.inf)
+    return np.asarray(correlations)
 
 
 def _beyond_others(products: FloatArray, i: int, j: int, pixels: int) -> float:
@@ -126,11 +126,11 @@ def _beyond_others(products: FloatArray, i: int, j: int, pixels: int) -> float:
     of_all = about @ products @ about.T
     # Both contain the noise of that mean, which is a correlation of 1 / (R - 1).
     length = math.sqrt(max(float(of_all[i, i] * of_all[j, j]), 1e-300))
-    found = (float(of_all[i, j]) / length - 1.0 / (count - 1)) * (count - 1) / (count - 2)
+    correlation = (float(of_all[i, j]) / length - 1.0 / (count - 1)) * (count - 1) / (count - 2)
     pairs = _correlations(of_all[np.ix_(others, others)])[np.triu_indices(count - 2, 1)]
     scatter = max(math.sqrt(float((pairs**2).mean())), 1.0 / math.sqrt(pixels))
     times = OUTLYING_ALONE[0] + OUTLYING_ALONE[1] / (count - 3) ** 2
-    return found - max(CORRELATED, times * scatter, -2.0 * float(pairs.min()))
+    return correlation - max(CORRELATED, times * scatter, -2.0 * float(pairs.min()))
 
 
 def _highest_by_chance(correlations: FloatArray, pixels: int) -> float:

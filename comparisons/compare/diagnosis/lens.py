@@ -75,10 +75,10 @@ class _Lens:
             normal = np.einsum("ahwc,bhwc,hwc->cab", columns, columns, weights)
             wanted = np.einsum("ahwc,hwc,hwc->ca", columns, rest, weights)
             if apart:
-                found = [_solved(n, v) for n, v in zip(normal, wanted, strict=True)]
+                steps = [_solved(n, v) for n, v in zip(normal, wanted, strict=True)]
             else:
-                found = 3 * [_solved(normal.sum(axis=0), wanted.sum(axis=0))]
-            amounts = np.clip(amounts + np.stack(found, axis=1), -MOST, MOST)
+                steps = 3 * [_solved(normal.sum(axis=0), wanted.sum(axis=0))]
+            amounts = np.clip(amounts + np.stack(steps, axis=1), -MOST, MOST)
         return amounts, self._seen(self._misfit.reference, self._factors(terms, amounts), 3)
 
     def _factors(self, terms: list[FloatArray], amounts: FloatArray) -> FloatArray:

@@ -157,8 +157,8 @@ class Misfit:
         difference = self.candidate - self.reference
         for scale in self._scales:
             if scale.clearness(difference) > CLEARLY:
-                found = scale.binned(difference) ** 2 - scale.error2
-                yield scale.block, np.asarray((scale.weights * found).sum(axis=-1))
+                squares = scale.binned(difference) ** 2 - scale.error2
+                yield scale.block, np.asarray((scale.weights * squares).sum(axis=-1))
 
 
 class _Scale:

@@ -23,10 +23,10 @@ def one_place(misfit: Misfit) -> Cause | None:
     """The row, column, rectangle or few pixels in which the difference lies, if it does."""
     for block, excess in misfit.excesses():
         total = float(excess.sum())
-        found = [_rectangle(excess, total, block)]
+        places = [_rectangle(excess, total, block)]
         if block == 1:
-            found = [_line(excess, total), _pixels(excess, total), *found]
-        for place in found:
+            places = [_line(excess, total), _pixels(excess, total), *places]
+        for place in places:
             if place is not None and _holds(misfit, place[1], block):
                 return place[0]
     return None

@@ -69,7 +69,7 @@ def layers(
     small = _smaller(scene)
     numbers: dict[str, Any] = {"layers": list(film_layers)}
     problems: list[str] = []
-    found: Centres | None = None
+    compared: Centres | None = None
     own_film = small.film.model_copy(update={"filter": film_filters[0], "layers": film_layers})
     if "variance" in film_layers:
         problems += _of_variance(small.changed(film=own_film), tables, numbers)
@@ -78,15 +78,15 @@ def layers(
         pictures = _pictures(_first_hits(small.changed(film=own_film)), tables, PICTURES, SAMPLES)
         first = {name: x[0] for name, x in pictures.items() if name in ("depth", "id")}
         if first:
-            found = centres(small, tables, counterpart, sizes, first)
-            numbers |= _numbers(found)
+            compared = centres(small, tables, counterpart, sizes, first)
+            numbers |= _numbers(compared)
         many = {name: x for name, x in pictures.items() if name in MEANS}
         if "position" in many and counterpart.has_planes():
             del many["position"]
             numbers["position"] = "not compared: Mitsuba's infinite planes end"
         if many:
             problems += _of_means(small, counterpart, sizes, film_filters[1], many, seed, numbers)
-    return _result(numbers, found, problems)
+    return _result(numbers, compared, problems)
 
 
 def applies(scene: Scene, film: Film) -> bool:
@@ -117,17 +117,17 @@ def _of_means(
     problems = []
     for name, all_of in pictures.items():
         ours = all_of[:half].mean(axis=0), all_of[half:PICTURES].mean(axis=0)
-        found = compare_means(ours, (theirs[0][name], theirs[1][name]), slack.get(name, 0.0))
+        means = compare_means(ours, (theirs[0][name], theirs[1][name]), slack.get(name, 0.0))
         numbers |= {
-            f"{name}_score": found.score,
-            f"{name}_bias": found.bias,
-            f"{name}_seen": found.seen,
+            f"{name}_score": means.score,
+            f"{name}_bias": means.bias,
+            f"{name}_seen": means.seen,
         }
-        if not found.score <= LIMIT:
+        if not means.score <= LIMIT:
             problems.append(
-                f"{name}: the means of pixels are off by {100.0 * found.bias:.2g} % of the largest "
-                f"value, root mean square; two independent halves differ alike ({found.score:.1f} "
-                f"standard errors); the worst pixel is {found.worst}"
+                f"{name}: the means of pixels are off by {100.0 * means.bias:.2g} % of the largest "
+                f"value, root mean square; two independent halves differ alike ({means.score:.1f} "
+                f"standard errors); the worst pixel is {means.worst}"
             )
     return problems
 
@@ -186,34 +186,34 @@ def _smaller(scene: Scene) -> Scene:
     return scene
 
 
-def _numbers(found: Centres) -> dict[str, Any]:
+def _numbers(compared: Centres) -> dict[str, Any]:
     return {
-        "pixels": found.pixels,
-        "unresolved": found.unresolved,
-        "wrong_pixels": dict(found.wrong),
-        "max_error_over_bound": found.ratio,
+        "pixels": compared.pixels,
+        "unresolved": compared.unresolved,
+        "wrong_pixels": dict(compared.wrong),
+        "max_error_over_bound": compared.ratio,
     }
 
 
-def _result(numbers: dict[str, Any], found: Centres | None, problems: list[str]) -> RungResult:
-    if found is not None:
-        wrong = {name: count for name, count in found.wrong.items() if count}
+def _result(numbers: dict[str, Any], compared: Centres | None, problems: list[str]) -> RungResult:
+    if compared is not None:
+        wrong = {name: count for name, count in compared.wrong.items() if count}
         if wrong:
             counts = ", ".join(f"{name} of {count}" for name, count in wrong.items())
-            text = f"of {found.pixels} pixels differ: {counts}; the first: {found.first}"
+            text = f"of {compared.pixels} pixels differ: {counts}; the first: {compared.first}"
             problems = [text, *problems]
     if problems:
         return RungResult("layers", "differ", "; ".join(problems), numbers)
     said: list[str] = []
-    if found is not None:
+    if compared is not None:
         edges = (
-            f"{found.unresolved} of {found.pixels} pixels lie at edges that float32 does not "
+            f"{compared.unresolved} of {compared.pixels} pixels lie at edges that float32 does not "
             "resolve"
         )
-        if arbiter.too_many(found.unresolved, found.pixels):
+        if arbiter.too_many(compared.unresolved, compared.pixels):
             return RungResult("layers", "reference-limited", edges, numbers)
-        names = ", ".join(found.wrong)
-        said.append(f"{names} agree within {found.ratio:.2g} of float32's bound; {edges}")
+        names = ", ".join(compared.wrong)
+        said.append(f"{names} agree within {compared.ratio:.2g} of float32's bound; {edges}")
     said += [
         f"{name} agrees (a bias of {100.0 * numbers[f'{name}_seen']:.2g} % of its largest value, "
         "root mean square, would be seen)"

@@ -89,21 +89,21 @@ class Seen:
     def colours(self, hits: MitsubaHits, of_vertices: bool = False) -> FloatArray:
         """The materials' own colours (n, 3), 0 for a miss;  of_vertices: where a mesh has vertex
         colours, these instead."""
-        found = np.zeros((len(hits.t), 3))
+        colours = np.zeros((len(hits.t), 3))
         for looked in self._by_leaf(hits):
             own = self._own(looked)
             if of_vertices:
                 mixed = _vertex_colours(looked)
                 own = np.where(mixed[:, :1] >= 0.0, mixed, own)
-            found[looked.rows] = own
-        return found
+            colours[looked.rows] = own
+        return colours
 
     def _by_leaf(self, hits: MitsubaHits) -> list[_Looked]:
         leaf, local = self._sizes.leaf_of(hits), self._sizes.local_points(hits)
-        found = []
+        parts = []
         for number in np.unique(leaf[leaf >= 0]).tolist():
             rows = np.flatnonzero(leaf == number)
-            found.append(
+            parts.append(
                 _Looked(
                     self._sizes.leaves[number],
                     rows,
@@ -112,7 +112,7 @@ class Seen:
                     local[rows],
                 )
             )
-        return found
+        return parts
 
     def _own(self, looked: _Looked) -> FloatArray:
         value = self._shown(looked.leaf.material)

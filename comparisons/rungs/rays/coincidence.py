@@ -34,26 +34,28 @@ def coincident(
     crosses Mitsuba's face too, at the same t.  Two shapes: with our shape moved far away, our
     tracer has Mitsuba's hit at the same t.
     """
-    found = np.zeros(len(numbers), bool)
+    together = np.zeros(len(numbers), bool)
     if len(numbers) == 0:
-        return found
+        return together
     rays, ours, theirs = traced.rays, traced.ours, traced.theirs
     if counterpart.solids:
         for tolerance in (None, 0.0, 1.0):
-            rest = np.flatnonzero(~found)
+            rest = np.flatnonzero(~together)
             k = numbers[rest]
             some, mine = rays.rows(k), rows_of(ours, k)
             again = rows_of(theirs, k)
             if tolerance is not None:
                 again = trace(counterpart, some.o, some.d, tolerance)
             _as_one_part(counterpart, some, mine, again)
-            found[rest] = (comparer.ratios(some, mine, again) <= 1.0).all(axis=1)
-    rest = np.flatnonzero(~found)
+            together[rest] = (comparer.ratios(some, mine, again) <= 1.0).all(axis=1)
+    rest = np.flatnonzero(~together)
     k = numbers[rest]
-    found[rest] = _on_two_faces(scene, comparer, rays.rows(k), rows_of(ours, k), rows_of(theirs, k))
-    left = ours.shape[numbers][~found]
+    together[rest] = _on_two_faces(
+        scene, comparer, rays.rows(k), rows_of(ours, k), rows_of(theirs, k)
+    )
+    left = ours.shape[numbers][~together]
     for shape in np.unique(left[left >= 0])[:COINCIDENCES].tolist():
-        rest = np.flatnonzero(~found & (ours.shape[numbers] == shape))
+        rest = np.flatnonzero(~together & (ours.shape[numbers] == shape))
         k = numbers[rest]
         some = rays.rows(k)
         others = build_tables(_without(scene, shape, float(comparer.sizes.reach.max())))
@@ -61,8 +63,8 @@ def coincident(
         agrees = (comparer.ratios(some, behind, rows_of(theirs, k)) <= 1.0).all(axis=1)
         e = slide(comparer.sizes, some.o, some.d, behind)
         with np.errstate(invalid="ignore"):
-            found[rest] = agrees & (np.abs(behind.t - ours.t[k]) <= e)
-    return found
+            together[rest] = agrees & (np.abs(behind.t - ours.t[k]) <= e)
+    return together
 
 
 def _on_two_faces(
@@ -71,11 +73,11 @@ def _on_two_faces(
     """Which rays cross the face that Mitsuba reports at the same t as another face of the same
     shape, which we report: as where a mesh has a triangle twice, or two shapes of an instanced
     group lie in one plane."""
-    found = np.zeros(len(ours.t), bool)
+    crossing = np.zeros(len(ours.t), bool)
     other_face = _is_other(ours, theirs)
     rows = np.flatnonzero(other_face & (ours.shape >= 0) & (ours.shape == theirs.shape))
     if len(rows) == 0:
-        return found
+        return crossing
     some, mine, other = rays.rows(rows), rows_of(ours, rows), rows_of(theirs, rows)
     e = slide(comparer.sizes, some.o, some.d, mine, other.sag) / np.linalg.norm(some.d, axis=1)
     crossed = query.crossings(scene.tables, some.o, some.d)
@@ -92,8 +94,8 @@ def _on_two_faces(
             rows_of(all_of_them, np.array([k])),
             rows_of(other, np.array([one])),
         )
-        found[rows[one]] |= bool((ratios <= 1.0).all())
-    return found
+        crossing[rows[one]] |= bool((ratios <= 1.0).all())
+    return crossing
 
 
 def _as_hits(crossed: query.Crossings) -> Intersections:
@@ -134,9 +136,9 @@ def on_two_surfaces(
     another one: they may have different materials, and the rung of geometry judges them."""
     here = _at_one_t(sizes, rays, ours, theirs)
     rows = np.flatnonzero(_is_other(ours, theirs) & here)
-    found = np.zeros(len(here), bool)
-    found[rows] = _are_two(sizes, tables, rays.rows(rows), ours.t[rows])
-    return found
+    two = np.zeros(len(here), bool)
+    two[rows] = _are_two(sizes, tables, rays.rows(rows), ours.t[rows])
+    return two
 
 
 def is_doubled(

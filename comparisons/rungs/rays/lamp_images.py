@@ -63,13 +63,13 @@ def is_beside(
 ) -> BoolArray:
     """(n,): whether the light has Mitsuba's value, `wanted` (n, 3), next to u, up to `allowed`
     (n,): at the edge of a texel."""
-    found = np.zeros(len(wanted), bool)
+    beside = np.zeros(len(wanted), bool)
     if not scale.any():
-        return found
+        return beside
     for at in _beside(u, float(scale.max())):
         error = np.abs(_value_at(context, light, at) - wanted).max(axis=1)
-        found |= (error <= allowed) & (scale > 0.0)
-    return found
+        beside |= (error <= allowed) & (scale > 0.0)
+    return beside
 
 
 def changes_of_lamps(context: LightContext, setup: WhittedSetup) -> tuple[FloatArray, FloatArray]:
@@ -114,8 +114,8 @@ def _beside(u: tuple[float, float], scale: float, count: int = 4) -> list[tuple[
 
 def _value_at(context: LightContext, light: int, u: tuple[float, float]) -> FloatArray:
     rays = context.rays
-    found = query.direct_light(context.tables, rays.o, rays.d, light, u)
-    return np.asarray(found.contribution)
+    light_there = query.direct_light(context.tables, rays.o, rays.d, light, u)
+    return np.asarray(light_there.contribution)
 
 
 def _has_image(context: LightContext, light: int) -> bool:

@@ -157,10 +157,10 @@ def bounds(
 def of_direct_light(context: LightContext) -> FloatArray:
     """(n,): how far float32 may move the light that Whitted's ray tracing takes from the middles of
     all lights, at the first hits."""
-    found = np.zeros(len(context.hits.t))
+    total = np.zeros(len(context.hits.t))
     choice = context.tables.lights.choice
     if choice is None:
-        return found
+        return total
     rays, hits = context.rays, context.hits
     for light in np.flatnonzero((choice.kind != ENVIRONMENT) & (choice.probability > 0.0)).tolist():
         ours = query.direct_light(context.tables, rays.o, rays.d, light, MIDDLE)
@@ -172,8 +172,8 @@ def of_direct_light(context: LightContext) -> FloatArray:
         w = target if distant else target - hits.p[lit]
         cosine = np.sum(w * hits.ns[lit], axis=1) / np.linalg.norm(w, axis=1)
         some = context.of(lit)
-        found[lit] += bounds(some, light, target, (value, value, cosine), 0.0)
-    return found
+        total[lit] += bounds(some, light, target, (value, value, cosine), 0.0)
+    return total
 
 
 def _feature(context: LightContext) -> FloatArray:
@@ -190,14 +190,14 @@ def cut_off(scene: Scene) -> float:
     for images.
     """
     lamps = [m for m in scene.materials.values() if isinstance(m, Emissive)]
-    found = [0.0]
+    sizes = [0.0]
     for light in (*scene.lights, *lamps):
         scale = getattr(light, "scale", 1.0)
         for name in ("radiance", "irradiance", "intensity"):
             value = getattr(light, name, 0.0)
-            found.append(scale * (1.0 if isinstance(value, str) else float(np.max(value))))
-        found.append(scale * float(isinstance(light, EnvironmentMap)))
-    return 1e-18 * max(found)
+            sizes.append(scale * (1.0 if isinstance(value, str) else float(np.max(value))))
+        sizes.append(scale * float(isinstance(light, EnvironmentMap)))
+    return 1e-18 * max(sizes)
 
 
 def _of_leaves(context: LightContext, error: Callable[[Scene, str], float]) -> FloatArray:
@@ -216,7 +216,7 @@ def _of_critical(context: LightContext, d: FloatArray, w: FloatArray, n: FloatAr
     """
     leaves = context.tables.materials.leaves
     tables = [table for table in (leaves.rough_dielectrics, leaves.principleds) if table]
-    found = np.zeros(len(d))
+    largest = np.zeros(len(d))
     wo, wi = (v / np.linalg.norm(v, axis=1)[:, None] for v in (-d, w))
     for index in np.unique([eta for table in tables for eta in table.eta]):
         eta = np.where(np.sum(wo * n, axis=1) > 0.0, index, 1.0 / index)[:, None]
@@ -225,8 +225,8 @@ def _of_critical(context: LightContext, d: FloatArray, w: FloatArray, n: FloatAr
         with np.errstate(divide="ignore", invalid="ignore"):
             cosines = [np.abs(np.sum(v * half, axis=1)) / length for v in (wo, wi)]
             error = ROUNDED * max(index, 1.0 / index) ** 2 / np.minimum(*cosines) ** 2
-        found = np.maximum(found, np.nan_to_num(error, nan=1.0))
-    return np.minimum(found, 1.0)
+        largest = np.maximum(largest, np.nan_to_num(error, nan=1.0))
+    return np.minimum(largest, 1.0)
 
 
 def _of_falloff(context: LightContext, light: int) -> FloatArray:

@@ -155,7 +155,7 @@ def is_mixture(wanted: FloatArray, values: FloatArray, slack: float) -> bool:
     if (np.abs(off).max(axis=1) <= 1.0).any():
         return True
     sides = np.concatenate([off.T, -off.T])
-    found = optimize.linprog(
+    solution = optimize.linprog(
         np.zeros(len(off)), sides, np.ones(6), np.ones((1, len(off))), np.ones(1), method="highs"
     )
-    return bool(found.status == 0)
+    return bool(solution.status == 0)

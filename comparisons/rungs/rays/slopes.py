@@ -50,12 +50,12 @@ def moved(rays: Rays, radius: FloatArray) -> list[Rays]:
     """STEPS versions of the rays: origins moved by `radius` (n,), directions turned by float32's
     error, on the opposite side of the sphere."""
     moves = arbiter.directions(STEPS)
-    found = []
+    versions = []
     for move, way in zip(moves, np.roll(moves, STEPS // 2, axis=0), strict=True):
         turned = rays.d + ROUNDINGS * UNIT_ROUNDOFF * way
         turned /= np.linalg.norm(turned, axis=1)[:, None]
-        found.append(Rays(rays.o + radius[:, None] * move, turned))
-    return found
+        versions.append(Rays(rays.o + radius[:, None] * move, turned))
+    return versions
 
 
 NEAR = 0.01
@@ -73,11 +73,11 @@ def turned(rays: Rays, p: FloatArray, angle: FloatArray) -> list[Rays]:
     right /= np.linalg.norm(right, axis=1)[:, None]
     up = np.cross(right, forward)
     cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    found = []
+    versions = []
     for across in (right, up, -right, -up):
         d = cosine * forward + sine * across
-        found.append(Rays(p - NEAR * length * d, d))
-    return found
+        versions.append(Rays(p - NEAR * length * d, d))
+    return versions
 
 
 def slopes(
@@ -87,8 +87,8 @@ def slopes(
 
     Twice the largest change: the directions of the moves are up to a cosine of 0.7 apart.
     """
-    found = np.zeros(len(value))
+    largest = np.zeros(len(value))
     for other in others:
         change = np.abs(other() - value).max(axis=1)
-        found = np.maximum(found, np.where(change <= STEEPEST * brightest, change, 0.0))
-    return 2.0 * found
+        largest = np.maximum(largest, np.where(change <= STEEPEST * brightest, change, 0.0))
+    return 2.0 * largest
