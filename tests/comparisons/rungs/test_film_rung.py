@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from comparisons.rungs import grating
 from comparisons.rungs.film import film
 from reference_rt.cameras.film import (
     CatmullRomFilter,

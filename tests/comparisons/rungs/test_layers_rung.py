@@ -85,7 +85,7 @@ def changed_by(monkeypatch: pytest.MonkeyPatch, name: str, change: Callable[[Any
             picture.layers[name] = change(picture.layers[name])
         return picture
 
-    monkeypatch.setattr(rung, "render", faulty)
+    monkeypatch.setattr("comparisons.rungs.layers.rung.render", faulty)
 
 
 FAULTS: dict[str, tuple[str, Callable[[Any], Any]]] = {
