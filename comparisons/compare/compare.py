@@ -313,7 +313,7 @@ def _pictures(
         look,
         seconds=budget.seconds,
         first=first,
-        step=lambda count: looks.group_of(count, most),
+        most=most,
         say=lambda line: say(f"{line} ({time.perf_counter() - start:.1f} s)"),
     )
     assert rendered is not None

@@ -53,60 +53,30 @@ def gate_pictures(
     reference: Reference,
     question: Question = Question(),
     notes: Sequence[str] = (),
+    looks: Looks | None = None,
 ) -> Case:
     """The verdict on candidates; several are replicates.
 
+    looks: those that were taken, the last one at these candidates, none of which is a copy.
     Candidates that are copies of the reference's pictures are `unchanged`.  Raises ImageError for
     candidates whose size is not the reference's, UsageError for several candidates without noise
     and for a rim that leaves nothing.
     """
     check_sizes(candidates, size_of(reference.pictures[0]), "as the reference")
-    copies = Copies.of(reference.fingerprints)
-    others = copies.others(candidates)
-    if not others:
-        return unchanged(question.name, copies, reference, notes)
-    if copies.count:
-        notes = [*notes, copies.note(len(others))]
-    return judged(others, reference, question, notes)
-
-
-def unchanged(name: str, copies: Copies, reference: Reference, notes: Sequence[str] = ()) -> Case:
-    """The case of candidates that are all copies of the reference's pictures."""
-    images = Images(*2 * [reference.pictures.mean(axis=0)])
-    nothing = RungResult("statistics", "not-applicable", "there is no difference to test")
-    rungs = [nothing, RungResult("images", "unchanged", copies.words, {"copies": copies.count})]
-    metrics = image_metrics(images)
-    verdict, reason = decide(rungs, metrics)
-    return Case(
-        scene=name,
-        verdict=verdict,
-        reason=reason,
-        rungs=tuple(rungs),
-        metrics=metrics,
-        seconds={},
-        images=images,
-        notes=(*notes, *reference.notes),
-        sides=("candidate's", reference.name),
-    )
-
-
-def judged(
-    candidates: Sequence[Picture],
-    reference: Reference,
-    question: Question = Question(),
-    notes: Sequence[str] = (),
-    looks: Looks | None = None,
-) -> Case:
-    """`gate_pictures` for candidates that are no copies.
-
-    looks: those that were taken, the last one at these candidates.
-    """
+    notes = list(notes)
+    if looks is None:
+        copies = Copies.of(reference.fingerprints)
+        candidates = copies.others(candidates)
+        if not candidates:
+            return unchanged(question.name, copies, reference, notes)
+        if copies.count:
+            notes.append(copies.note(len(candidates)))
     if question.rim:
         candidates, reference = without_rim(candidates, reference, question.rim)
         question = _without_rim(question)
     if reference.noise_free and len(candidates) > 1:
         raise UsageError(f"{len(candidates)} candidates of a picture without noise; expected one")
-    notes = [*notes, *_notes(candidates)]
+    notes += _notes(candidates)
     exact, shown = reference.pictures[0], candidates[0]
     if reference.noise_free and shown.displayed:
         reference, question, note = _as_displayed(shown, reference, question)
@@ -128,6 +98,26 @@ def judged(
         witness=question.witness,
     )
     return judge(evidence, question.limit)
+
+
+def unchanged(name: str, copies: Copies, reference: Reference, notes: Sequence[str] = ()) -> Case:
+    """The case of candidates that are all copies of the reference's pictures."""
+    images = Images(*2 * [reference.pictures.mean(axis=0)])
+    nothing = RungResult("statistics", "not-applicable", "there is no difference to test")
+    rungs = [nothing, RungResult("images", "unchanged", copies.words, {"copies": copies.count})]
+    metrics = image_metrics(images)
+    verdict, reason = decide(rungs, metrics)
+    return Case(
+        scene=name,
+        verdict=verdict,
+        reason=reason,
+        rungs=tuple(rungs),
+        metrics=metrics,
+        seconds={},
+        images=images,
+        notes=(*notes, *reference.notes),
+        sides=("candidate's", reference.name),
+    )
 
 
 def _rendered(candidates: Sequence[Picture], reference: Reference) -> Rendered:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from comparisons.compare.diagnosis.misfit import Hypothesis
+from comparisons.compare.looks import Looks
 from comparisons.compare.misreadings import misreadings
 from comparisons.compare.one_scene import NotebookCase
 from comparisons.compare.path_length import Lengths, path_lengths
@@ -94,7 +95,7 @@ def gated(
     """The verdict.  Raises ImageError, SceneError, UsageError, BaselineMissingError,
     BaselineEditedError."""
     judge = prepared(request, candidates, say)
-    return judge.case(partial(gate_pictures, candidates, judge.reference))
+    return judge.case(candidates)
 
 
 def gate(
@@ -153,11 +154,13 @@ class Judge:
         shown = self.curve(self.linear.pictures)
         return replace(self.linear, pictures=shown, notes=(*self.linear.notes, note))
 
-    def case(self, gate: "partial[Case]") -> Case:
-        """The verdict by `gate_pictures` or `judged`, whose candidates and reference are given
-        already; a difference from our own pictures may be of terms that the renderer lacks."""
-        request, candidates = self.request, gate.args[0]
-        case = self._case(gate)
+    def case(
+        self, candidates: Sequence[Picture], notes: Sequence[str] = (), looks: Looks | None = None
+    ) -> Case:
+        """The verdict by `gate_pictures`; a difference from our own pictures may be of terms that
+        the renderer lacks."""
+        request = self.request
+        case = self._case(candidates, notes, looks)
         if request.tone_curve == ESTIMATE and self.curve is not None:
             where = str(self.curve).replace(":", " at exposure ")
             reason = f"{UP_TO}the tone curve {where}, estimated: {case.reason}"
@@ -172,7 +175,7 @@ class Judge:
         def judged(scene: Scene) -> Case:
             ours = reference.of_scene(scene, request.limit, threads=request.threads)
             plain = Judge(replace(request, witness=None), ours, scene, self.curve)
-            return plain._case(partial(gate_pictures, candidates, plain.reference), diagnosed=False)
+            return plain._case(candidates, diagnosed=False)
 
         cause = missing_terms(self.scene, case, request.rim, request.threads, judged, self.curve)
         return case if cause is None else replace(case, cause=cause)
@@ -185,7 +188,7 @@ class Judge:
         if curve is None or str(curve) == str(own or "linear"):
             return None
         other = replace(self, curve=curve, request=replace(self.request, tone_curve=str(curve)))
-        case = other.case(partial(gate_pictures, candidates, other.reference))
+        case = other.case(candidates)
         is_gain = curve.name == ("linear" if own is None else own.name)
         if is_sure(found.cause) and (case.verdict != "agree" or (is_gain and own is None)):
             return None
@@ -203,7 +206,13 @@ class Judge:
         )
         return Cause(name, evidence, 1.0 - after / before)
 
-    def _case(self, gate: "partial[Case]", diagnosed: bool = True) -> Case:
+    def _case(
+        self,
+        candidates: Sequence[Picture],
+        notes: Sequence[str] = (),
+        looks: Looks | None = None,
+        diagnosed: bool = True,
+    ) -> Case:
         """The verdict.  diagnosed: whether the cause of a difference is sought by rendering."""
         request, scene, curve = self.request, self.scene, self.curve
         known = scene if diagnosed else None
@@ -226,7 +235,7 @@ class Judge:
         question = Question(
             request.limit, request.name, lights, lengths, edges, self._witness(), request.rim
         )
-        return gate(question=question)
+        return gate_pictures(candidates, self.reference, question, notes, looks)
 
     def _through(self, curve: ToneCurve, lengths: Lengths) -> Lengths:
         """Hypotheses about linear pictures, as the curve shows them."""

@@ -96,9 +96,9 @@ def test_it_ends_at_the_time_limit(seconds, counts):
 
 
 def test_a_look_ends_with_whole_groups():
-    found, _ = looked(["inconclusive"], seconds=1e3, step=lambda count: group_of(count, 64))
+    found, _ = looked(["inconclusive"], seconds=1e3, most=64)
     assert found.counts[-1] == 1000  # groups of eight
-    found, _ = looked(["inconclusive"], seconds=999.0, step=lambda count: group_of(count, 64))
+    found, _ = looked(["inconclusive"], seconds=999.0, most=64)
     assert found.counts[-1] == 992
 
 
