@@ -12,7 +12,7 @@ from junitparser import JUnitXml
 from typer.testing import CliRunner
 
 from comparisons.commands.gate import accept
-from comparisons.gate import reference
+from comparisons.gate import reference_cache
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.image import srgb, write_png
 from reference_rt.rendering.render import render
@@ -43,7 +43,7 @@ def test_right_pictures_pass(right: FloatArray, monkeypatch: pytest.MonkeyPatch)
     def refuse(*arguments: object, **more: object) -> None:
         raise AssertionError("the reference is in the cache")
 
-    monkeypatch.setattr(reference, "render", refuse)
+    monkeypatch.setattr(reference_cache, "render", refuse)
     assert run(*files(right), "--scene", "ball.yaml")[0].exit_code == 0
 
 
