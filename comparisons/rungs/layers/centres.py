@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.hits import MitsubaHits, rows_of
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.layers.seen import Seen
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.camera import camera_rays, ends

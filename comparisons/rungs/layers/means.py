@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import Counterpart, trace
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.layers.seen import FilmPoints, Seen, sensor_rays
 from comparisons.rungs.rays.camera import ends
 from reference_rt.cameras.film import Filter

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import Counterpart
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.results.case import RungResult
 from comparisons.rungs.layers.centres import Centres, centres
 from comparisons.rungs.layers.means import LIMIT, compare_means, expected

@@ -5,12 +5,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.cameras.translate import translate_filter
-from comparisons.geometry.sizes import LeafSizes, ShapeSizes
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.hits import MitsubaHits
 from comparisons.mitsuba.scene import for_rays
+from comparisons.referee.sizes import LeafSizes, ShapeSizes
 from comparisons.textures.texture import Use
 from comparisons.textures.translate import translate_texture
 from reference_rt.cameras.film import Filter

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from comparisons.geometry.exact.referee import Referee, identity_of
 from comparisons.mitsuba.hits import MitsubaHits
+from comparisons.referee.referee import Referee, identity_of
 from comparisons.rungs.rays.rays import Rays
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.rendering.query import Intersections

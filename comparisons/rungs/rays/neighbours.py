@@ -9,8 +9,8 @@ import numpy as np
 from scipy import optimize
 
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
-from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import Counterpart
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays.arbiter import NEIGHBOURS, RADII, BoolArray, directions
 from comparisons.rungs.rays.rays import Rays
 from reference_rt.core.arrays import FloatArray

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from comparisons.geometry.sizes import ShapeSizes
+from comparisons.referee.sizes import ShapeSizes
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.query import Intersections
 
