@@ -1,6 +1,6 @@
 """Rays that both renderers trace, and the error bounds that their hits must keep.
 
-- Which rays: `rays` (camera, random, secondary), `camera`; those aimed at edges are in
+- Which rays: `rays` (camera, random, secondary), `camera`; those aimed at edges in `aimed`.
   `rungs/geometry.py`.
 - Shadow rays: `any_hit`.
 - How large an error float32 explains: `resolution`, `light_error`, and slopes in `coincidence`.
