@@ -3,7 +3,7 @@
 import numpy as np
 
 from comparisons.geometry import affine
-from comparisons.rungs.files.findings import Findings, text, unit
+from comparisons.rungs.files.findings import Findings, text
 from comparisons.shapes import type_of
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes.shape import Shape
@@ -24,7 +24,7 @@ def check_equation(where: str, shape: Shape, findings: Findings) -> None:
     half, middle = np.array(surface.half), np.array(surface.middle)
     size = float(np.linalg.norm(half))
     target = middle + half * rng.uniform(-0.95, 0.95, (RAYS, 3))
-    begin = middle + 4.0 * size * unit(rng.normal(size=(RAYS, 3)))
+    begin = middle + 4.0 * size * _unit(rng.normal(size=(RAYS, 3)))
     o, d = begin @ linear.T + offset, (target - begin) @ linear.T
     hits = Scene(shapes=(shape.model_copy(update={"material": None}),)).intersect(o, d)
     findings.count(of.table.field if of.table else f"{type(shape).__name__.lower()}s")
@@ -47,7 +47,7 @@ def check_equation(where: str, shape: Shape, findings: Findings) -> None:
         return
     gradient = surface.normals(q)
     is_smooth = np.linalg.norm(gradient, axis=1) > 0.0
-    p, n, expected = p[is_smooth], n[is_smooth], unit(gradient[is_smooth] @ inverse)
+    p, n, expected = p[is_smooth], n[is_smooth], _unit(gradient[is_smooth] @ inverse)
     # Mirrored shapes keep the front of their description.
     off = np.linalg.norm(expected - n, axis=1)
     if len(off) and off.max() > 3e-5 + 16.0 * rounding / size:
@@ -55,3 +55,7 @@ def check_equation(where: str, shape: Shape, findings: Findings) -> None:
         findings.differences.append(
             f"{where}: has the normal {text(n[k])} at {text(p[k])}; expected {text(expected[k])}"
         )
+
+
+def _unit(v: FloatArray) -> FloatArray:
+    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))

@@ -5,11 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from reference_rt.core.arrays import FloatArray
-
-FLOAT32 = 2.0**-24
-"""The rounding of the numbers that Mitsuba holds."""
-
 
 @dataclass
 class Findings:
@@ -27,7 +22,3 @@ class Findings:
 
 def text(numbers: Any) -> str:
     return f"({', '.join(f'{x:.6g}' for x in np.ravel(numbers))})"
-
-
-def unit(v: FloatArray) -> FloatArray:
-    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))

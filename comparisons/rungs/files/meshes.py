@@ -7,10 +7,13 @@ import numpy as np
 
 from comparisons.geometry import affine
 from comparisons.mitsuba.second import Corners, by_second, by_us
-from comparisons.rungs.files.findings import FLOAT32, Findings, text
+from comparisons.rungs.files.findings import Findings, text
 from reference_rt.core.arrays import IntArray
 from reference_rt.shapes import Mesh, Triangle
 from reference_rt.shapes.shape import TabulationContext
+
+FLOAT32 = 2.0**-24
+"""The rounding of the numbers that Mitsuba holds."""
 
 LEAST32 = 2.0**-126
 """The least number that float32 holds with all of its bits."""
