@@ -5,6 +5,7 @@ import numpy as np
 from comparisons.geometry import affine
 from comparisons.rungs.files.findings import Findings, text
 from comparisons.shapes import type_of
+from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes.shape import Shape
 
