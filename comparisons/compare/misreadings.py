@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.compare.diagnosis.misfit import Hypothesis
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.path_length import Lengths
 from reference_rt.cameras import Orthographic
 from reference_rt.cameras.view_rectangle import CentralCamera

@@ -7,21 +7,23 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from comparisons.compare.diagnosis.misfit import Hypothesis
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.looks import Looks
 from comparisons.compare.misreadings import misreadings
-from comparisons.compare.one_scene import NotebookCase
+from comparisons.compare.notebook import NotebookCase
 from comparisons.compare.path_length import Lengths, path_lengths
 from comparisons.compare.single_lights import single_lights
 from comparisons.gate import baselines, reference
 from comparisons.gate.digest import scene_digest
 from comparisons.gate.edges import DARK, TOLERANCE, Edges, look_at
-from comparisons.gate.gate import LIMIT, Question, gate_pictures
+from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture, pictures_of
+from comparisons.gate.question import LIMIT, Question
 from comparisons.gate.reference import Reference, check_sizes, size_of
 from comparisons.gate.rim import check_rim
+from comparisons.gate.shown_curve import estimated
 from comparisons.gate.terms import is_sure, missing_terms
-from comparisons.gate.tone_curves import ESTIMATE, ToneCurve, curve_of, estimated
+from comparisons.gate.tone_curves import ESTIMATE, ToneCurve, curve_of
 from comparisons.renderers import WitnessName
 from comparisons.results.case import Case, Cause, FloatArray
 from comparisons.results.headline import UP_TO

@@ -12,13 +12,8 @@ from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.coincidence import is_doubled, on_two_surfaces
 from comparisons.rungs.rays.lamp_images import is_beside, magnified, slopes_of_image
-from comparisons.rungs.rays.light_error import (
-    POINT_LIKE,
-    LightContext,
-    bounds,
-    kind_of,
-    slopes_of,
-)
+from comparisons.rungs.rays.light_context import POINT_LIKE, LightContext, kind_of
+from comparisons.rungs.rays.light_error import bounds, slopes_of
 from comparisons.rungs.rays.mitsuba_light import _lamp, is_dark, mitsuba_direct
 from comparisons.rungs.rays.rays import described, mixed_rays
 from reference_rt.core.arrays import FloatArray, IntArray

@@ -17,7 +17,8 @@ from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.coincidence import on_two_surfaces
 from comparisons.rungs.rays.lamp_images import changes_of_lamps
-from comparisons.rungs.rays.light_error import LightContext, cut_off, of_direct_light
+from comparisons.rungs.rays.light_context import LightContext
+from comparisons.rungs.rays.light_error import cut_off, of_direct_light
 from comparisons.rungs.rays.neighbours import NeighbourContext, explained_by_neighbours, rounding_of
 from comparisons.rungs.rays.rays import Rays, described, pixel_rays
 from comparisons.rungs.rays.slopes import is_steep, moved, slopes

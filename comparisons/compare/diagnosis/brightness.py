@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from comparisons.compare.diagnosis.colour import CHANNELS
-from comparisons.compare.diagnosis.misfit import Hypothesis, Misfit
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.results.case import FloatArray
 from reference_rt.rendering.image import srgb
 from reference_rt.textures.image_file import linear

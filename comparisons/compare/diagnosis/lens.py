@@ -6,7 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 from scipy import ndimage
 
-from comparisons.compare.diagnosis.misfit import Hypothesis, Misfit
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.results.case import FloatArray
 
 STEPS = ((4.0, 1), (2.0, 1), (1.0, 1), (0.0, 3), (0.0, 3))

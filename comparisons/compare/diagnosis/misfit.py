@@ -2,28 +2,12 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage, optimize
 
 from comparisons.results.case import FloatArray, Images
 from comparisons.statistics.cells import divisor
-
-# ---- a hypothesis about what is wrong with a picture ---------------------------------------------
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """family: hypotheses of the same family do not compete;  name, evidence: as in `Cause`;
-    picture: the candidate that the hypothesis predicts;  parameters: how many were fitted."""
-
-    family: str
-    name: str
-    evidence: str
-    picture: FloatArray
-    parameters: int
-
 
 FLOOR = 0.005
 """Relative to a pixel's brightness, or the picture's if that is brighter: smaller differences have

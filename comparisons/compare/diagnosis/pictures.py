@@ -4,8 +4,9 @@ from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
-from comparisons.compare.diagnosis import brightness, colour, place
-from comparisons.compare.diagnosis.misfit import Hypothesis, Misfit
+from comparisons.compare.diagnosis import brightness, colour, place, tones
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.compare.diagnosis.spots import SHARE, one_place, rim
 from comparisons.results.case import Cause, FloatArray, Images
 from comparisons.statistics.metrics import count_nonfinite
@@ -49,6 +50,7 @@ def likeliest(
     hypotheses = [
         *brightness.hypotheses(misfit, lights or {}),
         *colour.hypotheses(misfit),
+        *tones.hypotheses(misfit),
         *place.hypotheses(misfit),
         *also(misfit.reference),
     ]

@@ -5,7 +5,8 @@ from functools import partial
 import numpy as np
 
 from comparisons.rungs.rays.arbiter import BoolArray
-from comparisons.rungs.rays.light_error import MIDDLE, LightContext, kind_of
+from comparisons.rungs.rays.light_context import LightContext, kind_of
+from comparisons.rungs.rays.light_error import MIDDLE
 from comparisons.rungs.rays.slopes import NEAR, slopes
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import WhittedSetup

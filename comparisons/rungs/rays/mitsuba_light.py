@@ -9,12 +9,7 @@ from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.plugins.whitted import without
 from comparisons.mitsuba.scene import for_rays, light_id
 from comparisons.rungs.rays import arbiter
-from comparisons.rungs.rays.light_error import (
-    POINT_LIKE,
-    LightContext,
-    kind_of,
-    number_of,
-)
+from comparisons.rungs.rays.light_context import POINT_LIKE, LightContext, kind_of, number_of
 from comparisons.rungs.rays.rays import Rays
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.lights import AREA, DIRECTIONAL, ENVIRONMENT

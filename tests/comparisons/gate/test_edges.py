@@ -8,8 +8,9 @@ import pytest
 
 from comparisons.gate import edges
 from comparisons.gate.edges import RULES, Edges, edges_rung, look_at
-from comparisons.gate.gate import Question, gate_pictures
+from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture
+from comparisons.gate.question import Question
 from comparisons.gate.reference import of_scene
 from comparisons.report.biases import biases_of
 from comparisons.results.case import RungResult

@@ -12,8 +12,9 @@ from junitparser import JUnitXml
 
 from comparisons.gate.baselines import MOST_KEPT
 from comparisons.gate.copies import Copies, fingerprint
-from comparisons.gate.gate import Question, gate_pictures
+from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture
+from comparisons.gate.question import Question
 from comparisons.gate.reference import of_files
 from comparisons.results.files import sealed
 from reference_rt.core.arrays import FloatArray

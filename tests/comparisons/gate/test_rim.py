@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from comparisons.gate.gate import Question, gate_pictures
+from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture
+from comparisons.gate.question import Question
 from comparisons.gate.reference import Reference
 from comparisons.gate.rim import without_rim, without_rim_later
 from comparisons.results.case import FloatArray
