@@ -13,7 +13,7 @@ from comparisons.gate.copies import Copies
 from comparisons.gate.displayed import as_displayed
 from comparisons.gate.edges import edges_rung
 from comparisons.gate.pictures_in import Picture
-from comparisons.gate.question import Question
+from comparisons.gate.question import USUAL, Question
 from comparisons.gate.reference import Reference, check_sizes, size_of, stacked
 from comparisons.gate.rim import question_without_rim, without_rim
 from comparisons.results.case import Case, FloatArray, Images, RungResult, Status, decide
@@ -25,7 +25,7 @@ from reference_rt.util.errors import ImageError, UsageError
 def gate_pictures(
     candidates: Sequence[Picture],
     reference: Reference,
-    question: Question = Question(),
+    question: Question = USUAL,
     notes: Sequence[str] = (),
     looks: Looks | None = None,
 ) -> Case:

@@ -28,3 +28,7 @@ class Question:
     edges: Edges | None = None
     witness: Witness | None = None
     rim: int = 0
+
+
+USUAL = Question()
+"""Without help, of whole pictures."""

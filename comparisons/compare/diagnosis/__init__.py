@@ -6,9 +6,9 @@ most of the squared difference beyond noise, if it is clearly better than the ot
 one place (row, tile, pixels) that holds the difference, or None.  A cause must also reproduce the
 bias of each channel's mean, and those of blocks (`Misfit.reproduces`).
 
-To add a hypothesis, yield it from `brightness`, `colour`, `tones` or `place`: the picture that the candidate
-would be, and how many parameters were fitted.  One with as many or fewer is its rival, unless it is
-of the same family.
+To add a hypothesis, yield it from `brightness`, `colour`, `tones` or `place`: the picture that the
+candidate would be, and how many parameters were fitted.  One with as many or fewer is its rival,
+unless it is of the same family.
 """
 
 from comparisons.compare.diagnosis.colour import A_MATRIX
