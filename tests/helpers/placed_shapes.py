@@ -7,8 +7,8 @@ from builders import random_turn, shapes_in_order, unit_vectors
 from drivers import probe
 
 import reference_rt as rt
-from comparisons.geometry.exact import KINDS, columns_of, first_hit
 from comparisons.geometry.exact.dyadic import NEVER, Dyadic, nearest
+from comparisons.referee import KINDS, columns_of, first_hit
 from reference_rt.core.transform import Matrix
 from reference_rt.shapes import TABLES
 

@@ -6,16 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
+from command_line import invoke
 from gate_checks import files, run, status
 from junitparser import JUnitXml
-from typer.testing import CliRunner
 
-from comparisons.commands.gate import accept
 from comparisons.gate.baselines import MOST_KEPT
-from comparisons.gate.digest import Copies, fingerprint
+from comparisons.gate.copies import Copies, fingerprint
 from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture
+from comparisons.gate.question import Question
 from comparisons.gate.reference import of_files
 from comparisons.results.files import sealed
 from reference_rt.core.arrays import FloatArray
@@ -32,10 +31,8 @@ def noisy(count: int, seed: int = 1) -> FloatArray:
 
 def accepted(pictures: FloatArray, *more: str) -> list[str]:
     """The files of a new baseline "ball"."""
-    app = typer.Typer()
-    app.command()(accept)
     names = files(pictures)
-    result = CliRunner().invoke(app, [*names, "--name", "ball", "--reason", "seen", *more])
+    result = invoke("accept", *names, "--name", "ball", "--reason", "seen", *more)
     assert result.exit_code == 0, result.output
     return names
 
@@ -164,7 +161,7 @@ def test_invalid_does_not_hide_a_bias(fault: str, gain: float) -> None:
     else:
         pictures[1] = 0.1 * pictures[1] + 0.9 * pictures[2]
     reference = of_files([Picture(p) for p in noisy(8, 2)], None, False)
-    case = gate_pictures([Picture(p) for p in pictures], reference, limit=0.02)
+    case = gate_pictures([Picture(p) for p in pictures], reference, Question(limit=0.02))
     assert case.verdict == "invalid"
     assert case.reason.startswith("input: ")
     assert ("; besides, statistics: the image mean differs: " in case.reason) == (gain > 1.0)

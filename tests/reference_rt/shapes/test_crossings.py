@@ -7,8 +7,8 @@ from every_shape import every_shape, tilted
 
 import reference_rt as rt
 from comparisons.geometry.exact.dyadic import Dyadic, nearest
-from comparisons.geometry.exact.referee import crossings_of
-from comparisons.geometry.sizes import ShapeSizes
+from comparisons.referee.referee import crossings_of
+from comparisons.referee.sizes import ShapeSizes
 from reference_rt.core.transform import affine
 from reference_rt.scene.examples import NAMED, write_files
 from reference_rt.shapes.csg import Solid

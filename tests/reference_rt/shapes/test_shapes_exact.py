@@ -11,8 +11,8 @@ from placed_shapes import Placed, anywhere, lattice_rays, put, random_map
 from quadric_kinds import KINDS as QUADRICS
 
 import reference_rt as rt
-from comparisons.geometry.exact import all_hits
 from comparisons.geometry.exact.dyadic import NEVER, nearest
+from comparisons.referee import all_hits
 from reference_rt.core import transform
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3
