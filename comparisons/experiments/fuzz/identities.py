@@ -18,7 +18,7 @@ from comparisons.experiments import relations
 from comparisons.experiments.fuzz.finding import Data, Finding, named_in, shapes_of
 from comparisons.experiments.relations import HIERARCHIES, REACH, Motion, identities_of
 from comparisons.geometry.frame import Frame
-from comparisons.geometry.sizes import ShapeSizes
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays.rays import pixel_rays
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray

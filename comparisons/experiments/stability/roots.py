@@ -42,8 +42,8 @@ from comparisons.experiments.stability.harness.core import (
 )
 from comparisons.experiments.stability.harness.steps import Rays
 from comparisons.geometry.affine import across, unit_vectors
-from comparisons.geometry.exact.crossings import torus_quartic
 from comparisons.geometry.exact.dyadic import CERTAIN, BoolArray, Dyadic
+from comparisons.shapes.torus import torus_quartic
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import entry_kernel

@@ -17,7 +17,7 @@ from comparisons.experiments.stability.leaving.shapes import (
     place,
     subjects,
 )
-from comparisons.geometry.exact import first_hit
+from comparisons.referee import first_hit
 
 PLAIN = Extent.of(1.0, 2.0, 1.0, False)
 

@@ -14,7 +14,7 @@ from comparisons.experiments.stability.harness import meshes
 from comparisons.experiments.stability.harness.core import OURS, Draw, U
 from comparisons.experiments.stability.slivers.judge import DISTANCES, RING, Judge, Question
 from comparisons.experiments.stability.watertight import crossings
-from comparisons.geometry.exact import columns_of
+from comparisons.referee import columns_of
 
 # Cases have triangles without area on purpose: what a mesh leaves out is no news here.
 pytestmark = pytest.mark.filterwarnings("ignore::reference_rt.util.errors.SceneWarning")

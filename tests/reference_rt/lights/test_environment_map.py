@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from builders import random_turn
 from chi_square import chi_square, integrate, sidak
 from PIL import Image
 
@@ -40,9 +41,9 @@ def _ahead(table, u, d, sampled, seen):
     for k in range(len(numbers)):
         numbers[k] = 0.0
     for k in range(len(u)):
-        environment_map.put_surface(table, numbers, k, u[k, 0], u[k, 1])
+        environment_map.put_surface(table, numbers, k, k, u[k, 0], u[k, 1])
     for k in range(len(d)):
-        environment_map.put_escaped(numbers, k, row(d, k))
+        environment_map.put_escaped(numbers, k, k, row(d, k))
     environment_map.compute_ahead(table, numbers, len(d), len(u))
     for k in range(len(u)):
         s = environment_map.sample_ahead(environment_map.Ahead(table, numbers, k))
@@ -74,7 +75,7 @@ def random_map(rng, height, width, dark=0.3):
     """Texels of very different brightness, some black, turned at random."""
     texels = rng.random((height, width, 3)) ** 4 * (rng.random((height, width, 1)) > dark)
     texels[-1, -1] = 1.0
-    turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    turn = random_turn(rng)
     return tabulate(texels, turn)
 
 

@@ -17,7 +17,6 @@ from comparisons.experiments.stability.harness.core import (
 )
 from comparisons.experiments.stability.harness.steps import Rays, traced
 from comparisons.geometry.affine import across, unit_vectors
-from comparisons.geometry.exact import KINDS, first_of
 from comparisons.geometry.exact.dyadic import (
     FRACTION,
     NEVER,
@@ -29,6 +28,7 @@ from comparisons.geometry.exact.dyadic import (
 )
 from comparisons.geometry.frame import round32
 from comparisons.mitsuba.backend import scalar
+from comparisons.referee import KINDS, first_of
 from reference_rt import textbook
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel

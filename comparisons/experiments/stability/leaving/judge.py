@@ -16,10 +16,10 @@ from comparisons.experiments.stability.leaving.shapes import (
     Subject,
     scene_of,
 )
-from comparisons.geometry.exact import all_hits, columns_of, first_of
 from comparisons.geometry.exact.dyadic import NEVER, BoolArray, nearest
-from comparisons.geometry.exact.referee import Referee
-from comparisons.geometry.sizes import ShapeSizes
+from comparisons.referee import all_hits, columns_of, first_of
+from comparisons.referee.referee import Referee
+from comparisons.referee.sizes import ShapeSizes
 from reference_rt.core.arrays import FloatArray, IntArray
 
 CLOSE = 0.01

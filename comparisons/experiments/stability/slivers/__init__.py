@@ -51,8 +51,8 @@ from comparisons.experiments.stability.slivers.judge import (
     needle,
     thin_triangle,
 )
-from comparisons.geometry.exact import columns_of
 from comparisons.geometry.exact.dyadic import BoolArray
+from comparisons.referee import columns_of
 from reference_rt import textbook
 from reference_rt.rendering import query
 

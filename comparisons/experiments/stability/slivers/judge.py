@@ -30,9 +30,9 @@ from comparisons.experiments.stability.harness.core import (
 )
 from comparisons.experiments.stability.harness.steps import any_turn, scaled
 from comparisons.geometry.affine import unit_rows
-from comparisons.geometry.exact import first_hit
 from comparisons.geometry.exact.dyadic import BoolArray, Dyadic, cross
 from comparisons.geometry.frame import round32
+from comparisons.referee import first_hit
 from reference_rt.core import transform
 
 # ---- random slivers, and rays that graze ---------------------------------------------------------
@@ -203,7 +203,7 @@ Extended = npt.NDArray[np.longdouble]
 @dataclass(frozen=True)
 class Question:
     """Rays o, d (n, 3) at one shape: row (its columns, of one row), kind as
-    `comparisons.geometry.exact` names it, size its largest extent."""
+    `comparisons.referee` names it, size its largest extent."""
 
     kind: str
     row: Mapping[str, Any]
