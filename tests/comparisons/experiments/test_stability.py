@@ -113,6 +113,17 @@ def test_usage(fakes, tmp_path, options, said):
     assert said in told
 
 
+def test_the_csv_has_a_row_for_each_contestant_and_infinity_in_words(tmp_path):
+    outcomes = {"a_method": Outcome(2, 1, 0.5), OURS: Outcome(3, 0, math.inf, 1)}
+    found = [Found("T1", "far", 10.0, outcomes, 1.0), Found("T1", "far", 20.0, {}, 1.0, "broke")]
+    outputs.rows_of(found).write_csv(tmp_path / "results.csv")
+    assert (tmp_path / "results.csv").read_text().splitlines() == [
+        "family,series,x,contestant,cases,failures,worst,open",
+        "T1,far,10.0,ours,3,0,inf,1",
+        "T1,far,10.0,a_method,2,1,0.5,0",
+    ]
+
+
 def test_outcomes_add_up_and_refuse_nonsense():
     both = Outcome(3, 1, 2.0, 1, ({"a": 1},)) + Outcome(4, 0, None, 2)
     assert both == Outcome(7, 1, 2.0, 3, ({"a": 1},))
