@@ -15,9 +15,10 @@ from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Say, budgeted
 from comparisons.compare.looks import level_of
 from comparisons.experiments.selftest.fault import CAUGHT
-from comparisons.gate.digest import fingerprint
-from comparisons.gate.gate import LIMIT, gate_pictures, look
+from comparisons.gate.copies import fingerprint
+from comparisons.gate.gate import gate_pictures, look
 from comparisons.gate.pictures_in import Picture
+from comparisons.gate.question import LIMIT
 from comparisons.gate.reference import Reference
 from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.runs.elsewhere import run_elsewhere
