@@ -149,8 +149,9 @@ def stability(
     """
     with compare_extra():
         from comparisons.experiments.stability.harness import outputs
-        from comparisons.experiments.stability.harness.core import MODULES, Effort, summaries
-        from comparisons.experiments.stability.harness.core import family as family_of
+        from comparisons.experiments.stability.harness.series import MODULES, Effort
+        from comparisons.experiments.stability.harness.points import summaries
+        from comparisons.experiments.stability.harness.series import family as family_of
         from comparisons.experiments.stability.harness.run import (
             Choice,
             mitsuba_is_there,

@@ -8,17 +8,9 @@ import time
 import numpy as np
 
 from comparisons.experiments.stability.harness import core, run
-from comparisons.experiments.stability.harness.core import (
-    MITSUBA,
-    OURS,
-    Family,
-    Outcome,
-    Series,
-    Shot,
-    Sweep,
-    alone,
-    decades,
-)
+from comparisons.experiments.stability.harness.outcomes import MITSUBA, OURS, Outcome
+from comparisons.experiments.stability.harness.series import Family, Series, Sweep, alone, decades
+from comparisons.experiments.stability.harness.shots import Shot
 
 METHOD = "sphere.algebraic"
 

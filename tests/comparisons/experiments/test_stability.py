@@ -15,15 +15,9 @@ from typer.testing import CliRunner
 
 from comparisons.commands import register
 from comparisons.experiments.stability.harness import core, outputs, run
-from comparisons.experiments.stability.harness.core import (
-    OURS,
-    Family,
-    Found,
-    Outcome,
-    Series,
-    Sweep,
-    outcome,
-)
+from comparisons.experiments.stability.harness.outcomes import OURS, Outcome, outcome
+from comparisons.experiments.stability.harness.series import Family, Series, Sweep
+from comparisons.experiments.stability.harness.points import Found
 from comparisons.experiments.stability.harness.outputs import summarise
 
 

@@ -10,10 +10,8 @@ from comparisons.experiments.stability import furnaces as f10_furnaces
 from comparisons.experiments.stability.bsdfs.samples import PURE
 from comparisons.experiments.stability.furnaces import COSINES
 from comparisons.experiments.stability.harness import worlds
-from comparisons.experiments.stability.harness.core import (
-    FloatArray,
-    family,
-)
+from comparisons.experiments.stability.harness.outcomes import FloatArray
+from comparisons.experiments.stability.harness.series import family
 from comparisons.experiments.stability.harness.worlds import Mean, judge
 
 

@@ -3,15 +3,9 @@
 import pytest
 from stability_runs import measured
 
-from comparisons.experiments.stability.harness.core import (
-    FURTHER,
-    MITSUBA,
-    MODULES,
-    OURS,
-    SeriesSummary,
-    family,
-    summarise,
-)
+from comparisons.experiments.stability.harness.points import FURTHER, SeriesSummary, summarise
+from comparisons.experiments.stability.harness.outcomes import MITSUBA, OURS
+from comparisons.experiments.stability.harness.series import MODULES, family
 from comparisons.experiments.stability.harness.run import Choice, mitsuba_is_there, run
 from reference_rt.util.workers import Threads
 

@@ -10,8 +10,8 @@ import reference_rt as rt
 from comparisons.experiments.stability.far import FAMILY as F1
 from comparisons.experiments.stability.far import curved, spheres
 from comparisons.experiments.stability.far.spheres import BAND, Truth, gaps, judge_by_moving
-from comparisons.experiments.stability.harness.core import OURS, U
-from comparisons.experiments.stability.harness.steps import Rays
+from comparisons.experiments.stability.harness.outcomes import OURS, U
+from comparisons.experiments.stability.harness.rays import Rays
 from comparisons.experiments.stability.roots import ferrari, judge, numpy_roots, of_quadratics
 
 

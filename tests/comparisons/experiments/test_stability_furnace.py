@@ -20,13 +20,8 @@ from comparisons.experiments.stability.bsdfs import (
     samples,
 )
 from comparisons.experiments.stability.harness.bsdfs import Bsdf, Ours, Samples, towards
-from comparisons.experiments.stability.harness.core import (
-    OURS,
-    Draw,
-    FloatArray,
-    of_errors,
-    relative,
-)
+from comparisons.experiments.stability.harness.outcomes import OURS, FloatArray, of_errors, relative
+from comparisons.experiments.stability.harness.series import Draw
 from comparisons.experiments.stability.radiometry import solid_angles
 from reference_rt.lights.emitters import point
 

@@ -6,8 +6,9 @@ import pytest
 from comparisons.experiments.stability import contact as contact
 from comparisons.experiments.stability import leaving as leaving
 from comparisons.experiments.stability.contact import fresnel, plates
-from comparisons.experiments.stability.harness.core import OURS, Draw
-from comparisons.experiments.stability.harness.steps import bound
+from comparisons.experiments.stability.harness.outcomes import OURS
+from comparisons.experiments.stability.harness.series import Draw
+from comparisons.experiments.stability.harness.shadows import bound
 from comparisons.experiments.stability.leaving.judge import Judge, Tally, row_of
 from comparisons.experiments.stability.leaving.shapes import (
     KINDS,

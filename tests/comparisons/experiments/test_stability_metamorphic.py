@@ -11,7 +11,8 @@ import reference_rt as rt
 from comparisons.experiments import relations
 from comparisons.experiments.stability import metamorphic as f09_metamorphic
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.core import OURS, Draw, family
+from comparisons.experiments.stability.harness.outcomes import OURS
+from comparisons.experiments.stability.harness.series import Draw, family
 from comparisons.experiments.stability.harness.meshes import write_obj
 from comparisons.experiments.stability.metamorphic import light, rays
 from comparisons.experiments.stability.metamorphic import rays as f09_rays

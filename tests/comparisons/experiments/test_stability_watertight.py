@@ -11,7 +11,8 @@ import reference_rt as rt
 from comparisons.experiments.stability import hierarchy, watertight
 from comparisons.experiments.stability import watertight as f03
 from comparisons.experiments.stability.harness import meshes
-from comparisons.experiments.stability.harness.core import OURS, Draw, U
+from comparisons.experiments.stability.harness.outcomes import OURS, U
+from comparisons.experiments.stability.harness.series import Draw
 from comparisons.experiments.stability.slivers.judge import DISTANCES, RING, Judge, Question
 from comparisons.experiments.stability.watertight import crossings
 from comparisons.geometry.exact import columns_of

@@ -14,16 +14,11 @@ from comparisons.experiments.stability.far.spheres import (
     judge_by_moving,
     tangent_gaps,
 )
-from comparisons.experiments.stability.harness.core import (
-    MITSUBA,
-    OURS,
-    Draw,
-    FloatArray,
-    Outcome,
-    Shot,
-    pixel_grid,
-)
-from comparisons.experiments.stability.harness.steps import Rays, matrix
+from comparisons.experiments.stability.harness.outcomes import MITSUBA, OURS, FloatArray, Outcomes
+from comparisons.experiments.stability.harness.rays import Rays
+from comparisons.experiments.stability.harness.series import Draw
+from comparisons.experiments.stability.harness.shots import Shot, pixel_grid
+from comparisons.experiments.stability.harness.steps import matrix
 from comparisons.geometry.affine import across, unit_vectors
 from comparisons.geometry.exact.dyadic import Dyadic
 from comparisons.geometry.frame import round32
@@ -250,7 +245,7 @@ IN_MITSUBA = ("ellipsoid", "cylinder")
 
 def compete(
     draw: Draw, name: str, distance: FloatArray, offset: float = 0.0, size: float = 1.0
-) -> Mapping[str, Outcome]:
+) -> Outcomes:
     """Ours; and Mitsuba on some of the rays, rounded to float32 with their shapes, against the
     exact answer for these and the law in float32's u."""
     rays, maps = draw_rays(draw.rng, name, distance, offset, size)

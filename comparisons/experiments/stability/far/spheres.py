@@ -1,21 +1,21 @@
 """F1's rays at spheres, and the contestants' answers."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from comparisons.experiments.stability.harness.core import (
+from comparisons.experiments.stability.harness.in_mitsuba import traced
+from comparisons.experiments.stability.harness.outcomes import (
     MITSUBA,
     OURS,
     Columns,
-    Draw,
     FloatArray,
     Outcome,
+    Outcomes,
     U,
     outcome,
     plain,
 )
-from comparisons.experiments.stability.harness.steps import Rays, traced
+from comparisons.experiments.stability.harness.rays import Rays
+from comparisons.experiments.stability.harness.series import Draw
 from comparisons.geometry.affine import across, unit_vectors
 from comparisons.geometry.exact import KINDS, first_of
 from comparisons.geometry.exact.dyadic import (
@@ -302,7 +302,7 @@ def mitsubas(rays: Rays) -> FloatArray:
     return t
 
 
-def compete(draw: Draw, rays: Rays, strict: bool = False) -> Mapping[str, Outcome]:
+def compete(draw: Draw, rays: Rays, strict: bool = False) -> Outcomes:
     """All on the same rays; Mitsuba on some of them, rounded to float32 with their spheres, against
     the exact answer for these and the law in float32's u.  strict: see `Truth`."""
     truth = Truth(rays, strict=strict)

@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Sweep
+from comparisons.experiments.stability.harness.outcomes import MITSUBA, OURS, FloatArray
+from comparisons.experiments.stability.harness.series import Draw, Sweep
 from comparisons.geometry.exact.crossings import IntArray
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.core import FloatArray
+from comparisons.experiments.stability.harness.outcomes import FloatArray
 from comparisons.geometry.affine import unit_vectors
 from comparisons.mitsuba.backend import mitsuba
 from reference_rt.core.arrays import IntArray

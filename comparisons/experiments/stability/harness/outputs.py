@@ -11,15 +11,11 @@ from typing import Any
 from markupsafe import Markup
 from rich.console import RenderableType
 
-from comparisons.experiments.stability.harness.core import (
-    MITSUBA,
-    OURS,
-    Effort,
+from comparisons.experiments.stability.harness.outcomes import MITSUBA, OURS, Outcome
+from comparisons.experiments.stability.harness.points import (
     Found,
-    Outcome,
     SeriesSummary,
     contestants,
-    family,
     first_failure,
     found_of,
     named,
@@ -28,6 +24,7 @@ from comparisons.experiments.stability.harness.core import (
     total,
 )
 from comparisons.experiments.stability.harness.run import Picture
+from comparisons.experiments.stability.harness.series import Effort, family
 from comparisons.report.plots import Curve, log_log
 from comparisons.report.templates import template, write
 from comparisons.report.terminal import fitted

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import trimesh
 from collections.abc import Mapping
 
-from comparisons.experiments.stability.harness.core import FloatArray, Outcome, outcome
+from comparisons.experiments.stability.harness.outcomes import FloatArray, Outcome, outcome
 from comparisons.geometry.exact.dyadic import BoolArray
 
 SIZE = 4.0

@@ -40,15 +40,16 @@ import numpy as np
 from scipy import stats
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.core import (
+from comparisons.experiments.stability.harness.in_mitsuba import rendered
+from comparisons.experiments.stability.harness.outcomes import (
     MITSUBA,
     OURS,
-    Draw,
     FloatArray,
-    Outcome,
+    Outcomes,
     one_case,
 )
-from comparisons.experiments.stability.harness.steps import at, rendered, scaled, turned
+from comparisons.experiments.stability.harness.series import Draw
+from comparisons.experiments.stability.harness.steps import at, scaled, turned
 from comparisons.mitsuba.backend import scalar
 
 LEVEL = 1e-8
@@ -195,7 +196,7 @@ def judge(
     expected: float,
     rounding: Callable[[str], float],
     shown: Mapping[str, Any],
-) -> dict[str, Outcome]:
+) -> Outcomes:
     """One case: the mean is finite and, in two stages of `fails`, the expected one, to noise, of
     `MOST` at most, and rounding.  The worst is relative."""
     found = {}
@@ -222,7 +223,7 @@ def measure(
     pixels: int = 32,
     in_scalar: bool = True,
     their_pixels: int = 16,
-) -> dict[str, Outcome]:
+) -> Outcomes:
     first, again = draw.rng.integers(1, 2**31, 2).tolist()
 
     def mitsubas(seed: int, spp: int) -> FloatArray:

@@ -10,9 +10,16 @@ import numpy as np
 import reference_rt as rt
 from comparisons.experiments.relations import REACH, Motion, moved
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
+from comparisons.experiments.stability.harness.in_mitsuba import rendered
+from comparisons.experiments.stability.harness.outcomes import (
+    MITSUBA,
+    OURS,
+    FloatArray,
+    Outcome,
+    Outcomes,
+)
 from comparisons.experiments.stability.harness.scenes import SIZE, of_pixels
-from comparisons.experiments.stability.harness.steps import rendered
+from comparisons.experiments.stability.harness.series import Draw
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.frame import UNIT_ROUNDOFF as U32
 from comparisons.mitsuba.backend import scalar
@@ -159,7 +166,7 @@ def _anywhere(rng: np.random.Generator, shift: float, part: object) -> FloatArra
     return np.asarray(shift / np.linalg.norm(v) * v)
 
 
-def under(motion: Callable[[float], Motion], draw: Draw, x: float) -> dict[str, Outcome]:
+def under(motion: Callable[[float], Motion], draw: Draw, x: float) -> Outcomes:
     """Both lit scenes; Mitsuba renders the path-traced one alone."""
     path = scenes.path(draw.folder)
     found = {OURS: judged(OURS, path, motion(x))}

@@ -8,18 +8,19 @@ import numpy.typing as npt
 
 import reference_rt as rt
 from comparisons.experiments.relations import Identities, Motion, Names, identities_of
-from comparisons.experiments.stability.harness.core import (
+from comparisons.experiments.stability.harness.in_mitsuba import traced
+from comparisons.experiments.stability.harness.outcomes import (
     MITSUBA,
     OURS,
     Columns,
     FloatArray,
     Outcome,
+    Outcomes,
     hexed,
     outcome,
 )
 from comparisons.experiments.stability.harness.scenes import GRID
 from comparisons.experiments.stability.harness.solids import Truth, truths
-from comparisons.experiments.stability.harness.steps import traced
 from comparisons.geometry.affine import unit_rows
 from comparisons.geometry.exact.dyadic import BoolArray, nearest
 from comparisons.geometry.exact.referee import Referee
@@ -105,8 +106,6 @@ class Judge:
             found.append(Met({k: some[ray] for k, some in solids.items()}, first, t))
         return found
 
-
-Outcomes = dict[str, Outcome]
 
 HALVINGS = 50
 """Steps that close in on an edge: until two rays differ by float64's rounding."""
