@@ -83,7 +83,9 @@ def by_second(shape: Mesh | Triangle, folder: Path, ours: Corners) -> Corners | 
         found = _in_order(known, ours)
     if shape.face_normals:
         found = replace(found, normals=None, silent=tuple({*found.silent} - {"normals"}))
-    elif found.normals is None and ours.bent is not None:
+    elif found.normals is None and (
+        ours.bent is not None or (shape.smooth and "normals" not in found.silent)
+    ):
         # In float32 the small triangles of a mesh that is far away would have other normals.
         points = _refined(found.points, ours.points)
         uv = ours.uv if "uv" in found.silent else found.uv

@@ -14,25 +14,32 @@ from builders import HELPERS
 from typer.testing import CliRunner
 
 from comparisons.commands import register
-from comparisons.experiments.stability.harness import core, outputs, run
+from comparisons.experiments.stability.harness import outputs, run, series
 from comparisons.experiments.stability.harness.outcomes import OURS, Outcome, outcome
+from comparisons.experiments.stability.harness.points import Found, summarise
 from comparisons.experiments.stability.harness.series import Family, Series, Sweep
-from comparisons.experiments.stability.harness.points import Found
-from comparisons.experiments.stability.harness.outputs import summarise
 
 
 @pytest.fixture
-def fakes(monkeypatch):
-    monkeypatch.setattr(core, "MODULES", dict(core.MODULES))
+def alone(monkeypatch):
+    """No families."""
+    monkeypatch.setattr(series, "_REGISTERED", {})
+    before = dict(series.MODULES)
+    modules = set(sys.modules)
+    yield
+    series.MODULES.clear()
+    series.MODULES.update(before)
+    for name in set(sys.modules) - modules:
+        if name.startswith(f"{series.FAMILIES}.T"):
+            del sys.modules[name]
+
+
+@pytest.fixture
+def fakes(alone, monkeypatch):
     monkeypatch.setattr(run, "WORKER", ("stability_fakes",))
     before = os.environ.get("PYTHONPATH", "")
     monkeypatch.setenv("PYTHONPATH", f"{HELPERS}{os.pathsep}{before}".rstrip(os.pathsep))
-    modules = set(sys.modules)
     stability_fakes.install()
-    yield
-    for name in set(sys.modules) - modules:
-        if name.startswith("comparisons.experiments.stability.T"):
-            del sys.modules[name]
 
 
 def stability(out, *options):
@@ -141,7 +148,7 @@ def test_rows_of_the_first_failures_are_shown():
     assert [example["number"] for example in found.examples] == [1, 3, 4]
 
 
-def test_a_lead_that_is_too_small_must_be_explained():
+def test_a_lead_that_is_too_small_must_be_explained(alone, monkeypatch):
     """Ours twice as far as Mitsuba is less than 29 bits allow."""
     found = [
         Found("T", "far", x, {OURS: Outcome(1, int(x > 4)), "mitsuba": Outcome(1, int(x > 2))}, 0.0)
@@ -150,8 +157,10 @@ def test_a_lead_that_is_too_small_must_be_explained():
     for explained in ("", "since it is so"):
         sweep = Sweep("x", (1.0, 2.0, 4.0, 8.0), (), 1, 1)
         end = {"holds_to": 4.0, "law": "four", "explained": explained}
-        series = Series("far", sweep, "", lambda *_: {}, **end)
-        (one,) = summarise(Family("T", "", "", (series,)), found)
+        monkeypatch.setattr(series, "_REGISTERED", {})
+        family = Family("T", "", "")
+        stability_fakes.install({family: (Series("far", sweep, "", lambda *_: {}, **end),)})
+        (one,) = summarise(family, found)
         assert one.further == 2.0
         assert one.holds
         assert one.unexplained == (not explained)

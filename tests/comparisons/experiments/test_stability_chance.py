@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from comparisons.experiments.stability import furnaces as f10_furnaces
+from comparisons.experiments.stability import furnaces
 from comparisons.experiments.stability.bsdfs.samples import PURE
 from comparisons.experiments.stability.furnaces import COSINES
 from comparisons.experiments.stability.harness import worlds
@@ -19,7 +19,7 @@ def test_the_level_of_a_full_run_is_that_of_all_its_tests() -> None:
     """The table of `worlds`, counted; the areas and radiances of 1 are drawn once."""
     f10, f11, f12 = (family(name).by_name for name in ("F10", "F11", "F12"))
     closed = len(f10["closed furnace"].values)
-    opened = len(f10["open furnace"].values) * len(f10_furnaces._white(0.1)) * len(COSINES)
+    opened = len(f10["open furnace"].values) * len(furnaces._white(0.1)) * len(COSINES)
     densities = len(f11["densities"].values) * len(PURE) * 3
     lamps = [
         (2 * len(f12[name].values) - 1) * kinds
