@@ -300,10 +300,10 @@ def convert(
     """
     with compare_extra("converting"):
         from comparisons.gltf import write_gltf
-        from comparisons.mitsuba.writing import write_xml
-        from comparisons.mitsuba.writing.files import SUFFIXES, check_name, folder_of, write_scene
-        from comparisons.mitsuba.writing.resolved import write_resolved
+        from comparisons.mitsuba.files import SUFFIXES, check_name, folder_of, write_scene
         from comparisons.pbrt import write_pbrt
+        from comparisons.translator.resolved import write_resolved
+        from comparisons.translator.writing import write_xml
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.files import check_writable
 

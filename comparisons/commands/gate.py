@@ -182,11 +182,11 @@ def gate(
         from comparisons.gate.reference import SizeError, is_noise_free
         from comparisons.gate.request import Request, gated
         from comparisons.gate.rounds import Rounds, gated_renderer
-        from comparisons.mitsuba.writing.resolved import write_resolved
         from comparisons.renderers import witness_facts
         from comparisons.report import terminal
         from comparisons.results.case import trace_command
         from comparisons.results.headline import headline
+        from comparisons.translator.resolved import write_resolved
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.console import ProgressLine
 

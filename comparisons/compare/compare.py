@@ -16,18 +16,18 @@ from comparisons.compare.budget import LEAST, Budget
 from comparisons.compare.judge import Evidence, Rendered, judge, of_replicates, picture_rungs
 from comparisons.compare.path_length import path_lengths
 from comparisons.geometry.flatten import copies_of
+from comparisons.lights.translate import in_place_of
 from comparisons.mitsuba import backend
 from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.counterpart import Counterpart
-from comparisons.mitsuba.notes import notes_of
-from comparisons.mitsuba.reading.reference import changes_to, file_of, own_scene
-from comparisons.mitsuba.translate import MOST_INSTANCES, UntranslatableError, load
-from comparisons.mitsuba.translate.lights import in_place_of
-from comparisons.mitsuba.translate.moved import with_float32_vertices
 from comparisons.results.case import Case, Images, RungResult
 from comparisons.rungs.layers.rung import applies
 from comparisons.rungs.witness import witness_of
+from comparisons.translator import MOST_INSTANCES, UntranslatableError, load
+from comparisons.translator.moved import with_float32_vertices
+from comparisons.translator.notes import notes_of
+from comparisons.translator.reference import changes_to, file_of, own_scene
 from reference_rt.cameras.film import BoxFilter, Film
 from reference_rt.cli.explain import explain
 from reference_rt.core.arrays import FloatArray

@@ -21,12 +21,12 @@ import numpy as np
 from scipy import special
 
 from comparisons import statistics
+from comparisons.lights.translate import of_solids
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.lit_scene import LitScene
 from comparisons.mitsuba.plugins.base import is_wide
 from comparisons.mitsuba.scene import picture
-from comparisons.mitsuba.translate.lights import of_solids
 from comparisons.results.case import FloatArray, RungResult
 from reference_rt.integrators import Path
 from reference_rt.materials import Dielectric, RoughDielectric

@@ -19,14 +19,14 @@ from typing import Any
 import numpy as np
 
 import reference_rt as rt
+from comparisons.cameras.translate import focus_of
 from comparisons.cycles.surfaces import Surface, name_of, surface_of
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import copies_of, place_of
 from comparisons.geometry.frame import SHARE, round32
 from comparisons.mitsuba.second import described_image
-from comparisons.mitsuba.translate.cameras import focus_of
-from comparisons.mitsuba.translate.moved import frame_of, moved
 from comparisons.renderers import NoCounterpartError
+from comparisons.translator.moved import frame_of, moved
 from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
 from reference_rt.cameras.film import BoxFilter
 from reference_rt.core.arrays import FloatArray
@@ -474,7 +474,7 @@ MEASURED = 10_000
 
 def _holds(corners: FloatArray) -> bool:
     """Whether float32 moves the corners of triangles by at most a hundredth of the shortest edge's
-    usual length (the median), as in `mitsuba.translate.moved`."""
+    usual length (the median), as in `translator.moved`."""
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).min(axis=1)
     moved = np.abs(round32(corners) - corners).max()
     return bool(moved <= SHARE * np.median(edges))

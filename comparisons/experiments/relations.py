@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from comparisons.geometry.frame import Frame
-from comparisons.mitsuba.translate.moved import moved as in_frame
+from comparisons.translator.moved import moved as in_frame
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray
 from reference_rt.lights import Directional, Point, Spot

@@ -19,13 +19,13 @@ import numpy as np
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import Copy, Leaf, copies_of
 from comparisons.gltf.surfaces import MATTE, Surfaces
-from comparisons.mitsuba.writing.files import (
+from comparisons.mitsuba.files import (
     Files,
     UnwritableError,
     check_name,
     write_files,
 )
-from comparisons.mitsuba.writing.resolved import (
+from comparisons.translator.resolved import (
     Tessellated,
     camera_of,
     flat_normals,

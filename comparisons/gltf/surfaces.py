@@ -11,7 +11,7 @@ import numpy.typing as npt
 from PIL import Image
 
 from comparisons.geometry import affine
-from comparisons.mitsuba.writing.files import Losses, UnwritableError
+from comparisons.mitsuba.files import Losses, UnwritableError
 from reference_rt import materials
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, luminance

@@ -1,12 +1,13 @@
-"""Mitsuba: how it is loaded, our scenes translated to it, and its hits and pictures.
+"""Mitsuba: how it is loaded, its scene files, and its hits and pictures.
 
 - `backend`, `llvm_libraries`: which variant of Mitsuba runs, with which LLVM.
-- `translate`: Scene -> Mitsuba; `plugins`: materials and an integrator that Mitsuba lacks.
+- `plugins`: materials and an integrator that Mitsuba lacks.
+- `parse`, `included`, `node`: what its own parser reads of its scene files; `files`: written ones.
 - `counterpart`: the loaded scene (`Counterpart`) and `trace`, its first hits; `csg`: those of
   solids.
 - `hits`: how each Mitsuba shape represents ours, and its hits in our numbering; `scene`: rays and
   pictures as NumPy arrays.
-- `accuracy`, `notes`: errors of tables and of Mitsuba's own materials.
+- `second`: the files of our scenes, read by other libraries.
 
 Arrays are float64, lengths in scene units, angles of normals in radians; Mitsuba rounds to float32.
 -1 is a miss or no instance, an error of 0 means exact.  Everything that needs Mitsuba raises

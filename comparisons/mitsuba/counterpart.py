@@ -30,7 +30,7 @@ from reference_rt.rendering.query import Intersections
 class InstancedGroup(NamedTuple):
     """All instances of a scene with many, in a scene of Mitsuba's scalar variant.
 
-    Other variants compile code for every shape, half a minute for a thousand instances.  pieces:
+    Other variants compile code for every shape, half a minute for a thousand instances.  mi_shapes:
     the primitives that the instances represent, by id.
     """
 

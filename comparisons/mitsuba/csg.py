@@ -80,7 +80,7 @@ EVERYWHERE = Box(np.full(3, -np.inf), np.full(3, np.inf))
 
 
 class Operand(NamedTuple):
-    """mi_scene: the operand's own Mitsuba scene;  pieces: its shapes, by id;  leaf, place: the
+    """mi_scene: the operand's own Mitsuba scene;  mi_shapes: its shapes, by id;  leaf, place: the
     primitive and its placement."""
 
     mi_scene: Any

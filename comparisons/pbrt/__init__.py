@@ -21,9 +21,9 @@ from scipy.ndimage import map_coordinates
 
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import Leaf, Member, copies_of
-from comparisons.mitsuba.writing.files import Files, UnwritableError, check_name, ply, write_files
-from comparisons.mitsuba.writing.resolved import Tessellated, placed, tessellated
+from comparisons.mitsuba.files import Files, UnwritableError, check_name, ply, write_files
 from comparisons.pbrt.surfaces import Params, Writing, words
+from comparisons.translator.resolved import Tessellated, placed, tessellated
 from reference_rt import lights
 from reference_rt.cameras import Orthographic, Pinhole, ThinLens, film
 from reference_rt.cameras.view_rectangle import by_width

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.geometry import affine
-from comparisons.mitsuba.writing.files import Files, Losses, UnwritableError
+from comparisons.mitsuba.files import Files, Losses, UnwritableError
 from reference_rt import materials
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.exr import write_exr

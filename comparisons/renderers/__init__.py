@@ -60,7 +60,7 @@ class Renderer(Protocol):
         SceneError for a file that cannot be used."""
 
 
-PLACES = {"mitsuba": "comparisons.mitsuba.native", "cycles": "comparisons.cycles.backend"}
+PLACES = {"mitsuba": "comparisons.translator.native", "cycles": "comparisons.cycles.backend"}
 """The modules of the other renderers, by name.  Imported when one is needed."""
 
 ReferenceSampler = Literal["independent", "multijitter"]

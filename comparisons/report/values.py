@@ -69,7 +69,7 @@ def soft(name: str) -> Markup:
 
 
 def label(name: object) -> str:
-    """`worst_tile_x` -> `worst tile x`"""
+    """A key such as `p_value` in words: p value."""
     return str(name).replace("_", " ")
 
 

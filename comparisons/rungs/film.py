@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from comparisons.cameras.translate import translate_filter
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
-from comparisons.mitsuba.translate.cameras import translate_filter
 from comparisons.results.case import RungResult
 from reference_rt.cameras import Orthographic
 from reference_rt.cameras.film import Film, Filter, GaussianFilter, film_offset

@@ -311,7 +311,7 @@ def geometry(
 
 TOGETHER = 2.0**-40
 """See `Referee`: a thousand times the rounding of tables, and a thousandth of the tolerance of our
-t, `rays.judgement.SHARE`."""
+t, `SHARE`."""
 
 LISTED = 20
 """Most rays that are listed of those that Mitsuba gets wrong."""

@@ -9,12 +9,11 @@ from scipy import optimize
 
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF, round32
 from comparisons.geometry.sizes import ShapeSizes
-from comparisons.mitsuba.accuracy import accuracy, coat_error
+from comparisons.lights.translate import SAMPLED, ambient_of, translate_integrator
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.plugins.whitted import MOST_COMPONENTS
 from comparisons.mitsuba.scene import for_rays
-from comparisons.mitsuba.translate.lights import SAMPLED, ambient_of, translate_integrator
 from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.arbiter import NEIGHBOURS, RADII, BoolArray, directions
@@ -22,6 +21,7 @@ from comparisons.rungs.rays.coincidence import is_steep, moved, on_two_surfaces,
 from comparisons.rungs.rays.lamp_images import changes_of_lamps
 from comparisons.rungs.rays.light_error import LightContext, cut_off, of_direct_light
 from comparisons.rungs.rays.rays import Rays, described, pixel_rays
+from comparisons.translator.accuracy import accuracy, coat_error
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import Whitted
 from reference_rt.integrators.scene_tables import SceneTables

@@ -93,7 +93,7 @@ def unseen_words(found: Unseen) -> str:
 
 
 def image_numbers(test: BiasTest) -> dict[str, Any]:
-    """Numbers by channel; names that end in `_of_bias` or `_bias` are fractions of the mean."""
+    """Numbers by channel; names that end in _of_bias or _bias are fractions of the mean."""
     return {
         "relative_bias": channels(test.relative),
         "standard_error_of_bias": channels(test.over_scale(test.standard_error)),

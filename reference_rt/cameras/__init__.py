@@ -7,7 +7,7 @@ kernel camera_ray(view, x, y, lens) -> `Ray` with a unit direction and no end, f
 lens_sample(view, sampler), which draws the lens point.
 
 To add a camera: its description and kernel, in a module that has no other `camera_ray`; `AnyCamera`
-and the registrations below; a translator function in `comparisons.mitsuba.translate`; a scene; a
+and the registrations below; a translator function in `comparisons.translator`; a scene; a
 row in the tests' tuple.
 """
 

@@ -9,7 +9,7 @@ sum of their weights.  With Sobol' points the samples of each sign are a sequenc
 `Strata`.  Lengths are in pixels.
 
 To add a filter: its description, a `TabulatedFilter` by default; `AnyFilter`; a translator function
-in `comparisons.mitsuba.translate`; a scene.
+in `comparisons.translator`; a scene.
 """
 
 import functools

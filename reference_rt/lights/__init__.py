@@ -20,7 +20,7 @@ Shapes whose material is `emissive` are lights too (`emitters/area.py`).
 
 To add a light: a file in `emitters/`; a code in `light.py`; in `tables.py` a field of `Lights`
 and a line in `TABLES`; below, a member of `AnyLight` and a line in `TABLES`; a translator in
-`comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.  Step by step:
+`comparisons.translator`; a scene; a row in the tests' tuple.  Step by step:
 docs/extending.md.
 """
 

@@ -17,7 +17,7 @@ Call `prepare` once at each hit, before the others.  Then
 
 To add a material: a file in `bsdfs/` or, if it is made of others, in `nested/`, whose docstrings
 say what else is needed; a member of `AnyMaterial` below; a translator in
-`comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.  Step by step:
+`comparisons.translator`; a scene; a row in the tests' tuple.  Step by step:
 docs/extending.md.
 """
 

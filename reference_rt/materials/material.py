@@ -144,7 +144,7 @@ INV_PI = 1.0 / math.pi
 class Shading(NamedTuple):
     """point: of the surface;  frame: the shading frame, n = `point.ns`;  wo: towards the viewer,
     local;  at: where textures are looked up;  tangents: dp/du and dp/dv, local, 0 for a
-    material that is not `oriented`;  layers: the scratch buffer that `prepare` fills with the
+    material that is not `oriented`;  flat_leaves: the scratch buffer that `prepare` fills with the
     material's flattened leaves, empty if no material of the scene is nested."""
 
     point: SurfacePoint

@@ -21,7 +21,7 @@ world coordinates and scene units, for row i of the table or the row of a hit:
 - `nearer` of shapes that `ray_simd.py` tests against several rays at once, with `arguments(table,
   i)`, what its `distance` takes of a row, and `found(table, i, ray, t)`, the crossing at t.
 
-To add a shape: its file; what `tables.py` says; a translator in `comparisons.mitsuba.translate`; a
+To add a shape: its file; what `tables.py` says; a translator in `comparisons.translator`; a
 scene; a row in the tests' tuple.  Step by step: docs/extending.md.
 """
 

@@ -7,7 +7,7 @@ range; and, where it depends on (u, v), `lookup(table, row, u, v)`, after the te
 
 To add a texture: its module; a code in `texture.py`; in `lookup.py` a field of `Textures` and a
 branch; below, `AnyTexture` and a line in `TABLES`; a translator function in
-`comparisons.mitsuba.translate`; a scene; a row in the tests' tuple.
+`comparisons.translator`; a scene; a row in the tests' tuple.
 """
 
 from typing import Annotated, Any

@@ -18,9 +18,9 @@ from comparisons.commands.compare import compare, report, suite
 from comparisons.gate import reference
 from comparisons.gate.browser import PageError, chromium_program
 from comparisons.mitsuba.backend import Backend
-from comparisons.mitsuba.translate import load
 from comparisons.report import write_report
 from comparisons.suites import run
+from comparisons.translator import load
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering.scene import Scene

@@ -9,9 +9,9 @@ import pytest
 
 from comparisons.geometry.frame import OURS
 from comparisons.mitsuba.backend import scalar
-from comparisons.mitsuba.translate import load
-from comparisons.mitsuba.translate.shapes import canonical, primitives
-from comparisons.mitsuba.translate.shapes.stand_ins import coarser
+from comparisons.shapes import canonical, primitives
+from comparisons.shapes.stand_ins import coarser
+from comparisons.translator import load
 from reference_rt import Scene
 
 

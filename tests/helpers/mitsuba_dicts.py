@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.reading import read_dict
 from comparisons.mitsuba.scene import for_rays
+from comparisons.translator.reading import read_dict
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
 

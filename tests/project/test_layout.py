@@ -17,9 +17,9 @@ FLOORS = {
         *("textbook", "cli"),
     ),
     "comparisons": (
-        *("results", "geometry", "statistics", "renderers", "mitsuba", "pbrt", "gltf", "runs"),
-        *("cycles", "rungs", "report", "compare", "gate", "truth", "suites", "experiments"),
-        "commands",
+        *("results", "geometry", "statistics", "renderers", "mitsuba", "textures", "materials"),
+        *("cameras", "lights", "shapes", "translator", "pbrt", "gltf", "runs", "cycles", "rungs"),
+        *("report", "compare", "gate", "truth", "suites", "experiments", "commands"),
     ),
 }
 """The folders of each package from the lowest to the highest: a file may import files of its own

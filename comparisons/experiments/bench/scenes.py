@@ -368,7 +368,7 @@ def cornell_box(setting: Setting) -> Scene:
 def _samples_row(name: str, setting: Setting) -> Row:
     from comparisons.mitsuba import scene as mitsuba_scene
     from comparisons.mitsuba.backend import variant
-    from comparisons.mitsuba.translate import load
+    from comparisons.translator import load
 
     mitsuba_variant, goal = VARIANTS[name]
     scene = cornell_box(setting)

@@ -20,11 +20,11 @@ from comparisons.experiments.convergence.store import (
     weights,
 )
 from comparisons.mitsuba.backend import LLVM, SCALAR
-from comparisons.mitsuba.native import Native
-from comparisons.mitsuba.notes import notes_of
 from comparisons.renderers import NoCounterpartError, other
 from comparisons.renderers import Renderer as Other
 from comparisons.runs.elsewhere import cool_down
+from comparisons.translator.native import Native
+from comparisons.translator.notes import notes_of
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.render import Progress, render
 from reference_rt.rendering.scene import Scene

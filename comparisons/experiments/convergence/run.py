@@ -52,10 +52,10 @@ from comparisons.experiments.convergence.store import (
     weights,
 )
 from comparisons.mitsuba.backend import SCALAR, backend
-from comparisons.mitsuba.native import failing
-from comparisons.mitsuba.translate import UntranslatableError, load
 from comparisons.renderers import NoCounterpartError
 from comparisons.suites.suite import Changes, read
+from comparisons.translator import UntranslatableError, load
+from comparisons.translator.native import failing
 from reference_rt.cameras.film import BoxFilter
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import RayCast

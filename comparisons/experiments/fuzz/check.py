@@ -28,12 +28,12 @@ from comparisons.experiments.fuzz.generate import parse
 from comparisons.experiments.fuzz.identities import IDENTITIES, Original
 from comparisons.experiments.fuzz.reduce import renamed, without_unused
 from comparisons.geometry.flatten import copies_of
-from comparisons.mitsuba.translate.materials import is_textured
-from comparisons.mitsuba.translate.shapes.stand_ins import coarser
-from comparisons.mitsuba.translate.textures import TranslationContext
+from comparisons.materials.translate import is_textured
 from comparisons.results.case import Case, RungResult
 from comparisons.results.rungs import OF_LIGHT
 from comparisons.rungs.limited import limited
+from comparisons.shapes.stand_ins import coarser
+from comparisons.textures.translate import TranslationContext
 from reference_rt.materials import (
     Blend,
     Bump,

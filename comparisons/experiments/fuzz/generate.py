@@ -352,7 +352,7 @@ def _wanted(draw: Draw, features: tuple[str, ...]) -> dict[str, list[str]]:
 def _far(draw: Draw, scene: Data) -> Data:
     """The scene, far from the origin or of another size; a camera's lengths too."""
     from comparisons.geometry.frame import Frame
-    from comparisons.mitsuba.translate.moved import moved
+    from comparisons.translator.moved import moved
 
     size = 2.0 ** int(draw.rng.integers(-12, 13))
     center = (0.0, 0.0, 0.0)

@@ -34,11 +34,11 @@ from comparisons.gate.request import Request as GateRequest
 from comparisons.gate.rounds import Rounds, gated_renderer
 from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.mitsuba.backend import FORCE, SCALAR
-from comparisons.mitsuba.translate import load
 from comparisons.report.thumbnails import png_url
 from comparisons.results.case import Case, RungResult
 from comparisons.runs.processes import serve
 from comparisons.statistics.metrics import encode, white_level
+from comparisons.translator import load
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.rendering.image import display

@@ -20,8 +20,8 @@ from comparisons.gate.gate import LIMIT, gate_pictures, look
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference
 from comparisons.mitsuba import scene as mitsuba_scene
-from comparisons.mitsuba.translate import load
 from comparisons.runs.elsewhere import run_elsewhere
+from comparisons.translator import load
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene

@@ -21,7 +21,7 @@ slopes of a bump map are a tenth off.  Where the angle around the axis does not 
 of constant z, as on the diagonals of a saddle, the tangents of a mesh have any direction.
 
 This plugin gives the nested material the surface's own uv and derivatives, computed at the point
-that was hit (`comparisons.mitsuba.coordinates`), and the shading frame whose x axis follows dp/du.
+that was hit, and the shading frame whose x axis follows dp/du.
 It is not for instances, in which it does not know the place of the surface.
 """
 

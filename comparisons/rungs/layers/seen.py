@@ -6,18 +6,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from comparisons.cameras.translate import translate_filter
 from comparisons.geometry.sizes import LeafSizes, ShapeSizes
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.hits import MitsubaHits, rows_of
 from comparisons.mitsuba.scene import for_rays
-from comparisons.mitsuba.translate.cameras import translate_filter
-from comparisons.mitsuba.translate.textures import TranslationContext, translate_texture
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.camera import camera_rays, ends
 from comparisons.rungs.rays.comparer import KINDS, Comparer
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.rays.resolution import slide
+from comparisons.textures.translate import TranslationContext, translate_texture
 from reference_rt.cameras.film import Filter
 from reference_rt.core.arrays import FloatArray, IdArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from comparisons.cameras.translate import FAR, NEAR
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.scene import for_rays
-from comparisons.mitsuba.translate.cameras import FAR, NEAR
 from reference_rt.cameras import LENS_CENTRE, ThinLens
 from reference_rt.cameras.film import Film
 from reference_rt.core.arrays import FloatArray

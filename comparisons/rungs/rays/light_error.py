@@ -8,12 +8,12 @@ import numpy as np
 
 from comparisons.geometry.frame import UNIT_ROUNDOFF
 from comparisons.geometry.sizes import ShapeSizes
-from comparisons.mitsuba.accuracy import PASSED, accuracy, coat_error, is_tilted
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.hits import MitsubaHits, rows_of
 from comparisons.rungs.rays.coincidence import is_steep, moved, slopes, turned
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.rays.resolution import slide
+from comparisons.translator.accuracy import PASSED, accuracy, coat_error, is_tilted
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.lights import (
@@ -196,7 +196,7 @@ def cut_off(scene: Scene) -> float:
 
 
 def _of_leaves(context: LightContext, error: Callable[[Scene, str], float]) -> FloatArray:
-    """(n,): an error of the hit materials, see `comparisons.mitsuba.accuracy`."""
+    """(n,): an error of the hit materials, see `comparisons.translator.accuracy`."""
     scene, names = context.scene, [of.material for of in context.sizes.leaves]
     by_leaf = np.array([error(scene, name) if name else 0.0 for name in names] + [0.0])
     return np.asarray(by_leaf[context.sizes.leaf_of(context.hits)])

@@ -74,8 +74,8 @@ NOTHING = -1
 
 @kernel
 def leaf_code(first: int, size: int, is_triangle_leaf: bool) -> int:
-    """The code of a leaf of references first..first + size, at most LEAF_SHARE;  is_packet: all are
-    triangles, with vertices in `Bvh.corners`."""
+    """The code of a leaf of references first..first + size, at most LEAF_SHARE;  is_triangle_leaf:
+    all are triangles, with vertices in `Bvh.corners`."""
     return -1 - (32 * first + 2 * size + int(is_triangle_leaf))
 
 

@@ -1,7 +1,7 @@
 """Quadric: a surface of second degree, clipped to a box; how rows of the table are made.
 
 Cylinders, cones and ellipsoids are rows of the same table.  The local coordinates of a row are
-those of `quadratic_form.fit`.
+those of `fit`.
 """
 
 from collections.abc import Sequence

@@ -12,13 +12,13 @@ from typer.testing import CliRunner, Result
 
 import comparisons.commands.register
 import comparisons.compare.compare
-import comparisons.mitsuba.translate
+import comparisons.translator
 from comparisons.compare.budget import Budget
 from comparisons.compare.pictures import layers
 from comparisons.mitsuba import scene as mitsuba_scene
-from comparisons.mitsuba.translate import UntranslatableError, load
 from comparisons.renderers import ReferenceSampler
 from comparisons.results.case import Case, exit_code
+from comparisons.translator import UntranslatableError, load
 from reference_rt.cli.main import app
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
@@ -47,7 +47,7 @@ def test_layers_are_the_hits_of_both_sides() -> None:
     scene = Scene.load(SCENES / "spheres_whitted.yaml")
     film = scene.film.model_copy(update={"width": 24, "height": 15})
     scene = scene.changed(film=film)
-    tables, counterpart = build_tables(scene), comparisons.mitsuba.translate.load(scene)
+    tables, counterpart = build_tables(scene), comparisons.translator.load(scene)
     found = layers(scene, tables, counterpart)
     hit = found["distance"][0][..., 0] > 0.0
     assert 0 < hit.sum() < hit.size
@@ -114,7 +114,7 @@ def test_path_tracing_is_compared_by_replicates(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_wrong_light_differs_at_its_rung(monkeypatch: pytest.MonkeyPatch) -> None:
-    translate = comparisons.mitsuba.translate.translate_light
+    translate = comparisons.translator.translate_light
 
     def brighter(light: Any, around: Any) -> dict[str, Any]:
         emitter = translate(light, around)
@@ -123,7 +123,7 @@ def test_wrong_light_differs_at_its_rung(monkeypatch: pytest.MonkeyPatch) -> Non
             emitter["intensity"]["value"] = [1.01 * x for x in emitter["intensity"]["value"]]
         return emitter
 
-    monkeypatch.setattr(comparisons.mitsuba.translate, "translate_light", brighter)
+    monkeypatch.setattr(comparisons.translator, "translate_light", brighter)
     case = compared_here(Budget(size=(48, 32)))
     assert case.verdict == "differ"
     assert case.reason.startswith("direct:")
@@ -137,7 +137,7 @@ def test_type_without_translation_is_not_comparable(monkeypatch: pytest.MonkeyPa
     def refuse(light: Any, around: Any) -> dict[str, Any]:
         raise UntranslatableError(light, "light")
 
-    monkeypatch.setattr(comparisons.mitsuba.translate, "translate_light", refuse)
+    monkeypatch.setattr(comparisons.translator, "translate_light", refuse)
     case = compared_here(Budget())
     assert case.verdict == "not-comparable"
     assert "light Point" in case.reason

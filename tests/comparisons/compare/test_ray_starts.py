@@ -14,8 +14,8 @@ from comparisons.compare.judge import Evidence, judge, of_replicates
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.plugins.base import is_wide
 from comparisons.mitsuba.scene import picture
-from comparisons.mitsuba.translate import load
 from comparisons.results.case import RungResult
+from comparisons.translator import load
 from reference_rt.lights import Constant
 from reference_rt.rendering.scene import Scene
 

@@ -35,7 +35,7 @@ from comparisons.experiments.convergence.store import (
     size_within,
     weights,
 )
-from comparisons.mitsuba.translate import to_mitsuba
+from comparisons.translator import to_mitsuba
 from reference_rt.cameras.film import BoxFilter, Film
 from reference_rt.cli.main import app
 from reference_rt.rendering.scene import Scene

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from stiff_scenes import scene
 
-from comparisons.mitsuba.translate import load
-from comparisons.mitsuba.translate.moved import frame_of, moved
 from comparisons.results.case import RungResult
 from comparisons.rungs import direct
 from comparisons.rungs.limited import limited
 from comparisons.rungs.rays.camera import camera_rays
 from comparisons.rungs.rays.resolution import Resolution, resolution
+from comparisons.translator import load
+from comparisons.translator.moved import frame_of, moved
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.transform import Scale
 from reference_rt.integrators import Whitted

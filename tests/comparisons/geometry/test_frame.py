@@ -5,11 +5,11 @@ from stiff_scenes import FOLDER, STIFF, scene
 
 from comparisons.geometry.frame import RAY_EPSILON, SHARE, Frame, frame_for
 from comparisons.geometry.sizes import ShapeSizes
-from comparisons.mitsuba.translate import load
-from comparisons.mitsuba.translate.moved import frame_of, moved
 from comparisons.rungs import geometry
 from comparisons.rungs.rays.camera import camera_rays
 from comparisons.rungs.rays.rays import mixed_rays
+from comparisons.translator import load
+from comparisons.translator.moved import frame_of, moved
 from reference_rt.integrators import Whitted
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene

@@ -155,7 +155,7 @@ def test_without_mitsuba_the_error_says_how_to_install(monkeypatch: pytest.Monke
 
 
 def test_importing_the_comparisons_does_not_import_mitsuba() -> None:
-    modules = "comparisons.mitsuba.backend, comparisons.mitsuba.translate, comparisons.rungs"
+    modules = "comparisons.mitsuba.backend, comparisons.translator, comparisons.rungs"
     code = f"import sys, {modules}; sys.exit('mitsuba' in sys.modules or 'drjit' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
@@ -182,7 +182,7 @@ from types import ModuleType
 from comparisons.commands.doctor import checks
 from comparisons.mitsuba import backend
 from comparisons.mitsuba.llvm_libraries import LIBRARY
-from comparisons.mitsuba.writing import write_xml
+from comparisons.translator.writing import write_xml
 from reference_rt import Scene
 from reference_rt.util.errors import SceneError
 file = sys.argv[1]

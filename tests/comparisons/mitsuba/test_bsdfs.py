@@ -8,13 +8,13 @@ import pytest
 
 import reference_rt as rt
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
-from comparisons.mitsuba import accuracy
-from comparisons.mitsuba.accuracy import both_sides, clearcoat_error, directions, table_error
+from comparisons.materials.translate import translate_material
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.plugins.exact_coat import approximate_g1, exact_g1, smooth_reflectance
-from comparisons.mitsuba.translate.materials import translate_material
-from comparisons.mitsuba.translate.textures import TranslationContext
 from comparisons.rungs.rays import arbiter
+from comparisons.textures.translate import TranslationContext
+from comparisons.translator import accuracy
+from comparisons.translator.accuracy import both_sides, clearcoat_error, directions, table_error
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.materials import Material

@@ -8,8 +8,8 @@ from counterparts import coarse_meshes
 
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import trace
-from comparisons.mitsuba.translate import load
 from comparisons.rungs import geometry
+from comparisons.translator import load
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
 

@@ -23,10 +23,10 @@ from comparisons.mitsuba.plugins.exact_coordinates import (
     of_quadric,
 )
 from comparisons.mitsuba.scene import first_hits
-from comparisons.mitsuba.translate import UntranslatableError, load, to_mitsuba
-from comparisons.mitsuba.translate.shapes import meshes, stand_ins
-from comparisons.mitsuba.translate.shapes.stand_ins import coarser
 from comparisons.rungs import direct, layers, whitted
+from comparisons.shapes import meshes, stand_ins
+from comparisons.shapes.stand_ins import coarser
+from comparisons.translator import UntranslatableError, load, to_mitsuba
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene

@@ -20,10 +20,10 @@ from comparisons.compare.compare import Subject, compare_scene
 from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.lit_scene import LitScene
-from comparisons.mitsuba.notes import notes_of
 from comparisons.mitsuba.scene import for_rays, render
-from comparisons.mitsuba.translate import UntranslatableError, load, to_mitsuba
 from comparisons.rungs import direct, whitted
+from comparisons.translator import UntranslatableError, load, to_mitsuba
+from comparisons.translator.notes import notes_of
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
 

@@ -5,9 +5,9 @@ import pytest
 from counterparts import coarse_meshes
 
 from comparisons.mitsuba.backend import scalar
-from comparisons.mitsuba.translate import load
 from comparisons.results.case import RungResult
 from comparisons.rungs import geometry
+from comparisons.translator import load
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
 

@@ -11,10 +11,10 @@ from PIL import Image
 
 from comparisons.compare.pictures import whitted as whitted_pictures
 from comparisons.mitsuba.backend import mitsuba, scalar
-from comparisons.mitsuba.notes import notes_of
-from comparisons.mitsuba.translate import UntranslatableError, load, to_mitsuba
-from comparisons.mitsuba.translate.textures import TranslationContext
 from comparisons.rungs import direct, geometry, whitted
+from comparisons.textures.translate import TranslationContext
+from comparisons.translator import UntranslatableError, load, to_mitsuba
+from comparisons.translator.notes import notes_of
 from reference_rt.rendering.scene import Scene
 
 WHOLE = {

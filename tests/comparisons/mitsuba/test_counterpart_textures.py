@@ -7,16 +7,16 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
+from comparisons.lights.translate import translate_light
+from comparisons.materials.translate import translate_material
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
-from comparisons.mitsuba.translate import load
-from comparisons.mitsuba.translate.lights import translate_light
-from comparisons.mitsuba.translate.materials import translate_material
-from comparisons.mitsuba.translate.textures import (
+from comparisons.textures.translate import (
     TranslationContext,
     UntranslatableError,
     translate_texture,
 )
+from comparisons.translator import load
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.lights import EnvironmentMap
 from reference_rt.lights.emitters import environment_map

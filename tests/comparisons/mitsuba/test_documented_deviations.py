@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from comparisons.mitsuba import translate
+from comparisons import translator
+from comparisons.materials.translate import translate_material
 from comparisons.mitsuba.backend import mitsuba, scalar
-from comparisons.mitsuba.notes import COSINES, base_error, notes_of
 from comparisons.mitsuba.scene import for_rays, picture
-from comparisons.mitsuba.translate import load
-from comparisons.mitsuba.translate.materials import translate_material
-from comparisons.mitsuba.translate.textures import TranslationContext
+from comparisons.textures.translate import TranslationContext
+from comparisons.translator import load
+from comparisons.translator.notes import COSINES, base_error, notes_of
 from reference_rt.materials import Plastic, RoughPlastic
 from reference_rt.rendering.scene import Scene
 
@@ -97,7 +97,7 @@ QUICK = {(1.5, 0.01), (1.9, 0.1), (1.3, 0.5)}
     ],
 )
 def test_documented_coats(index, alpha, ggx, beckmann, monkeypatch):
-    monkeypatch.setattr("comparisons.mitsuba.notes.COSINES", (1.0,))
+    monkeypatch.setattr("comparisons.translator.notes.COSINES", (1.0,))
     for distribution, told in (("ggx", ggx), ("beckmann", beckmann)):
         low, high = base_error(index, distribution, alpha)
         assert low == high
@@ -202,6 +202,6 @@ def test_lamps_that_let_light_pass_straight_through(base, monkeypatch):
     assert "black environment" in " ".join(notes_of(scene))
     with scalar():
         assert picture(load(scene).mi_scene, 64, 0).mean() == pytest.approx(1.0, abs=1e-6)
-        monkeypatch.setattr(translate, "drops_light", lambda scene: False)
+        monkeypatch.setattr(translator, "drops_light", lambda scene: False)
         own = picture(load(scene).mi_scene, 64, 0).mean()
     assert own < 0.2

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import reference_rt as rt
+from comparisons.cameras.translate import translate_filter
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.translate.cameras import translate_filter
 from reference_rt.cameras.film import AnyFilter
 
 FILTERS: tuple[AnyFilter, ...] = (

@@ -8,9 +8,9 @@ import pytest
 
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.translate import load
-from comparisons.mitsuba.translate.moved import frame_of, with_float32_vertices
 from comparisons.rungs import whitted
+from comparisons.translator import load
+from comparisons.translator.moved import frame_of, with_float32_vertices
 from reference_rt import Dielectric, Film, Mesh, Point, Scene, Sphere, Triangle, Whitted
 from reference_rt.core.transform import Rotate, Scale, Translate, Turn
 from reference_rt.rendering import query

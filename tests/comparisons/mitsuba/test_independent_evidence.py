@@ -11,7 +11,7 @@ from builders import SCENES
 
 import comparisons.cycles
 import comparisons.geometry
-import comparisons.mitsuba.translate
+import comparisons.translator
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, gather
 from reference_rt.core import transform
@@ -34,7 +34,7 @@ EXCEPTIONS = {
     "sizes.py": {"tabulate"},  # sizes, of which bounds of errors are made
 }
 
-FOLDERS = (comparisons.mitsuba.translate, comparisons.cycles, comparisons.geometry)
+FOLDERS = (comparisons.translator, comparisons.cycles, comparisons.geometry)
 SOURCES = [path for f in FOLDERS for path in sorted(Path(f.__path__[0]).rglob("*.py"))]
 
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from comparisons.mitsuba.reading import read_dict, read_file
-from comparisons.mitsuba.reading.included import MOST_NESTED
+from comparisons.mitsuba.included import MOST_NESTED
+from comparisons.translator.reading import read_dict, read_file
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneError, SceneWarning
 
@@ -208,7 +208,7 @@ def test_dictionaries_name_the_node():
 def test_objects_of_mitsuba_are_refused():
     import mitsuba as mi
 
-    from comparisons.mitsuba.reading.parse import scalar
+    from comparisons.mitsuba.parse import scalar
 
     with scalar():
         scene = {"type": "scene", "a": {"type": "sphere", "b": mi.load_dict({"type": "diffuse"})}}

@@ -9,8 +9,8 @@ from mitsuba_dicts import theirs_along
 from PIL import Image
 
 from comparisons.mitsuba.backend import backend
-from comparisons.mitsuba.reading import read_file, reference
-from comparisons.mitsuba.reading.reference import changes_to, own_scene
+from comparisons.translator.reading import read_file, reference
+from comparisons.translator.reference import changes_to, own_scene
 from reference_rt.rendering.scene import Scene
 
 SCENE = """<scene version="3.0.0">

@@ -17,8 +17,8 @@ from typer.testing import CliRunner, Result
 
 from comparisons.commands.compare import convert
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.reading import meshes, read_file
-from comparisons.mitsuba.writing.files import write_scene
+from comparisons.mitsuba.files import write_scene
+from comparisons.translator.reading import meshes, read_file
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ImageError, SceneError, SceneWarning, UsageError

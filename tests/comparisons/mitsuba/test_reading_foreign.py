@@ -15,9 +15,9 @@ from PIL import Image
 from test_reading_plugins import fast, filled
 
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.reading import included, read_file
-from comparisons.mitsuba.reading.included import PRIMAL
-from comparisons.mitsuba.reading.reference import changes_to, own_scene
+from comparisons.mitsuba.included import PRIMAL
+from comparisons.translator.reading import included, read_file
+from comparisons.translator.reference import changes_to, own_scene
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneError, SceneWarning
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from comparisons.mitsuba.backend import imported
-from comparisons.mitsuba.reading.node import Reading
+from comparisons.mitsuba.node import Reading
 from reference_rt.rendering.scene import Scene
 
 CAMERA = """<sensor type="perspective"><film type="hdrfilm"/><transform name="to_world">

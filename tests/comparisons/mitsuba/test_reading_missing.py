@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from mitsuba_dicts import hits_of, theirs_along
 
-from comparisons.mitsuba.reading.reference import changes_to, own_scene
 from comparisons.suites.keys import files_digest
+from comparisons.translator.reference import changes_to, own_scene
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneError, SceneWarning
 

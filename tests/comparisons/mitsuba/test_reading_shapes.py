@@ -8,9 +8,9 @@ import pytest
 from mitsuba_dicts import both_scenes, hits_of, rays_at
 
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.reading import read_dict
 from comparisons.mitsuba.scene import for_rays
 from comparisons.rungs.rays.camera import camera_rays
+from comparisons.translator.reading import read_dict
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneError
 
@@ -162,7 +162,7 @@ def test_instances_are_those_of_mitsuba(outer, inner, meshes):
     hits = ours.intersect(o, d)
     t, _, ns, _ = hits_of(theirs, o, d)
     met = np.isfinite(hits.t) & np.isfinite(t)
-    # In groups Mitsuba's rays may pass between triangles (see comparisons.mitsuba.translate).
+    # In groups Mitsuba's rays may pass between triangles (see comparisons.translator).
     assert met.sum() > 20
     assert (np.isfinite(hits.t) != np.isfinite(t)).sum() <= EDGE
     good = np.abs(hits.t[met] - t[met]) < FLOAT32

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from comparisons.commands.compare import convert
+from comparisons.lights.reading import HEIGHT, WIDTH
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.reading import read_file
-from comparisons.mitsuba.reading.lights import HEIGHT, WIDTH
 from comparisons.mitsuba.scene import for_rays
+from comparisons.translator.reading import read_file
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.integrators import Whitted
 from reference_rt.lights import EnvironmentMap

@@ -12,11 +12,11 @@ from builders import every_law, every_light
 import reference_rt as rt
 from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.counterpart import Counterpart
-from comparisons.mitsuba.reading.reference import own_scene
 from comparisons.mitsuba.scene import picture
-from comparisons.mitsuba.translate import load
-from comparisons.mitsuba.writing import write_xml
 from comparisons.rungs import direct, geometry, whitted
+from comparisons.translator import load
+from comparisons.translator.reference import own_scene
+from comparisons.translator.writing import write_xml
 from reference_rt.rendering.scene import Scene
 
 VIEW = """

@@ -9,14 +9,14 @@ import pytest
 
 import reference_rt as rt
 from comparisons.cycles.translate import bounces_of
+from comparisons.lights.translate import ambient_of
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import trace
 from comparisons.mitsuba.scene import render
-from comparisons.mitsuba.translate import UntranslatableError, load, to_mitsuba
-from comparisons.mitsuba.translate.lights import ambient_of
 from comparisons.pbrt import write_pbrt
 from comparisons.renderers import NoCounterpartError
 from comparisons.rungs import geometry
+from comparisons.translator import UntranslatableError, load, to_mitsuba
 from reference_rt.cameras.camera import Camera
 from reference_rt.cameras.film import AnyFilter, BoxFilter, Film, GaussianFilter, TentFilter
 from reference_rt.core.model import Description

@@ -6,9 +6,9 @@ import pytest
 
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.backend import variant as in_variant
-from comparisons.mitsuba.translate import load, to_mitsuba
 from comparisons.rungs import geometry
 from comparisons.rungs.rays.camera import compare_camera
+from comparisons.translator import load, to_mitsuba
 from reference_rt.cameras import AnyCamera, Orthographic, Perspective, Pinhole, ThinLens
 from reference_rt.cameras.film import Film
 from reference_rt.rendering.scene import Scene

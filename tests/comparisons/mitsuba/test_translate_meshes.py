@@ -11,8 +11,8 @@ import trimesh
 from comparisons.geometry.frame import UNIT_ROUNDOFF
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import trace
-from comparisons.mitsuba.translate import load
 from comparisons.rungs import geometry
+from comparisons.translator import load
 from reference_rt.cameras import Perspective
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators import RayCast

@@ -18,8 +18,8 @@ import reference_rt as rt
 from comparisons.commands.compare import convert
 from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.scene import for_rays, picture
-from comparisons.mitsuba.writing import write_xml
 from comparisons.rungs.rays.camera import camera_rays
+from comparisons.translator.writing import write_xml
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
 

@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 
 import reference_rt as rt
 from comparisons.commands.compare import convert
-from comparisons.mitsuba.writing.resolved import FORMAT, is_closed, tessellated, write_resolved
 from comparisons.rungs.rays.camera import camera_rays
+from comparisons.translator.resolved import FORMAT, is_closed, tessellated, write_resolved
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes.csg import Difference, Intersection, Union

@@ -10,8 +10,8 @@ import reference_rt as rt
 from comparisons.commands.options import Witness
 from comparisons.cycles.backend import PYTHON
 from comparisons.mitsuba.backend import LLVM, mitsuba
-from comparisons.mitsuba.native import Native
 from comparisons.renderers import PLACES, NoCounterpartError, WitnessName, other
+from comparisons.translator.native import Native
 
 ALL = {
     name: pytest.param(

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from comparisons.geometry.sizes import ShapeSizes
-from comparisons.mitsuba.translate import load
 from comparisons.rungs import geometry
 from comparisons.rungs.rays import any_hit
 from comparisons.rungs.rays.rays import mixed_rays
+from comparisons.translator import load
 from reference_rt import Film, Instance, Mesh, Scene, Sphere
 from reference_rt.core.transform import Scale, Translate
 from reference_rt.rendering import query

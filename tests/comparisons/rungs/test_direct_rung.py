@@ -9,9 +9,9 @@ from counterparts import faulty_counterpart
 from PIL import Image
 
 from comparisons.mitsuba.backend import scalar
-from comparisons.mitsuba.translate import load
-from comparisons.mitsuba.translate.shapes.stand_ins import coarser
 from comparisons.rungs import direct
+from comparisons.shapes.stand_ins import coarser
+from comparisons.translator import load
 from reference_rt import Scene
 
 SPOT = """

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from comparisons.mitsuba.backend import scalar
-from comparisons.mitsuba.translate import load
-from comparisons.mitsuba.translate.shapes.stand_ins import coarser
 from comparisons.rungs import whitted
+from comparisons.shapes.stand_ins import coarser
+from comparisons.translator import load
 from reference_rt import Scene
 from reference_rt.core.transform import rotate
 from reference_rt.rendering.render import render

@@ -10,10 +10,10 @@ from comparisons.geometry.exact.referee import Referee
 from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.counterpart import trace
-from comparisons.mitsuba.translate import load
 from comparisons.rungs import geometry
 from comparisons.rungs.geometry import MOST_JUDGED, aimed_rays, judged
 from comparisons.rungs.rays.rays import Rays, mixed_rays
+from comparisons.translator import load
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene

@@ -9,9 +9,9 @@ import pytest
 from builders import SCENES
 
 from comparisons.mitsuba.backend import scalar
-from comparisons.mitsuba.translate import load
 from comparisons.rungs import layers
 from comparisons.rungs.layers import rung
+from comparisons.translator import load
 from reference_rt.cameras.film import BoxFilter, Film, MitchellFilter
 from reference_rt.integrators import RayCast
 from reference_rt.rendering import render as rendering

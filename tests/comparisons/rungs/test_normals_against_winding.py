@@ -7,8 +7,8 @@ import pytest
 from PIL import Image
 
 from comparisons.mitsuba.backend import scalar
-from comparisons.mitsuba.translate import load
 from comparisons.rungs import direct
+from comparisons.translator import load
 from reference_rt.rendering.scene import Scene
 
 SCENE = """

@@ -8,12 +8,12 @@ import pytest
 from counterparts import faulty_counterpart
 
 from comparisons.geometry.sizes import ShapeSizes
-from comparisons.mitsuba.translate import load
 from comparisons.results.case import RungResult
 from comparisons.rungs import direct, whitted
 from comparisons.rungs import geometry as geometry_of_many
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.camera import pixel_centres
+from comparisons.translator import load
 from reference_rt.cameras.film import Film
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering import query

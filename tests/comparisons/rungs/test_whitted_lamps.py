@@ -7,9 +7,9 @@ import pytest
 from PIL import Image
 
 from comparisons.mitsuba.backend import mitsuba, scalar
-from comparisons.mitsuba.translate import load
-from comparisons.mitsuba.translate.shapes.stand_ins import coarser
 from comparisons.rungs import whitted
+from comparisons.shapes.stand_ins import coarser
+from comparisons.translator import load
 from reference_rt.core.transform import rotate
 from reference_rt.rendering.scene import Scene
 

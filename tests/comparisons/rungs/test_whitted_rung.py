@@ -8,9 +8,9 @@ from counterparts import every_material
 from PIL import Image
 
 from comparisons.mitsuba.backend import scalar
-from comparisons.mitsuba.translate import load
-from comparisons.mitsuba.translate.shapes.stand_ins import coarser
 from comparisons.rungs import direct, whitted
+from comparisons.shapes.stand_ins import coarser
+from comparisons.translator import load
 from reference_rt import Scene
 from reference_rt.cameras.film import Film
 from reference_rt.integrators import Whitted

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 import reference_rt as rt
+from comparisons import translator
 from comparisons.experiments.stability.harness.steps import matrix
 from comparisons.geometry import frame
 from comparisons.geometry.exact.dyadic import BoolArray
-from comparisons.mitsuba import translate
 from comparisons.mitsuba.backend import scalar
 from reference_rt.accel.geometry import Geometry, closest_hit, owner, surface
 from reference_rt.core.arrays import FloatArray, IntArray
@@ -65,7 +65,7 @@ def follow_in_mitsuba(scene: rt.Scene, o: FloatArray, d: FloatArray, steps: int)
     """The same in Mitsuba, by `si.spawn_ray`."""
     out = np.full((len(o), steps), -1)
     with scalar() as mi:
-        counterpart = translate.load(scene, frame.OURS)
+        counterpart = translator.load(scene, frame.OURS)
         for i in range(len(o)):
             ray = mi.Ray3f(mi.Point3f(o[i].tolist()), mi.Vector3f(d[i].tolist()))
             for k in range(steps):

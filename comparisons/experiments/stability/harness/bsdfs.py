@@ -18,10 +18,10 @@ from scipy import stats
 from comparisons.experiments.stability.harness.outcomes import MITSUBA, OURS, FloatArray
 from comparisons.experiments.stability.harness.series import Draw, Sweep
 from comparisons.geometry.exact.crossings import IntArray
+from comparisons.materials.translate import translate_material
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
-from comparisons.mitsuba.translate.materials import translate_material
-from comparisons.mitsuba.translate.textures import TranslationContext
+from comparisons.textures.translate import TranslationContext
 from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.materials import (

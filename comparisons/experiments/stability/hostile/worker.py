@@ -277,9 +277,9 @@ def judged_of_mitsuba(scenes: Sequence[Path]) -> Outcome:
 
 
 def _mitsubas(path: Path, _: str | None, clock: Any) -> dict[str, Any]:
-    from comparisons.mitsuba import translate
+    from comparisons import translator
     from comparisons.mitsuba.scene import picture
-    from comparisons.mitsuba.translate.textures import UntranslatableError
+    from comparisons.textures.translate import UntranslatableError
     from reference_rt.cli.options import adjusted
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.errors import ReferenceRtError
@@ -292,7 +292,7 @@ def _mitsubas(path: Path, _: str | None, clock: Any) -> dict[str, Any]:
         return found
     with contextlib.redirect_stderr(io.StringIO()):
         try:
-            counterpart = translate.load(
+            counterpart = translator.load(
                 scene
             )  # which takes seconds for curved shapes, for our own part
             if counterpart.no_pictures_reason:

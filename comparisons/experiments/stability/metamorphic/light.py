@@ -136,8 +136,8 @@ does not change when things move by 1e-14, and has failed."""
 
 
 def judged(contestant: str, scene: rt.Scene, motion: Motion, mirrored: bool = False) -> Outcome:
-    """Each pixel is a case.  worst: the largest difference, of the picture's mean.  mirrored: the
-    transformed picture is the other one's mirror image, left to right.
+    """Each pixel is a case; the worst has the largest difference, as a share of the picture's mean.
+    mirrored: the transformed picture is the other one's mirror image, left to right.
 
     What rounds separately at each surface no common move finds: where a few pixels are wrong, they
     are compared with scenes each part of which is moved by `shift` in a direction of its own.

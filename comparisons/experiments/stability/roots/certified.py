@@ -97,7 +97,7 @@ def judge(
 ) -> Outcome:
     """Roots `found` (n, k) as `Certified.real` has them; `slack` (n, 1): besides the bound.
 
-    Wrong are a root too few or too many, and one off by more.  asked: columns of the examples.
+    Wrong are a root too few or too many, and one off by more.  columns: of the examples.
     """
     real, bound = truth.real()
     found = np.sort(np.where(np.isnan(found), np.inf, found), axis=1)

@@ -1,0 +1,1 @@
+"""Cameras for the comparison: to and from Mitsuba."""

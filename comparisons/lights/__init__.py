@@ -1,0 +1,1 @@
+"""Lights for the comparison: to and from Mitsuba."""

@@ -1,0 +1,1 @@
+"""Materials for the comparison: to and from Mitsuba."""

@@ -1,0 +1,1 @@
+"""Textures for the comparison: to and from Mitsuba."""

@@ -1,0 +1,227 @@
+"""Scene -> Mitsuba: one `singledispatch` function per public type of `reference_rt`.
+
+Contract: a function takes the description and, where it needs textures or other materials, the
+`TranslationContext`, and returns the dict of a Mitsuba plugin (shapes: a list of `Plugin`), with
+radiance and lengths unchanged.  None means that Mitsuba has no place for it.  To translate a new
+type: register a function in the file of its kind; until then it raises `UntranslatableError`, which
+makes a scene `not-comparable`.
+"""
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from comparisons.cameras.translate import (
+    translate_camera,
+    translate_film,
+    translate_sampler,
+)
+from comparisons.geometry import affine
+from comparisons.geometry.flatten import Copy, Leaf, copies_of, place_of
+from comparisons.geometry.frame import Frame
+from comparisons.lights.translate import (
+    BLACK,
+    counts_lights_often,
+    drops_light,
+    in_place_of,
+    never_samples,
+    translate_integrator,
+    translate_light,
+)
+from comparisons.materials.translate import (
+    coloured_parts_of,
+    is_oriented,
+    is_textured,
+    parts_of,
+)
+from comparisons.mitsuba.backend import mitsuba, scalar
+from comparisons.mitsuba.counterpart import Counterpart, InstancedGroup
+from comparisons.mitsuba.csg import Operand, SolidCounterpart
+from comparisons.mitsuba.hits import MitsubaShape, Plugin
+from comparisons.mitsuba.lit_scene import LitScene
+from comparisons.mitsuba.scene import light_id, shape_id
+from comparisons.renderers import ReferenceSampler
+from comparisons.shapes import Site, translate_shape
+from comparisons.shapes.meshes import MOST_INSTANCES
+from comparisons.textures.translate import TranslationContext, UntranslatableError
+from comparisons.translator.moved import frame_of, moved
+from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import Grid
+
+# Without this Embree drops rays that hit a shared edge (Mitsuba issue 1149).
+ROBUST = {"embree_use_robust_intersections": True}
+
+
+class _Translated(NamedTuple):
+    plain: dict[str, Any]
+    mi_shapes: dict[str, MitsubaShape]
+    solids: list[SolidCounterpart]
+
+
+def to_mitsuba(scene: Scene, native: bool = False) -> dict[str, Any]:
+    """The scene as a dict for `mitsuba.load_dict`, without its solids; our shape i has the id
+    "shape_<i>", or several ids with suffixes.
+
+    Meshes are Mitsuba objects already, of what a second reader reads.  Ray casting has no
+    integrator in Mitsuba.  native: use Mitsuba's own materials even where our plugins are more
+    exact, to measure Mitsuba's speed.  Raises UntranslatableError, SceneError for a file that
+    cannot be used, ReferenceUnavailableError without Mitsuba.
+    """
+    found = _translated(scene, native)
+    return {**_groups(found.mi_shapes), **found.plain}
+
+
+def load(
+    scene: Scene, frame: Frame | None = None, sampler: ReferenceSampler = "independent"
+) -> Counterpart:
+    """The scene's counterpart in Mitsuba, its shapes not merged, in the coordinates that suit
+    float32 best, or in `frame`;  sampler: of samples that are not a grid.  Raises as `to_mitsuba`
+    does."""
+    frame = frame_of(scene) if frame is None else frame
+    found = _translated(moved(scene, frame))
+    instanced_group = _instanced_group(found)
+    plain = {**_groups(found.mi_shapes), **found.plain}
+    if not isinstance(scene.resolved_sampler, Grid):
+        plain["sensor"]["sampler"]["type"] = sampler
+    solids = tuple(found.solids)
+    ours = in_place_of(scene, bool(solids))
+    if ours is not None:
+        plain["integrator"] = ours
+    mi_scene = mitsuba().load_dict(plain, optimize=False)
+    if ours is not None:
+        mi_scene.integrator().lit = partial(LitScene, solids=solids)
+    return Counterpart(mi_scene, found.mi_shapes, solids, instanced_group, frame, ours is not None)
+
+
+def _instanced_group(found: _Translated) -> InstancedGroup | None:
+    """Move the instances out of what is translated, if there are more than FEW."""
+    names = [
+        name for name, mi_shape in found.mi_shapes.items() if mi_shape.plugin.group is not None
+    ]
+    if len(names) <= MOST_INSTANCES or mitsuba().variant().startswith("scalar"):
+        return None
+    mi_shapes = {name: found.mi_shapes.pop(name) for name in names}
+    instances = {name: found.plain.pop(name) for name in names}
+    with scalar() as mi:
+        groups = _groups(mi_shapes)
+        mi_scene = mi.load_dict({"type": "scene", **ROBUST, **groups, **instances}, optimize=False)
+    return InstancedGroup(mi_scene, mi_shapes)
+
+
+def _groups(mi_shapes: Mapping[str, MitsubaShape]) -> dict[str, Any]:
+    """The shape groups of these instances, in the current variant."""
+    groups = {p.plugin.group.name: p.plugin.group for p in mi_shapes.values() if p.plugin.group}
+    return {
+        name: {"type": "shapegroup", "member": g.member() if callable(g.member) else g.member}
+        for name, g in groups.items()
+    }
+
+
+def _translated(scene: Scene, native: bool = False) -> _Translated:
+    sensor = translate_camera(scene.camera, scene.film)
+    sensor["film"] = translate_film(scene.film)
+    sensor["sampler"] = translate_sampler(scene.resolved_sampler)
+    plain: dict[str, Any] = {"type": "scene", **ROBUST, "sensor": sensor}
+    integrator = translate_integrator(scene.integrator)
+    if integrator is not None:
+        plain["integrator"] = integrator
+        if counts_lights_often(scene):
+            integrator["emitter_samples"] = 1
+    result = _Translated(plain, {}, [])
+    copies = copies_of(scene)
+    count = {group: sum(c.group == group for c in copies) for group in {c.group for c in copies}}
+    shared: dict[Any, Any] = {}
+    context = TranslationContext.of(scene, native)
+    reach = _reach(scene, copies)
+    for copy in copies:
+        try:
+            of_group = count[copy.group] if copy.group else 1
+            _add(result, scene, copy, of_group, shared, context, reach)
+        except ValueError as error:
+            raise scene.error(str(error), "shapes", copy.shape) from None
+    for i, light in enumerate(scene.lights):
+        emitter = translate_light(light, context)
+        if emitter is not None:
+            plain[light_id(i)] = emitter
+    if drops_light(scene) and not native:
+        plain["black"] = BLACK
+    return result
+
+
+def _reach(scene: Scene, copies: list[Copy]) -> float:
+    """About the largest coordinate: of the eye, and of the transformed unit shapes."""
+    found = float(np.abs([scene.camera.eye, scene.camera.target]).max())
+    for copy in copies:
+        for leaf in (leaf for member in copy.members for leaf in member.leaves):
+            m = affine.map_in(leaf.shape, place_of(scene, leaf, copy.outer))
+            found = max(found, float((np.abs(m[:, 3]) + np.abs(m[:, :3]).sum(axis=1)).max()))
+    return found
+
+
+def _add(
+    result: _Translated,
+    scene: Scene,
+    copy: Copy,
+    count: int,
+    shared: dict[Any, Any],
+    context: TranslationContext,
+    reach: float,
+) -> None:
+    """Add the shapes of one copy to the result;  count: how many copies its group has."""
+    for number, member in enumerate(copy.members):
+        name = shape_id(copy.shape)
+        if copy.instance >= 0:
+            name += f"_{copy.instance}_{number}"
+        operands = []
+        for leaf in member.leaves:
+            place = place_of(scene, leaf, copy.outer)
+            parts = parts_of(leaf.material, context)
+            if "emitter" in parts and never_samples(scene.integrator, copy, member, leaf, place):
+                parts["emitter"]["sampling_weight"] = 0.0
+            site = Site(
+                place=place,
+                parts=parts,
+                coloured=coloured_parts_of(leaf.material, context) or parts,
+                textured=is_textured(leaf.material, context),
+                oriented=is_oriented(leaf.material, context),
+                material=leaf.material,
+                copies=count,
+                shared=shared,
+                reach=reach,
+                native=context.native,
+            )
+            plugins = translate_shape(leaf.shape, site)
+            if site.textured and not all(plugin.has_our_uv for plugin in plugins):
+                kind = type(leaf.shape).__name__
+                raise UntranslatableError(f"{kind} under a texture, with other uv,", "shape")
+            if member.tree is None:
+                values, mi_shapes = _named(plugins, name, copy, leaf)
+                result.plain.update(values)
+                result.mi_shapes.update(mi_shapes)
+            else:
+                values, mi_shapes = _named(plugins, f"{name}_part{leaf.part}", copy, leaf)
+                groups = _groups(mi_shapes)
+                mi_scene = mitsuba().load_dict(
+                    {"type": "scene", **ROBUST, **groups, **values}, optimize=False
+                )
+                operands.append(Operand(mi_scene, mi_shapes, leaf, place))
+        if member.tree is not None:
+            result.solids.append(SolidCounterpart(tuple(operands), member.tree))
+
+
+def _named(
+    plugins: list[Plugin], name: str, copy: Copy, leaf: Leaf
+) -> tuple[dict[str, Any], dict[str, MitsubaShape]]:
+    values, mi_shapes = {}, {}
+    for plugin in plugins:
+        key = name + plugin.suffix
+        values[key] = plugin.value
+        mi_shapes[key] = MitsubaShape(
+            copy.shape, leaf.part, copy.instance, leaf.shape, plugin._replace(value=None)
+        )
+    return values, mi_shapes
+
+
+__all__ = ["MOST_INSTANCES", "UntranslatableError", "load", "to_mitsuba"]

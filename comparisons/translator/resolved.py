@@ -1,0 +1,385 @@
+"""A scene as data for other renderers: everything resolved, shapes as triangles.
+
+`docs/scenes.md` describes the format.  Nothing has a default: each number that determines the
+picture is in the file, or in the files beside it."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from comparisons.geometry import affine
+from comparisons.geometry.affine import Affine
+from comparisons.geometry.flatten import Leaf, Tree, copies_of
+from comparisons.mitsuba.files import Files, check_name, ply, write_files
+from comparisons.shapes.meshes import Soup, polygon_soup
+from comparisons.shapes.primitives import (
+    around_z,
+    box_of_triangles,
+    quadric_surface,
+    side_surface,
+    sphere_surface,
+    torus_surface,
+)
+from comparisons.shapes.stand_ins import measured_error
+from comparisons.shapes.surfaces import (
+    Implicit,
+    Limits,
+    Patch,
+    cap_faces,
+    meshed,
+)
+from reference_rt.cameras import Orthographic, Pinhole, ThinLens
+from reference_rt.cameras.view_rectangle import CentralCamera
+from reference_rt.core import transform
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.lights import EnvironmentMap
+from reference_rt.rendering.scene import Scene
+from reference_rt.shapes import (
+    Box,
+    Cone,
+    Cylinder,
+    Disk,
+    Mesh,
+    Plane,
+    Polygon,
+    Quadric,
+    Rectangle,
+    Shape,
+    Sphere,
+    Torus,
+    Triangle,
+)
+from reference_rt.shapes.meshes.files.data import MeshData
+from reference_rt.shapes.meshes.topology import unit
+from reference_rt.shapes.meshes.triangle_table import geometric_normals
+from reference_rt.shapes.shape import TabulationContext
+from reference_rt.util.errors import ReferenceRtError
+
+# ---- shapes as triangles: exact for flat shapes, the error of curved ones measured ---------------
+
+
+SIDES = 1024
+"""Triangles of a disk."""
+
+
+class Tessellated(NamedTuple):
+    """mesh: under the shape's own transform, its front counter-clockwise;  distance: the largest
+    one from the surface, 0 for flat shapes but for a disk's rim."""
+
+    mesh: MeshData
+    distance: float
+
+
+def tessellated(shape: Shape, folder: Path) -> Tessellated:
+    """The triangles of a shape.  Raises ValueError; TypeError for planes and solids."""
+    if isinstance(shape, Triangle | Mesh):
+        table = shape.tabulate(TabulationContext(folder=folder))
+        return Tessellated(
+            MeshData(
+                table.vertices.reshape(-1, 3),
+                np.arange(3 * len(table.vertices)).reshape(-1, 3),
+                None if table.normals is None else table.normals.reshape(-1, 3),
+                None if table.uvs is None else table.uvs.reshape(-1, 2),
+                None if table.colours is None else table.colours.reshape(-1, 3),
+            ),
+            0.0,
+        )
+    m = transform.affine(shape.transform)
+    soups, distance = _soups(shape, m)
+    mirrored = transform.flips_orientation(m)
+    return Tessellated(_joined([soup.moved(m, mirrored) for soup in soups]), distance)
+
+
+def _soups(shape: Shape, m: transform.Affine) -> tuple[list[Soup], float]:
+    """The parts of a shape in its own coordinates, and its error under the map m."""
+    match shape:
+        case Sphere():
+            return _curved(*sphere_surface(shape), None, m)
+        case Torus():
+            return _curved(*torus_surface(shape), None, m)
+        case Quadric():
+            patches, surface, box = quadric_surface(shape)
+            soups, distance = _curved(patches, surface, box, m) if patches else ([], 0.0)
+            soups = [around_z(soup, box) for soup in soups]
+            if shape.capped:
+                caps, faces = cap_faces(surface.value, box)
+                soups += [caps] if len(faces) else []
+            return soups, distance
+        case Cylinder() | Cone():
+            patch, surface = side_surface(shape)
+            soups, distance = _curved([patch], surface, None, m)
+            return soups + (_caps(shape, patch) if shape.capped else []), distance
+        case Box():
+            return [box_of_triangles(np.eye(3, 4))], 0.0
+        case Polygon():
+            return [polygon_soup(shape)], 0.0
+        case Rectangle():
+            corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+            flat = np.column_stack([corners, np.zeros(4)])
+            faces = np.array([[0, 1, 2], [0, 2, 3]])
+            return [Soup(flat, uvs=0.5 * (corners + 1.0), faces=faces)], 0.0
+        case Disk():
+            return [_disk()], (1.0 - np.cos(np.pi / SIDES)) * float(np.abs(m[:, :2]).max())
+    raise TypeError(f"no triangles for {type(shape).__name__}")
+
+
+def _curved(
+    patches: Sequence[Patch], surface: Implicit, box: Limits | None, m: transform.Affine
+) -> tuple[list[Soup], float]:
+    soup = meshed(patches, surface, box, 1.0)
+    return [_welded(soup)], measured_error(soup, surface, m)[0]
+
+
+GRID = 1e-9
+"""Vertices of one place, over the size of the mesh: apart by rounding where a patch meets itself.
+"""
+
+
+def _welded(soup: Soup) -> Soup:
+    """The mesh with vertices of one place at the very same place, so that it is closed, and without
+    the triangles that lose their area."""
+    size = float(np.ptp(soup.positions, axis=0).max())
+    places = np.round(soup.positions / (GRID * size)).astype(np.int64)
+    _, first, number = np.unique(places, axis=0, return_index=True, return_inverse=True)
+    number = number.ravel()
+    corners = number[soup.faces]
+    kept = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    return Soup(
+        soup.positions[first][number], soup.normals, soup.uvs, soup.colours, soup.faces[kept]
+    )
+
+
+def is_closed(mesh: MeshData) -> bool:
+    """Whether each edge of a triangle is, the other way round, that of another; by position."""
+    _, number = np.unique(mesh.vertices, axis=0, return_inverse=True)
+    corners = number.ravel()[mesh.faces]
+    a, b = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    n = int(corners.max()) + 1
+    return np.array_equal(np.sort(a * n + b), np.sort(b * n + a))
+
+
+def _caps(shape: Cylinder | Cone, side: Patch) -> list[Soup]:
+    """Fans about the axis, whose rims are those of the side."""
+    if isinstance(shape, Cylinder):
+        radii, reach = (shape.radius, shape.radius), shape.radius
+    else:
+        radii = shape.radius, shape.top_radius
+        reach = max(radii)
+    u = np.arange(side.cells[0]) / side.cells[0]
+    k = np.arange(len(u))
+    found = []
+    for v, radius in zip((0.0, 1.0), radii, strict=True):
+        if radius == 0.0:
+            continue
+        rim = side.point(u, np.full_like(u, v))
+        positions = np.vstack([[[0.0, 0.0, rim[0, 2]]], rim])
+        faces = np.column_stack([np.zeros_like(k), 1 + k, 1 + (k + 1) % len(k)])
+        faces = faces if v == 1.0 else faces[:, ::-1]
+        found.append(Soup(positions, uvs=0.5 * (1.0 + positions[:, :2] / reach), faces=faces))
+    return found
+
+
+def _disk() -> Soup:
+    """The unit disk, with uv of its own in each triangle: the distance from the middle, and the
+    angle from 0 to 1."""
+    turn = np.arange(SIDES + 1) / SIDES
+    rim = np.column_stack([np.cos(2.0 * np.pi * turn), np.sin(2.0 * np.pi * turn), 0.0 * turn])
+    k = np.arange(SIDES)
+    corners = np.stack([np.zeros((SIDES, 3)), rim[k], rim[k + 1]], axis=1)
+    uv = np.stack(
+        [
+            np.column_stack([np.zeros(SIDES), 0.5 * (turn[k] + turn[k + 1])]),
+            np.column_stack([np.ones(SIDES), turn[k]]),
+            np.column_stack([np.ones(SIDES), turn[k + 1]]),
+        ],
+        axis=1,
+    )
+    return Soup(corners.reshape(-1, 3), uvs=uv.reshape(-1, 2))
+
+
+def _joined(soups: Sequence[Soup]) -> MeshData:
+    """One mesh.  Where only some parts have normals, the others get those of their triangles."""
+    if not soups:
+        raise ValueError("has no surface")
+    any_normals = any(soup.normals is not None for soup in soups)
+    vertices, faces, normals, uvs = [], [], [], []
+    count = 0
+    for soup in soups:
+        vertices.append(soup.positions)
+        faces.append(soup.faces + count)
+        uvs.append(np.zeros((len(soup.positions), 2)) if soup.uvs is None else soup.uvs)
+        if any_normals:
+            flat = flat_normals(soup.positions, soup.faces)
+            normals.append(unit(flat if soup.normals is None else soup.normals))
+        count += len(soup.positions)
+    return MeshData(
+        np.concatenate(vertices),
+        np.concatenate(faces),
+        np.concatenate(normals) if any_normals else None,
+        np.concatenate(uvs) if all(soup.uvs is not None for soup in soups) else None,
+    )
+
+
+def flat_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """(n, 3) at the vertices of a part whose neighbouring triangles are in one plane."""
+    found = np.zeros((len(vertices), 3))
+    of_faces = geometric_normals(vertices[faces].reshape(-1, 9))
+    for corner in range(3):
+        found[faces[:, corner]] = of_faces
+    return found
+
+
+def placed(mesh: MeshData, outer: Affine) -> MeshData:
+    """A mesh under a map; its front stays its front."""
+    faces = mesh.faces[:, ::-1] if affine.mirrors(outer) else mesh.faces
+    normals = None if mesh.normals is None else affine.apply_normals(outer, mesh.normals)
+    vertices = affine.apply_points(outer, mesh.vertices)
+    return MeshData(vertices, faces, normals, mesh.uv, mesh.colours)
+
+
+# ---- the document --------------------------------------------------------------------------------
+
+
+FORMAT, VERSION = "reference_rt resolved scene", 1
+
+
+def write_resolved(scene: Scene, path: Path, float32: bool = False) -> int:
+    """Write a scene as .json, whole or not at all; how many files it has besides.
+
+    float32: meshes are rounded to it, since readers for browsers take no doubles.  Raises
+    SceneError, UsageError, ImageError.
+    """
+    check_name(path, (".json",))
+
+    def text(files: Files) -> str:
+        return (
+            json.dumps(_Document(scene, files, float32).whole(), indent=1, allow_nan=False) + "\n"
+        )
+
+    return write_files(scene, path, text)
+
+
+def camera_of(scene: Scene) -> dict[str, Any]:
+    """Position, basis and view rectangle: at distance 1, of an orthographic one through the
+    eye."""
+    camera, film = scene.camera, scene.film
+    right, up, back = camera.basis.tolist()
+    found: dict[str, Any] = {"type": camera.type, "eye": list(camera.eye)}
+    if isinstance(camera, Pinhole):
+        # What it sees, upside down, as a rectangle in front of it.
+        half = camera.film_width / camera.film_distance / 2.0
+        tall = half * film.height / film.width
+        found["type"], edges = "perspective", [-half, half, -tall, tall]
+        right, up = [-x for x in right], [-x for x in up]
+    else:
+        assert isinstance(camera, CentralCamera | Orthographic)
+        edges = list(camera.rectangle(film.width, film.height))
+    found |= {"right": right, "up": up, "back": back, "view": edges}
+    if isinstance(camera, ThinLens):
+        found |= {"aperture_radius": camera.aperture_radius, "focus_distance": camera.focus}
+    return found
+
+
+class _Document:
+    def __init__(self, scene: Scene, files: Files, float32: bool) -> None:
+        self.scene, self.files, self.float32 = scene, files, float32
+        self.meshes: list[dict[str, Any]] = []
+        self.known: dict[int, int] = {}
+
+    def whole(self) -> dict[str, Any]:
+        scene = self.scene
+        shapes = self.shapes()
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "description": scene.description,
+            "camera": camera_of(scene),
+            "film": scene.film.model_dump(mode="json"),
+            "sampler": scene.resolved_sampler.model_dump(mode="json"),
+            "integrator": scene.integrator.model_dump(mode="json"),
+            "textures": {name: self.texture(name) for name in scene.textures},
+            "materials": {k: m.model_dump(mode="json") for k, m in scene.materials.items()},
+            "meshes": self.meshes,
+            "shapes": shapes,
+            "lights": [self.light(light, k) for k, light in enumerate(scene.lights)],
+        }
+
+    def texture(self, name: str) -> dict[str, Any]:
+        texture = self.scene.textures[name]
+        found = texture.model_dump(mode="json")
+        found["uv"] = texture.uv.coefficients().reshape(2, 3).tolist()
+        if "file" in found:
+            found["file"] = self.files.copy(found["file"], "textures", name, "file")
+        return found
+
+    def light(self, light: Any, number: int) -> dict[str, Any]:
+        found: dict[str, Any] = light.model_dump(mode="json")
+        if isinstance(light, EnvironmentMap):
+            found["file"] = self.files.copy(light.file, "lights", number, "file")
+            found["transform"] = transform.affine(light.transform).tolist()
+        return found
+
+    def shapes(self) -> list[dict[str, Any]]:
+        """Every copy of every shape."""
+        found = []
+        for copy in copies_of(self.scene):
+            for member in copy.members:
+                place = {"shape": copy.shape, "instance": copy.instance}
+                try:
+                    if member.tree is None:
+                        (leaf,) = member.leaves
+                        value = self.leaf(leaf, copy.outer)
+                    else:
+                        value = self.solid(member.tree, member.leaves, copy.outer)
+                except ReferenceRtError:
+                    raise
+                except ValueError as error:
+                    raise self.scene.error(str(error), "shapes", copy.shape) from None
+                found.append(place | value)
+        return found
+
+    def solid(
+        self, tree: Tree | int, leaves: tuple[Leaf, ...], outer: transform.Affine
+    ) -> dict[str, Any]:
+        """A CSG tree of closed meshes and half-spaces."""
+        if isinstance(tree, int):
+            return self.leaf(leaves[tree], outer)
+        return {
+            "operation": tree.operation,
+            "of": [self.solid(part, leaves, outer) for part in tree.of],
+        }
+
+    def leaf(self, leaf: Leaf, outer: transform.Affine) -> dict[str, Any]:
+        """A mesh, or a plane, under a map."""
+        m = transform.compose(leaf.outer, outer)
+        if isinstance(leaf.shape, Plane):
+            m = transform.compose(transform.affine(leaf.shape.transform), m)
+            return {"plane": m.tolist(), "material": leaf.material}
+        return {
+            "mesh": self.mesh(leaf),
+            "transform": m.tolist(),
+            "material": leaf.material,
+        }
+
+    def mesh(self, leaf: Leaf) -> int:
+        """The number of a shape's mesh, which is made once."""
+        shape = leaf.shape
+        if id(shape) not in self.known:
+            found = tessellated(shape, self.scene.folder)
+            kind = type(shape).__name__.lower()
+            content = ply(found.mesh, float32=self.float32)
+            file = self.files.write(f"{kind}.ply", lambda path: path.write_bytes(content))
+            self.known[id(shape)] = len(self.meshes)
+            self.meshes.append(
+                {
+                    "file": file,
+                    "of": kind,
+                    "triangles": len(found.mesh.faces),
+                    "distance": found.distance,
+                    "closed": is_closed(found.mesh),
+                }
+            )
+        return self.known[id(shape)]
