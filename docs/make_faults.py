@@ -15,6 +15,7 @@ import numpy as np
 import yaml
 from docs_pages import DOCS
 
+from comparisons.report.table import table_of
 from comparisons.report.templates import check, rewrite
 from comparisons.runs.provenance import ours as provenance
 from comparisons.truth.case import AREAS, Case, chosen
@@ -130,7 +131,7 @@ def signs(case: Case) -> list[str]:
 
 def tables(matrix: Mapping[Case, list[str]]) -> list[str]:
     """A line for each fault, and the whole matrix."""
-    lines = ["| | fault | applies to | seen by | by area |", "|---|---|---|---|---|"]
+    rows = []
     for k, name in enumerate(NAMES):
         counts = {}
         for area, title in AREAS.items():
@@ -138,7 +139,8 @@ def tables(matrix: Mapping[Case, list[str]]) -> list[str]:
             counts[title] = column.count(SEEN), len(column) - column.count(ABSENT)
         seen, applies = np.sum(list(counts.values()), axis=0)
         areas = "; ".join(f"{title} {n} of {m}" for title, (n, m) in counts.items() if m)
-        lines.append(f"| {k + 1} | {name} | {applies} | {seen} | {areas} |")
+        rows.append((str(k + 1), name, str(applies), str(seen), areas))
+    lines = table_of(("", "fault", "applies to", "seen by", "by area"), rows).markdown()
     lines += ["", "```text", " " * 22 + "".join(f"{k + 1:3}" for k in range(len(NAMES)))]
     lines += [f"{c.name:22}" + "".join(f"{s:>3}" for s in row) for c, row in matrix.items()]
     return [*lines, "```"]

@@ -6,7 +6,7 @@ from functools import singledispatch
 from typing import Any
 
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.textures.translate import UntranslatableError
+from comparisons.mitsuba.context import UntranslatableError
 from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
 from reference_rt.cameras.camera import Camera
 from reference_rt.cameras.film import (

@@ -183,7 +183,7 @@ def gate(
         from comparisons.gate.request import Request, gated
         from comparisons.gate.rounds import Rounds, gated_renderer
         from comparisons.renderers import witness_facts
-        from comparisons.report import terminal
+        from comparisons.report import biases, terminal
         from comparisons.results.case import trace_command
         from comparisons.results.headline import headline
         from comparisons.translator.resolved import write_resolved
@@ -307,7 +307,7 @@ def gate(
     say(f"{case.scene}: {case.verdict}: {headline(case)}")
     if case.cause is not None:
         say(f"  {case.cause.name}: {case.cause.evidence}")
-    terminal.tell(terminal.console(), case)
+    biases.tell(terminal.console(), case)
     tell(f"{results}, {report}")
     raise typer.Exit(outputs.code_of(case))
 

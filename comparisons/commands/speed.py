@@ -46,15 +46,9 @@ def bench(
 ) -> None:
     """Measure the renderer's speed against Mitsuba's; takes about half an hour."""
     with compare_extra():
+        from comparisons.experiments.bench import outputs
         from comparisons.experiments.bench.row import Setting
-        from comparisons.experiments.bench.run import (
-            Display,
-            all_groups,
-            chosen,
-            markdown_table,
-            run,
-            terminal_table,
-        )
+        from comparisons.experiments.bench.run import all_groups, chosen, run
         from comparisons.report import templates, terminal
 
     setting = Setting(scenes=scenes, mesh=mesh, quick=quick)
@@ -63,12 +57,12 @@ def bench(
         raise UsageError(f"--mesh: there is no file '{mesh}'")
     if markdown is not None:
         templates.check(markdown, "bench")
-    with Display() as display:
+    with outputs.Display() as display:
         outcome = run(groups, replace(setting, say=display.say), out, display, fresh)
     console = terminal.console()
-    console.print(terminal_table(outcome.rows, console.width))
+    console.print(outputs.terminal(outcome.rows, console.width))
     if markdown is not None:
-        written = markdown_table(outcome.rows, outcome.machine, outcome.not_measured)
+        written = outputs.markdown(outcome.rows, outcome.machine, outcome.not_measured)
         templates.rewrite(markdown, "bench", written)
     for name, why in outcome.not_measured.items():
         say(f"{name}: not measured: {why}", err=True)
@@ -90,7 +84,8 @@ def methods(
 ) -> None:
     """Time the textbook's intersection methods, in nanoseconds per ray."""
     with compare_extra("measuring"):
-        from comparisons.experiments.methods.outputs import table, write, write_page
+        from comparisons.experiments.methods.outputs import terminal as table_of
+        from comparisons.experiments.methods.outputs import write, write_page
         from comparisons.experiments.methods.run import FAMILIES, FULL, QUICK, run
         from comparisons.runs.provenance import ours
 
@@ -115,7 +110,7 @@ def methods(
         progress("page", 1.0)
     console = terminal.console()
     for name in names:
-        console.print(table([row for row in rows if row.family == name], console.width))
+        console.print(table_of([row for row in rows if row.family == name], console.width))
         console.print()
     say(f"{out / 'results.json'}, results.csv, methods.html", err=True)
 

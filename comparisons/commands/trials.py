@@ -149,15 +149,16 @@ def stability(
     """
     with compare_extra():
         from comparisons.experiments.stability.harness import outputs
-        from comparisons.experiments.stability.harness.series import MODULES, Effort
+        from comparisons.experiments.stability.harness import page as page_of
         from comparisons.experiments.stability.harness.points import summaries
-        from comparisons.experiments.stability.harness.series import family as family_of
         from comparisons.experiments.stability.harness.run import (
             Choice,
             mitsuba_is_there,
             run,
             shoot,
         )
+        from comparisons.experiments.stability.harness.series import MODULES, Effort
+        from comparisons.experiments.stability.harness.series import family as family_of
         from comparisons.report import templates, terminal
         from comparisons.report.plots import save
         from comparisons.runs.provenance import ours, provenance
@@ -199,13 +200,13 @@ def stability(
         outputs.write_results(out, found, effort, seed, facts)
         display.line("pictures and page")
         pictures = shoot(choice, found, out, opened)
-        outputs.write_page(page, found, pictures, effort, seed, facts)
+        page_of.write_page(page, found, pictures, effort, seed, facts)
     console = terminal.console()
     console.print(outputs.terminal(found, console.width))
     if markdown is not None:
         templates.rewrite(markdown, "stability", outputs.markdown(found, effort, seed, facts))
     if plots is not None:
-        save(plots, outputs.failures(found), facts)
+        save(plots, page_of.failures(found), facts)
     holds = True
     for one in (s for some in summaries(found).values() for s in some):
         holds &= one.holds

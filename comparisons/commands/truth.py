@@ -83,9 +83,7 @@ def truth(
     facts |= {"variant": SCALAR} if "mitsuba" in who else {}
     facts |= {"seconds": round(time.perf_counter() - begun, 1)}
     _finish(out, rows, facts)
-    console = terminal.console()
-    console.print(outputs.table(rows, console.width))
-    console.print(outputs.score_card(rows, console.width))
+    outputs.show(terminal.console(), rows)
     if markdown is not None:
         templates.rewrite(markdown, "truth", outputs.markdown(rows, facts))
     counted = [row for row in rows if row.renderer == who[0]]
@@ -126,10 +124,7 @@ def truth_gate(
         driven = Driven(command, SCENES, out / "candidates", **given)
         rows = [driven.row(case, lambda line: say(line, err=True)) for case in picked]
     _finish(out, rows, facts)
-    console = terminal.console()
-    console.print(outputs.table(rows, console.width))
-    if len(rows) > 1:
-        console.print(outputs.score_card(rows, console.width))
+    outputs.show(terminal.console(), rows)
     raise typer.Exit(outputs.exit_code(rows))
 
 

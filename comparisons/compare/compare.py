@@ -1,27 +1,23 @@
 """The comparison of one scene with Mitsuba, rung by rung, from the scene to the verdict."""
 
-import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from comparisons import rungs as ladder
-from comparisons import statistics
 from comparisons.compare import looks, pictures, ray_starts
 from comparisons.compare.budget import LEAST, Budget
-from comparisons.compare.judge import Evidence, Rendered, judge, of_replicates, picture_rungs
+from comparisons.compare.control import control
+from comparisons.compare.judge import Evidence, Rendered, at_look, check, judge
 from comparisons.compare.path_length import path_lengths
+from comparisons.compare.single_lights import single_lights
 from comparisons.geometry.flatten import copies_of
 from comparisons.lights.translate import in_place_of
-from comparisons.mitsuba import backend
-from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.counterpart import Counterpart
-from comparisons.results.case import Case, Images, RungResult
+from comparisons.results.case import Case, RungResult
 from comparisons.rungs.layers.rung import applies
 from comparisons.rungs.witness import witness_of
 from comparisons.translator import MOST_INSTANCES, UntranslatableError, load
@@ -30,12 +26,8 @@ from comparisons.translator.notes import notes_of
 from comparisons.translator.reference import changes_to, file_of, own_scene
 from reference_rt.cameras.film import BoxFilter, Film
 from reference_rt.cli.explain import explain
-from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.lights import Ambient
-from reference_rt.materials import AnyMaterial, Emissive
-from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid, Sobol
 from reference_rt.scene.build import build_tables
@@ -43,118 +35,7 @@ from reference_rt.scene.build import build_tables
 __all__ = ["Evidence", "Say", "Subject", "budgeted", "compare_scene", "gather"]
 
 
-# ---- the control cases: Mitsuba against itself, in another variant and with other seeds ----------
-#
-# A difference here is a fault of the harness or of Mitsuba, not of reference_rt.
-
-
-MOST_PIXELS = 64 * 48
-"""Size limit of pictures without noise: scalar variants trace their rays one by one in Python."""
-
-
-def control(scene: Scene, budget: Budget, say: Callable[[str], None]) -> Case:
-    """Compare the pictures of a scene by two of Mitsuba's variants.  Raises SceneError,
-    ReferenceUnavailableError."""
-    if scene.integrator.deterministic:
-        scene = _smaller(scene)
-    chosen = backend.backend().variant
-    variants = {"candidate": backend.SCALAR, "reference": chosen}
-    found: list[FloatArray] = []
-    seconds: dict[str, dict[str, float]] = {}
-    sides = (f"Mitsuba's {backend.SCALAR}", f"Mitsuba's {chosen}")
-    rungs: tuple[RungResult, ...] = ()
-    rendered = None
-    try:
-        for number, (side, variant) in enumerate(variants.items()):
-            start = time.perf_counter()
-            with backend.variant(variant):
-                # The candidate's seeds must not overlap the reference's.
-                found.append(_of_seeds(scene, budget, (1 - number) * 100_000))
-            seconds[side] = {"render": time.perf_counter() - start}
-            say(f"{variant}: {seconds[side]['render']:.1f} s")
-    except (UntranslatableError, _NoLightError) as error:
-        rungs = (RungResult("statistics", "not-comparable", str(error)),)
-    else:
-        if scene.integrator.deterministic:
-            rendered = Rendered(Images(found[0][0], found[1][0]))
-        else:
-            rendered = of_replicates(found[0], found[1], seconds)
-    return judge(
-        Evidence(f"{scene.name} (control)", rungs, rendered, seconds, sides=sides), budget.limit
-    )
-
-
-def _smaller(scene: Scene) -> Scene:
-    """The scene with at most MOST_PIXELS, of about the same aspect ratio."""
-    film = scene.film
-    factor = min(1.0, math.sqrt(MOST_PIXELS / (film.width * film.height)))
-    sides = {side: max(1, round(factor * getattr(film, side))) for side in ("width", "height")}
-    return scene.changed(film=film.model_copy(update=sides))
-
-
-class _NoLightError(Exception):
-    """The scene has no counterpart in Mitsuba that can be lit."""
-
-
-def _of_seeds(scene: Scene, budget: Budget, seed: int) -> FloatArray:
-    """(replicates, height, width, 3) by the active variant; one replicate if deterministic."""
-    counterpart = load(scene)
-    if isinstance(scene.integrator, RayCast):
-        return pictures.mitsuba_cast(scene, counterpart, render(scene))[0][np.newaxis]
-    if counterpart.no_light_reason:
-        raise _NoLightError(counterpart.no_light_reason)
-    if isinstance(scene.integrator, Whitted):
-        return pictures.mitsuba_whitted(scene, build_tables(scene), counterpart)[np.newaxis]
-    if counterpart.no_pictures_reason:
-        raise _NoLightError(counterpart.no_pictures_reason)
-    spp = scene.resolved_sampler.spp
-    return mitsuba_scene.render(counterpart.mi_scene, budget.replicates, spp, seed).pictures
-
-
-# ---- pictures of a scene under each light alone, to recognise a lost or doubled light ------------
-
-
-MOST = 8
-"""Number of lights above which a missing one is hard to recognise."""
-
-DARK = (0.0, 0.0, 0.0)
-
-
-def single_lights(scene: Scene, spp: int, threads: int | None = None) -> Mapping[str, FloatArray]:
-    """Our picture (height, width, 3) under each light or emissive material alone, by its name;
-    empty if there are fewer than two, or more than MOST."""
-    shining = [name for name, m in scene.materials.items() if isinstance(m, Emissive)]
-    lights = [k for k, light in enumerate(scene.lights) if not isinstance(light, Ambient)]
-    if not 2 <= len(shining) + len(lights) <= MOST:
-        return {}
-    sampler = scene.resolved_sampler
-    if hasattr(sampler, "seed"):
-        sampler = sampler.model_copy(update={"spp": spp})
-    found = {}
-    for name in shining:
-        one = scene.changed(lights=(), materials=_only(scene, name), sampler=sampler)
-        found[f"the material '{name}'"] = render(one, threads=threads).colour
-    for k in lights:
-        light = scene.lights[k]
-        one = scene.changed(lights=(light,), materials=_only(scene, None), sampler=sampler)
-        found[f"lights[{k}] ({light.type})"] = render(one, threads=threads).colour
-    return found
-
-
-def _only(scene: Scene, name: str | None) -> dict[str, AnyMaterial]:
-    """The scene's materials; all emissive ones but `name` are dark."""
-    return {
-        other: material.model_copy(update={"radiance": DARK})
-        if isinstance(material, Emissive) and other != name
-        else material
-        for other, material in scene.materials.items()
-    }
-
-
 _NO_LIGHT = "ray casting shows surfaces, not light"
-
-LIGHT_SPP = 64
-"""Samples per pixel of pictures of single lights: enough to recognise them in a difference."""
 
 Say = Callable[[str], None]
 """Called with a line of text about each step."""
@@ -305,7 +186,7 @@ def _gather(
         left_out,
         lights=None
         if scene.integrator.deterministic
-        else lambda: single_lights(judged_by, LIGHT_SPP),
+        else partial(single_lights, judged_by),
         lengths=path_lengths(judged_by, threads),
         looks=looked,
         ray_starts=None
@@ -424,13 +305,10 @@ def _pictures(
     def look(level: float) -> RungResult:
         nonlocal rendered
         rendered = of_both.rendered()
-        if level == looks.level_of(1):
-            checked, *_, last = picture_rungs(rendered, budget.limit, level)
-            rendered = replace(rendered, checked=checked)
-            return last
         # The input is checked again at the end: each check has its own chance of a false alarm.
-        assert rendered.replicates is not None
-        return statistics.compare(*rendered.replicates, limit=budget.limit, level=level)
+        if level == looks.level_of(1):
+            rendered = replace(rendered, checked=check(rendered))
+        return at_look(rendered, budget.limit, level)
 
     found = looks.until_decided(
         of_both.grow,

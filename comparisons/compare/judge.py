@@ -16,11 +16,11 @@ from comparisons.results.case import (
     FloatArray,
     ImageRegion,
     Images,
+    Metrics,
     RungResult,
     Status,
     decide,
 )
-from comparisons.results.rungs import RUNGS
 from comparisons.rungs.images import images_rung
 from comparisons.rungs.input import input_rung
 from comparisons.rungs.limited import limited
@@ -36,30 +36,56 @@ RayStarts = Callable[[RungResult, tuple[FloatArray, FloatArray]], RungResult]
 explains it; renders pictures."""
 
 
+Replicates = tuple[FloatArray, FloatArray | statistics.Known]
+"""Of each side (replicates, height, width, 3), one or more; or the reference's known mean."""
+
+
+def _deterministic() -> RungResult:
+    return RungResult("statistics", "not-applicable", "deterministic: there is no noise")
+
+
 @dataclass(frozen=True)
 class Rendered:
-    """images: the two pictures;  seconds: wall clock by side and step;  replicates: for noisy
-    pictures, the replicates (replicates, height, width, 3) of each side whose means they are;
-    checked: the rung `input` of these, if a look has it already."""
+    """What is compared.
+
+    images: the two pictures;  seconds: wall clock by side and step;  replicates: of noisy pictures,
+    whose means the images are;  checked: the rung `input` of these, if it is known already;  still:
+    the rung `statistics` of pictures without noise;  fixed_reference: as in `statistics.compare`.
+    """
 
     images: Images
     seconds: dict[str, dict[str, float]] = field(default_factory=dict)
-    replicates: tuple[FloatArray, FloatArray] | None = None
+    replicates: Replicates | None = None
     notes: tuple[str, ...] = ()
     checked: RungResult | None = None
+    still: Callable[[], RungResult] = _deterministic
+    fixed_reference: bool = False
+
+    @property
+    def resampled(self) -> tuple[FloatArray, FloatArray] | None:
+        """The replicates that show the noise of each side's mean; None if they do not.  A reference
+        whose variance is known is two replicates that have exactly its mean and its variance."""
+        if self.replicates is None or len(self.replicates[0]) < 2:
+            return None
+        candidate, reference = self.replicates
+        if isinstance(reference, statistics.Known):
+            deviation = np.sqrt(reference.variance)
+            return candidate, np.stack([reference.mean + deviation, reference.mean - deviation])
+        return (candidate, reference) if len(reference) > 1 else None
 
 
 def of_replicates(
-    candidate: FloatArray, reference: FloatArray, seconds: dict[str, dict[str, float]]
+    candidate: FloatArray,
+    reference: FloatArray | statistics.Known,
+    seconds: dict[str, dict[str, float]],
 ) -> Rendered:
     """The means of replicates (replicates, height, width, 3) and the standard error of their
     difference."""
-    if candidate.shape[1:] == reference.shape[1:]:
+    mean = reference.mean if isinstance(reference, statistics.Known) else reference.mean(axis=0)
+    error = None
+    if candidate.shape[1:] == mean.shape:
         error = statistics.standard_error(candidate, reference)
-    else:
-        error = None
-    means = Images(candidate.mean(axis=0), reference.mean(axis=0), error)
-    return Rendered(means, seconds, (candidate, reference))
+    return Rendered(Images(candidate.mean(axis=0), mean, error), seconds, (candidate, reference))
 
 
 @dataclass(frozen=True)
@@ -92,35 +118,34 @@ def judge(evidence: Evidence, limit: float) -> Case:
     rungs, rendered = list(evidence.rungs), evidence.rendered
     metrics, images = None, None
     if rendered is not None:
-        found = picture_rungs(rendered, limit, looks=evidence.looks)
-        decided = any(rung.status in ("differ", "invalid") for rung in [*rungs, *found[:-1]])
-        if evidence.ray_starts and found[-1].status == "differ" and not decided:
-            assert rendered.replicates is not None
-            found[-1] = evidence.ray_starts(found[-1], rendered.replicates)
-        rungs += found
+        checked, *tested = picture_rungs(rendered, limit, evidence.looks)
+        decided = any(rung.status in ("differ", "invalid") for rung in [*rungs, checked])
+        if evidence.ray_starts and not decided and tested[0].status == "differ":
+            assert rendered.resampled is not None
+            tested = [evidence.ray_starts(tested[0], rendered.resampled)]
+        rungs += [checked, *tested]
         images = rendered.images
-        if not any(rung.status == "invalid" for rung in rungs):
+        if checked.status != "invalid":
             metrics = image_metrics(images)
-            rungs.append(images_rung(images, metrics, rendered.replicates))
-            if evidence.witness is not None and rendered.replicates is not None:
-                heard, picture = evidence.witness(rendered.replicates, evidence.sides)
+            rungs.append(_whole(rendered, metrics, tested[0]))
+            if evidence.witness is not None and rendered.resampled is not None:
+                heard, picture = evidence.witness(rendered.resampled, evidence.sides)
                 rungs.append(heard)
                 images = replace(images, witness=picture)
     rungs = limited(rungs)
     verdict, reason = decide(rungs, metrics)
-    reason = with_vote(verdict, reason, rungs)
     cause: Cause | None = None
     worst: tuple[ImageRegion, ...] = ()
     if verdict == "differ":
         cause = diagnosis.of_rungs(rungs)
         if rendered is not None and metrics is not None:
             cause = cause or likeliest_cause(rendered.images, evidence.lights, evidence.lengths)
-            worst = _places(rendered)
+            worst = statistics.worst_regions(*_means_tested(rendered))
     return Case(
         scene=evidence.name,
         verdict=verdict,
-        reason=reason,
-        rungs=tuple(sorted(rungs, key=lambda rung: RUNGS.index(rung.name))),
+        reason=_with_vote(verdict, reason, rungs),
+        rungs=tuple(rungs),
         metrics=metrics,
         seconds={side: dict(times) for side, times in evidence.seconds.items()},
         images=images,
@@ -132,63 +157,95 @@ def judge(evidence: Evidence, limit: float) -> Case:
     )
 
 
-def with_vote(verdict: Status, reason: str, rungs: Sequence[RungResult]) -> str:
+def _with_vote(verdict: Status, reason: str, rungs: Sequence[RungResult]) -> str:
     """The reason of a verdict, with who of three renderers stands alone: a difference of two says
     that one is wrong, the third says which."""
     said = next((rung.reason for rung in rungs if "alone" in rung.numbers), "")
     return reason if verdict == "agree" or said in reason else f"{reason}; {said}"
 
 
-def picture_rungs(
-    rendered: Rendered, limit: float, level: float = 1.0, looks: Looks | None = None
-) -> list[RungResult]:
-    """The rungs `input` and, for noisy pictures that are valid, `statistics`.
-
-    level: as in `statistics.compare`;  looks: were taken already, the last at these pictures.
-    """
-    if rendered.replicates is None:
-        images = rendered.images
-        checked = input_rung(images.candidate, images.reference)
-        return [
-            checked,
-            RungResult("statistics", "not-applicable", "deterministic: there is no noise"),
-        ]
-    checked = rendered.checked or input_rung(*rendered.replicates)
+def picture_rungs(rendered: Rendered, limit: float, looks: Looks | None = None) -> list[RungResult]:
+    """The rungs `input` and `statistics`; of an invalid input the latter only if a difference is
+    certain even so.  looks: were taken already, the last at these pictures."""
+    checked = rendered.checked or check(rendered)
     if checked.status == "invalid":
-        return [checked, *despite(*rendered.replicates, limit)]
-    if looks is not None:
-        return [checked, looks.judged]
-    return [checked, statistics.compare(*rendered.replicates, limit=limit, level=level)]
+        return [checked, *_despite(rendered, limit)]
+    return [checked, _tested(rendered, limit) if looks is None else looks.judged]
 
 
-def despite(
-    candidate: FloatArray, reference: "FloatArray | statistics.Known", limit: float
-) -> list[RungResult]:
+def check(rendered: Rendered) -> RungResult:
+    """The rung `input`."""
+    if rendered.replicates is None:
+        return input_rung(rendered.images.candidate, rendered.images.reference)
+    candidate, reference = rendered.replicates
+    return input_rung(
+        candidate, reference.mean if isinstance(reference, statistics.Known) else reference
+    )
+
+
+def at_look(rendered: Rendered, limit: float, level: float) -> RungResult:
+    """The rung `statistics` of one of several looks, or the fault of the input if that was checked.
+
+    level: the share of the levels that this look may use.
+    """
+    if rendered.checked is not None and rendered.checked.status == "invalid":
+        return rendered.checked
+    return _tested(rendered, limit, level)
+
+
+def _tested(rendered: Rendered, limit: float, level: float = 1.0) -> RungResult:
+    if rendered.replicates is None:
+        return rendered.still()
+    fixed = rendered.fixed_reference
+    return statistics.compare(*rendered.replicates, limit=limit, level=level, fixed_reference=fixed)
+
+
+def _whole(rendered: Rendered, metrics: Metrics, tested: RungResult) -> RungResult:
+    """The rung `images`;  tested: the rung `statistics`."""
+    if tested.status == "agree" and "edge" in tested.numbers:
+        return RungResult("images", "not-applicable", _EACH_PIXEL)
+    if rendered.replicates is not None and rendered.resampled is None:
+        return RungResult("images", "not-applicable", _UNKNOWN_NOISE)
+    return images_rung(rendered.images, metrics, rendered.resampled)
+
+
+_EACH_PIXEL = "each pixel is judged: metrics of the whole do not forgive edges"
+_UNKNOWN_NOISE = "the noise of a single picture is unknown"
+
+
+def _means_tested(rendered: Rendered) -> Replicates:
+    """The replicates; of pictures without noise one each."""
+    images = rendered.images
+    return rendered.replicates or (images.candidate[np.newaxis], images.reference[np.newaxis])
+
+
+def _despite(rendered: Rendered, limit: float) -> list[RungResult]:
     """The statistics of invalid pictures, if a bias is certain nevertheless; else nothing.
 
     The noise of replicates that depend on each other is not known from their spread: the mean of
     the candidate's counts as a single picture.  Pixels that are not finite are left out.
     """
+    if rendered.replicates is None:
+        return []
+    candidate, reference = rendered.replicates
     try:
         a, b = statistics.read(candidate, reference, finite=False)
     except ValueError:  # other sizes or channels
         return []
-    judges = b.mean[np.newaxis] if isinstance(b, statistics.Known) else b
     bad = [nonfinite_pixels(candidate)]
     if not isinstance(reference, statistics.Known):
         bad.append(nonfinite_pixels(reference))
     finite = np.expand_dims(~np.concatenate(bad).any(axis=0), -1)
     mean = np.where(finite, a.mean(axis=0), 0.0)
-    if not (judges.any() and np.ptp(mean) > 0.0):
+    is_lit = (b.mean if isinstance(b, statistics.Known) else b).any()
+    if not (is_lit and np.ptp(mean) > 0.0):
         return []  # black or constant, which was said already
     if isinstance(b, statistics.Known):
-        judge: FloatArray | statistics.Known = statistics.Known(
-            np.where(finite, b.mean, 0.0), np.where(finite, b.variance, 0.0)
-        )
+        b = statistics.Known(np.where(finite, b.mean, 0.0), np.where(finite, b.variance, 0.0))
     else:
-        judge = np.where(finite, b, 0.0)
-    found = statistics.compare(mean[np.newaxis], judge, limit=limit)
-    return [found] if found.status == "differ" else []
+        b = np.where(finite, b, 0.0)
+    tested = statistics.compare(mean[np.newaxis], b, limit=limit)
+    return [tested] if tested.status == "differ" else []
 
 
 def likeliest_cause(
@@ -210,10 +267,3 @@ def likeliest_cause(
 SURE = 0.995
 """The fraction of the squared difference that a cause must explain for others not to be rendered.
 If nearly all light is lost, a gain near 0 explains 0.99 of it (measured: a ball under a sky)."""
-
-
-def _places(rendered: Rendered) -> tuple[ImageRegion, ...]:
-    if rendered.replicates is not None:
-        return statistics.worst_regions(*rendered.replicates)
-    images = rendered.images
-    return statistics.worst_regions(images.candidate[np.newaxis], images.reference[np.newaxis])

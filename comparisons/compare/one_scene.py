@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import fields
 from html import escape
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,12 +15,13 @@ from comparisons.compare.looks import FIRST, SECONDS
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.renderers import WitnessName
 from comparisons.report import write_report
+from comparisons.report.biases import biases_of
 from comparisons.report.page import FAILED, SIGNS
 from comparisons.report.thumbnails import BLUE, RED, WHITE, png_url
 from comparisons.report.values import shown
 from comparisons.results.case import Case, FloatArray, Images
 from comparisons.results.files import named
-from comparisons.results.headline import headline, numbers_rows
+from comparisons.results.headline import headline
 from comparisons.runs.provenance import provenance
 from comparisons.statistics.metrics import encode, nonfinite_pixels, white_level
 from reference_rt.rendering.render import with_settings
@@ -64,11 +66,14 @@ class NotebookCase(Case):
 
     def _found(self) -> str:
         """The numbers of the statistics as a table."""
-        if not (rows := numbers_rows(self)):
+        table = biases_of(self)
+        if table is None:
             return ""
+        rows: list[tuple[str, list[Any]]] = [("th", table.head)]
+        rows += [("td", row) for row in table.cells]
         body = "".join(
             f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in row)}</tr>"
-            for tag, row in zip(("th", "td", "td", "td"), rows, strict=True)
+            for tag, row in rows
         )
         return f"<table>{body}</table>"
 

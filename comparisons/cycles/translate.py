@@ -1,5 +1,5 @@
-"""Scene -> Cycles: one `singledispatch` function for each kind, which raises NoCounterpartError for
-what Cycles does not compute exactly.
+"""Scene -> Cycles: raises NoCounterpartError for what Cycles does not compute exactly.  What it has
+of materials and textures stands in their files, `comparisons.materials` and `comparisons.textures`.
 
 Contract: the functions return plain data that `worker` reads: numbers, lists, names of .npy and
 .npz files beside it.  They take descriptions, never tables; maps are of `geometry.affine`, files
@@ -24,8 +24,10 @@ from comparisons.cycles.surfaces import Surface, name_of, surface_of
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import copies_of, place_of
 from comparisons.geometry.frame import SHARE, round32
-from comparisons.mitsuba.second import described_image
+from comparisons.materials import type_of
 from comparisons.renderers import NoCounterpartError
+from comparisons.renderers.vocabulary import Data, plain_rgb
+from comparisons.textures import BY_DESCRIPTION
 from comparisons.translator.moved import frame_of, moved
 from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
 from reference_rt.cameras.film import BoxFilter
@@ -33,9 +35,8 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import Direct
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.lights import Constant, Directional, Point
-from reference_rt.materials import Blend, Emissive, TwoSided
+from reference_rt.materials import Emissive
 from reference_rt.rendering.scene import Scene
-from reference_rt.textures import Bitmap, Checker
 
 MOST_BOUNCES = 1024
 """Cycles' own limit."""
@@ -46,9 +47,6 @@ and after a thousand the picture of `deep_mirrors` is 0.6 % off where it vanishe
 
 MOST_TRIANGLES = 5_000_000
 """Most triangles of all copies: Cycles is given each copy."""
-
-
-Data = dict[str, Any]
 
 
 @dataclass
@@ -74,6 +72,29 @@ class Writing:
         except NoCounterpartError as error:
             if str(error) not in self.reasons:
                 self.reasons.append(str(error))
+
+    def colour(self, value: Any) -> Any:
+        """A colour, or the texture of this name.  Raises NoCounterpartError."""
+        if not isinstance(value, str):
+            return plain_rgb(value)
+        texture = self.scene.textures[value]
+        known = BY_DESCRIPTION.get(type(texture))
+        if known is None or known.to_cycles is None:
+            raise NoCounterpartError(f"the texture {texture.type}")
+        return known.to_cycles(texture, self)
+
+    def number(self, value: Any) -> Any:
+        """A number, or the texture of this name.  Raises NoCounterpartError."""
+        return self.colour(value) if isinstance(value, str) else float(value)
+
+    def shader(self, name: str | None) -> Data:
+        """The shader of a material: black from behind where the material is.  Raises
+        NoCounterpartError."""
+        material = rt.Diffuse() if name is None else self.scene.materials[name]
+        known = type_of(material)
+        if known is None or known.to_cycles is None:
+            raise NoCounterpartError(f"the material {material.type}")
+        return known.to_cycles(material, self)
 
     def save(self, array: FloatArray | None = None, **arrays: Any) -> str:
         """The name of a new file that holds an array, or arrays by name."""
@@ -228,156 +249,6 @@ def _(light: Directional) -> Data:
     return {"type": "SUN", "colour": list(light.irradiance), "matrix": axes.tolist()}
 
 
-# ---- materials and textures ----------------------------------------------------------------------
-
-BLACK: Data = {"type": "black"}
-
-
-def _rgb(value: Any) -> list[float]:
-    return [float(x) for x in np.broadcast_to(value, 3)]
-
-
-def _colour(value: Any, writing: Writing) -> Any:
-    if isinstance(value, str):
-        return texture_of(writing.scene.textures[value], writing)
-    return _rgb(value)
-
-
-def _number(value: Any, writing: Writing) -> Any:
-    return _colour(value, writing) if isinstance(value, str) else float(value)
-
-
-@singledispatch
-def texture_of(texture: Any, writing: Writing) -> Data:
-    """A texture's data."""
-    raise NoCounterpartError(f"the texture {texture.type}")
-
-
-@texture_of.register
-def _(texture: Checker, writing: Writing) -> Data:
-    uv = affine.of_uv(texture.uv)[:2].tolist()
-    colours = {"first": _rgb(texture.first), "second": _rgb(texture.second)}
-    return {"type": "checker", "uv": uv, **colours}
-
-
-@texture_of.register
-def _(texture: Bitmap, writing: Writing) -> Data:
-    along_u, along_v = texture.wraps
-    if along_u != along_v or texture.cutoff is not None:
-        raise NoCounterpartError("a bitmap with two wraps, or with a cutoff")
-    path, ours = writing.scene.folder / texture.file, texture.read(writing.scene.folder).linear
-    source = path, texture.encoding, texture.scale, texture.layer
-    values = described_image(*source, ours, texture.channel)
-    return {
-        "type": "image",
-        "uv": affine.of_uv(texture.uv)[:2].tolist(),
-        "file": writing.save(values),
-        "interpolation": {"bilinear": "Linear", "nearest": "Closest"}[texture.filter],
-        "extension": {"repeat": "REPEAT", "clamp": "EXTEND", "mirror": "MIRROR"}[along_u],
-    }
-
-
-@singledispatch
-def shader_of(material: Any, writing: Writing) -> Data:
-    """The shader of a material: black from behind where the material is."""
-    raise NoCounterpartError(f"the material {material.type}")
-
-
-def _front(shader: Data) -> Data:
-    return {"type": "sides", "front": shader, "back": BLACK}
-
-
-@shader_of.register
-def _(material: rt.Diffuse, writing: Writing) -> Data:
-    return _front({"type": "diffuse", "colour": _colour(material.reflectance, writing)})
-
-
-@shader_of.register
-def _(material: rt.Mirror, writing: Writing) -> Data:
-    return _front({"type": "glossy", "colour": _colour(material.reflectance, writing)})
-
-
-@shader_of.register
-def _(material: rt.Conductor, writing: Writing) -> Data:
-    _only(material, reflectance=1.0)
-    metal = {"type": "metal", "eta": _rgb(material.eta), "k": _rgb(material.k), "roughness": 0.0}
-    return _front(metal)
-
-
-@shader_of.register
-def _(material: rt.RoughConductor, writing: Writing) -> Data:
-    _only(material, reflectance=1.0, distribution="ggx")
-    alphas = {material.alpha} if isinstance(material.alpha, str) else set(material.alpha)
-    (alpha, *others) = alphas
-    if others or isinstance(alpha, str) or alpha > MOST_ALPHA:
-        raise NoCounterpartError(
-            f"the material {material.type}, but for one alpha of at most {MOST_ALPHA:g}: Cycles' "
-            "masking is height-correlated"
-        )
-    roughness = alpha**0.5
-    metal = {"type": "metal", "eta": _rgb(material.eta), "k": _rgb(material.k)}
-    return _front({**metal, "roughness": roughness})
-
-
-@shader_of.register
-def _(material: rt.Dielectric, writing: Writing) -> Data:
-    _only(material, reflectance=1.0, transmittance=1.0)
-    ior = material.interior_ior / material.exterior_ior
-    return {"type": "glass", "ior": ior, "roughness": 0.0}
-
-
-MOST_ALPHA = 0.15
-"""Largest roughness of metals that vote.  Cycles' masking of microfacets is Smith's height-
-correlated form, ours and Mitsuba's the separable one: at 60 degrees from the normal, both ways,
-they differ by 0.03 % at this roughness (Lambda² / (1 + 2 Lambda) with Lambda = 0.017)."""
-
-
-def _only(material: Any, **values: Any) -> None:
-    for name, expected in values.items():
-        found = getattr(material, name)
-        if not np.all(np.asarray(found) == expected):
-            raise NoCounterpartError(
-                f"the material {material.type} with another {name} than {expected}"
-            )
-
-
-@shader_of.register
-def _(material: Emissive, writing: Writing) -> Data:
-    if isinstance(material.radiance, str):
-        raise NoCounterpartError("a textured lamp")
-    emission = {"type": "emission", "radiance": _rgb(material.radiance)}
-    if material.base is None:
-        return _front(emission)
-    return {"type": "sum", "of": [_front(emission), _named(material.base, writing)]}
-
-
-@shader_of.register
-def _(material: TwoSided, writing: Writing) -> Data:
-    front = _bare(_named(material.base, writing))
-    back = front if material.back is None else _bare(_named(material.back, writing))
-    return {"type": "sides", "front": front, "back": back}
-
-
-def _bare(shader: Data) -> Data:
-    """What is seen from the front, on either side."""
-    if shader["type"] == "sides" and shader["back"] == BLACK:
-        return _bare(shader["front"])
-    if shader["type"] in ("sum", "mix", "sides", "glass"):
-        raise NoCounterpartError("two_sided of a material that is made of others, or of glass")
-    return shader
-
-
-@shader_of.register
-def _(material: Blend, writing: Writing) -> Data:
-    first, second = _named(material.first, writing), _named(material.second, writing)
-    weight = _number(material.weight, writing)
-    return {"type": "mix", "weight": weight, "first": first, "second": second}
-
-
-def _named(name: str | None, writing: Writing) -> Data:
-    return shader_of(rt.Diffuse() if name is None else writing.scene.materials[name], writing)
-
-
 # ---- shapes --------------------------------------------------------------------------------------
 
 
@@ -464,7 +335,7 @@ def _material(name: str | None, writing: Writing) -> str:
     if key not in writing.named:
         material = None if name is None else writing.scene.materials[name]
         sampling = "FRONT" if isinstance(material, Emissive) else "NONE"
-        writing.named[key] = {"sampling": sampling, "shader": _named(name, writing)}
+        writing.named[key] = {"sampling": sampling, "shader": writing.shader(name)}
     return key
 
 

@@ -7,16 +7,15 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from comparisons.compare.compare import single_lights
 from comparisons.compare.diagnosis.misfit import Hypothesis
-from comparisons.compare.judge import Lights
 from comparisons.compare.misreadings import misreadings
 from comparisons.compare.one_scene import NotebookCase
 from comparisons.compare.path_length import Lengths, path_lengths
+from comparisons.compare.single_lights import single_lights
 from comparisons.gate import baselines, reference
 from comparisons.gate.digest import scene_digest
 from comparisons.gate.edges import DARK, TOLERANCE, Edges, look_at
-from comparisons.gate.gate import LIMIT, gate_pictures
+from comparisons.gate.gate import LIMIT, Question, gate_pictures
 from comparisons.gate.pictures_in import Picture, pictures_of
 from comparisons.gate.reference import Reference, check_sizes, size_of
 from comparisons.gate.rim import check_rim
@@ -30,10 +29,6 @@ from comparisons.statistics import Margins
 from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import UsageError
-
-LIGHT_SPP = 64
-"""Samples per pixel of the pictures of single lights: enough to recognise a missing one."""
-
 
 @dataclass(frozen=True)
 class Request:
@@ -221,16 +216,12 @@ class Judge:
         lengths = None if known is None else _hypotheses(known, request.threads)
         if curve is not None and lengths is not None:
             lengths = self._through(curve, lengths)
-        return gate(
-            limit=request.limit,
-            name=request.name,
-            # Pictures of single lights do not add up behind a curve.
-            lights=None if known is None or curve else _lights(known, request.threads),
-            lengths=lengths,
-            edges=edges,
-            witness=self._witness(),
-            rim=request.rim,
+        # Pictures of single lights do not add up behind a curve.
+        lights = None if known is None or curve else partial(single_lights, known, threads=request.threads)
+        question = Question(
+            request.limit, request.name, lights, lengths, edges, self._witness(), request.rim
         )
+        return gate(question=question)
 
     def _through(self, curve: ToneCurve, lengths: Lengths) -> Lengths:
         """Hypotheses about linear pictures, as the curve shows them."""
@@ -302,10 +293,6 @@ def _baseline(
     if request.noise_free and len(judge.pictures) == 1:
         judge = replace(judge, noise_free=True)
     return judge, scene
-
-
-def _lights(scene: Scene, threads: int | None) -> Lights:
-    return lambda: single_lights(scene, LIGHT_SPP, threads)
 
 
 def _hypotheses(scene: Scene, threads: int | None) -> Lengths | None:

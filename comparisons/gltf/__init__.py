@@ -18,13 +18,14 @@ import numpy as np
 
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import Copy, Leaf, copies_of
-from comparisons.gltf.surfaces import MATTE, Surfaces
+from comparisons.gltf.surfaces import Surfaces
 from comparisons.mitsuba.files import (
     Files,
     UnwritableError,
     check_name,
     write_files,
 )
+from comparisons.renderers.vocabulary import MATTE
 from comparisons.translator.resolved import (
     Tessellated,
     camera_of,

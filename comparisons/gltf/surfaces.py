@@ -1,42 +1,23 @@
-"""Materials and textures in glTF's terms, and the buffer that images stand in."""
+"""Looks and images in glTF's terms as its parts, and the buffer that images stand in."""
 
 import hashlib
 import io
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from comparisons.geometry import affine
+from comparisons.materials import type_of
 from comparisons.mitsuba.files import Losses, UnwritableError
-from reference_rt import materials
+from comparisons.renderers.vocabulary import GltfImage, Look, matte
+from comparisons.textures import BY_DESCRIPTION
+from comparisons.textures.texture import grey
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.rendering.image import srgb
-from reference_rt.textures import Bitmap, Checker, VertexColours
+from reference_rt.textures import Checker, VertexColours
 from reference_rt.textures.image_file import linear
-
-
-@dataclass
-class _Look:
-    """A material in glTF's terms.  Colours and numbers are constants or names of textures.
-
-    tint: a factor of `base`;  of_alpha: whether `roughness` is GGX's alpha, its square;  normals:
-    a `normal_map`."""
-
-    base: Any = (0.5, 0.5, 0.5)
-    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    metallic: Any = 0.0
-    roughness: Any = 1.0
-    of_alpha: bool = False
-    opacity: Any = 1.0
-    radiance: Any = (0.0, 0.0, 0.0)
-    normals: Any = None
-    both_sides: bool = False
-    extensions: dict[str, dict[str, Any]] = field(default_factory=dict)
 
 
 class Surface(NamedTuple):
@@ -52,132 +33,12 @@ class Surface(NamedTuple):
     follow_v: bool = False
 
 
-MATTE = {"KHR_materials_specular": {"specularFactor": 0.0}}
-"""Without its highlight glTF's dielectric is exactly Lambert's law."""
-
-NEARLY = {
-    "mirror": "a smooth metal, white at grazing angles",
-    "conductor": "a smooth metal of Schlick's reflectance",
-    "rough_conductor": "a metal of Schlick's reflectance",
-    "dielectric": "KHR_materials_transmission",
-    "thin_dielectric": "KHR_materials_transmission",
-    "rough_dielectric": "KHR_materials_transmission",
-    "plastic": "a diffuse base below a highlight",
-    "rough_plastic": "a diffuse base below a highlight",
-    "principled": "base colour, metallic, roughness and index alone",
-    "principled_thin": "base colour and roughness alone",
-    "phong": "a matte surface",
-}
-
-
-def _look(losses: Losses, name: str | None) -> _Look:
-    """Raises UnwritableError."""
-    if name is None:
-        return _Look(extensions=dict(MATTE))
-    material: Any = losses.scene.materials[name]
-    kind = material.type
-    if kind in NEARLY:
-        losses.note(f"the material '{name}' ({kind}) is only nearly so in glTF: {NEARLY[kind]}")
-    match material:
-        case materials.TwoSided():
-            if material.back not in (None, material.base):
-                raise UnwritableError("another material behind than in front")
-            found = _look(losses, material.base)
-            found.both_sides = True
-            return found
-        case materials.Mask():
-            found = _look(losses, material.base)
-            found.opacity = material.opacity
-            return found
-        case materials.NormalMap():
-            found = _look(losses, material.base)
-            found.normals = material
-            return found
-        case materials.Bump():
-            losses.note(f"the bumps of the material '{name}' are left out")
-            return _look(losses, material.base)
-        case materials.Emissive():
-            losses.note("few renderers of glTF light others with surfaces that shine")
-            black = _Look((0.0, 0.0, 0.0), extensions=dict(MATTE))
-            found = black if material.base is None else _look(losses, material.base)
-            found.radiance = material.radiance
-            return found
-        case materials.Diffuse():
-            return _Look(material.reflectance, extensions=dict(MATTE))
-        case materials.Mirror():
-            return _Look(material.reflectance, metallic=1.0, roughness=0.0)
-        case materials.Conductor() | materials.RoughConductor():
-            eta, k = np.array(material.eta), np.array(material.k)
-            head_on = ((eta - 1.0) ** 2 + k**2) / ((eta + 1.0) ** 2 + k**2)
-            alpha = getattr(material, "alpha", 0.0)
-            return _Look(material.reflectance, tuple(head_on.tolist()), 1.0, _one(alpha), True)
-        case materials.Dielectric() | materials.ThinDielectric() | materials.RoughDielectric():
-            passing = {"KHR_materials_transmission": {"transmissionFactor": 1.0}}
-            alpha = getattr(material, "alpha", 0.0)
-            more = passing | _index(material.interior_ior / material.exterior_ior)
-            return _Look(material.transmittance, (1, 1, 1), 0.0, _one(alpha), True, extensions=more)
-        case materials.Plastic() | materials.RoughPlastic():
-            more = _index(material.interior_ior / material.exterior_ior)
-            alpha = _one(getattr(material, "alpha", 0.0))
-            return _Look(material.reflectance, (1, 1, 1), 0.0, alpha, True, extensions=more)
-        case materials.Principled():
-            more = _index(material.relative_ior)
-            base, metallic, rough = material.base_colour, material.metallic, material.roughness
-            return _Look(base, (1, 1, 1), metallic, rough, extensions=more)
-        case materials.PrincipledThin():
-            return _Look(material.base_colour, roughness=material.roughness)
-        case materials.Phong() if not isinstance(material.diffuse, str):
-            seen = np.minimum(np.pi * np.array(material.diffuse), 1.0)
-            return _Look(tuple(seen.tolist()), extensions=dict(MATTE))
-    if kind == "gltf_pbr":
-        more = _index(material.ior)
-        if (material.specular, material.specular_color) != (1.0, (1.0, 1.0, 1.0)):
-            if isinstance(material.specular, str) or isinstance(material.specular_color, str):
-                raise UnwritableError("a textured strength or colour of the highlight")
-            strength = {"specularFactor": material.specular}
-            strength |= {"specularColorFactor": list(material.specular_color)}
-            more["KHR_materials_specular"] = strength
-        base = material.base_color
-        return _Look(base, (1, 1, 1), material.metallic, material.roughness, extensions=more)
-    raise UnwritableError(f"a material '{kind}'")
-
-
-def _one(alpha: Any) -> Any:
-    """The roughness of both directions: a texture, or the geometric mean."""
-    along, across = alpha if isinstance(alpha, tuple) else (alpha, alpha)
-    if along == across:
-        return along
-    if isinstance(along, str) or isinstance(across, str):
-        raise UnwritableError("two roughnesses of which one is a texture")
-    return float(np.sqrt(along * across))
-
-
-def _index(ior: float) -> dict[str, dict[str, Any]]:
-    """An index below 1 reflects as its inverse does, head-on."""
-    ior = 1.0 / ior if 0.0 < ior < 1.0 else ior
-    return {} if ior == 1.5 else {"KHR_materials_ior": {"ior": ior}}
-
-
 class _Parts(NamedTuple):
     """A colour: the product of a constant, of images by name, and of the vertices' colours."""
 
     factor: FloatArray
     images: tuple[str, ...] = ()
     colours: VertexColours | None = None
-
-
-class _Image(NamedTuple):
-    """Linear texels (height, width, 3);  scale: a factor of 8-bit codes in them;  uv: (3, 3), from
-    a shape's coordinates;  sampler: glTF's."""
-
-    texels: FloatArray
-    scale: float
-    uv: FloatArray
-    sampler: dict[str, int]
-
-
-LINEAR, NEAREST = 9729, 9728
-WRAPS = {"repeat": 10497, "clamp": 33071, "mirror": 33648}
 
 
 @dataclass
@@ -215,10 +76,10 @@ class Surfaces(Losses):
         if name not in self.surfaces:
             self.surfaces[name] = Surface(0, (), None, False, True)
             with self.collected("materials", name or "default"):
-                self.surfaces[name] = self.material(_look(self, name), name or "default")
+                self.surfaces[name] = self.material(self.look(name), name or "default")
         return self.surfaces[name]
 
-    def material(self, look: _Look, name: str) -> Surface:
+    def material(self, look: Look, name: str) -> Surface:
         maps: list[FloatArray] = []
         pbr: dict[str, Any] = {}
         found: dict[str, Any] = {"name": name, "pbrMetallicRoughness": pbr}
@@ -231,7 +92,7 @@ class Surfaces(Losses):
             scale = np.prod([one.scale for one in rgb])
             codes, tint = self.coded(colour * tint, tint * scale, 1.0, name)
             if alpha:
-                grey = np.prod([_grey(one.texels) for one in alpha], axis=0)
+                grey = np.prod([grey(one.texels) for one in alpha], axis=0)
                 shares = self.rounded(grey * opacity.factor[0], name)
                 codes = np.concatenate([codes, shares[..., None]], axis=2)
             pbr["baseColorTexture"] = self.texture(codes, sampler, uv, maps)
@@ -251,7 +112,7 @@ class Surfaces(Losses):
             codes = np.full(shape, 255, np.uint8)
             for k, (key, some) in enumerate(planes.items(), 1):
                 if some:
-                    grey = np.prod([_grey(one.texels) for one in some], axis=0)
+                    grey = np.prod([grey(one.texels) for one in some], axis=0)
                     grey = grey * values[key].factor[0]
                     root = look.of_alpha and key == "roughnessFactor"
                     codes[..., k] = self.rounded(np.sqrt(grey) if root else grey, name)
@@ -280,7 +141,7 @@ class Surfaces(Losses):
         return Surface(number, tuple(maps), colours, tangents, look.both_sides, follow_v)
 
     def emission(
-        self, look: _Look, found: dict[str, Any], maps: list[FloatArray], name: str
+        self, look: Look, found: dict[str, Any], maps: list[FloatArray], name: str
     ) -> None:
         shining = self.parts(look.radiance)
         factor = shining.factor
@@ -324,29 +185,29 @@ class Surfaces(Losses):
         found: float | None = getattr(texture, "cutoff", None)
         return found
 
-    def images(self, names: tuple[str, ...]) -> list[_Image]:
+    def images(self, names: tuple[str, ...]) -> list[GltfImage]:
         return [self.image(name) for name in names]
 
-    def image(self, name: str) -> _Image:
+    def look(self, name: str | None) -> Look:
+        """The material with this name.  Raises UnwritableError."""
+        if name is None:
+            return matte(Look().base)
+        material = self.scene.materials[name]
+        known = type_of(material)
+        to_gltf = None if known is None else known.to_gltf
+        if to_gltf is None:
+            raise UnwritableError(f"a material '{material.type}'")
+        if to_gltf.nearly:
+            what = f"the material '{name}' ({material.type})"
+            self.note(f"{what} is only nearly so in glTF: {to_gltf.nearly}")
+        return to_gltf.look(material, name, self)
+
+    def image(self, name: str) -> GltfImage:
         texture = self.scene.textures[name]
-        uv = affine.of_uv(texture.uv)
-        match texture:
-            case Checker():
-                pair = np.array([texture.first, texture.second])
-                scale = float(pair.max()) or 1.0
-                both = {"magFilter": NEAREST, "minFilter": NEAREST}
-                tiled = {"wrapS": WRAPS["repeat"], "wrapT": WRAPS["repeat"]}
-                return _Image(pair[[[1, 0], [0, 1]]], scale, uv, both | tiled)
-            case Bitmap():
-                read = partial(texture.read, self.scene.folder)
-                texels = self.read(read, "textures", name).linear
-                kind = LINEAR if texture.filter == "bilinear" else NEAREST
-                wrap: Any = texture.wrap
-                along = (wrap, wrap) if isinstance(wrap, str) else wrap
-                sampler = {"magFilter": kind, "minFilter": kind}
-                sampler |= {"wrapS": WRAPS[along[0]], "wrapT": WRAPS[along[1]]}
-                return _Image(texels, texture.scale, uv, sampler)
-        raise UnwritableError(f"a texture '{texture.type}'")
+        known = BY_DESCRIPTION.get(type(texture))
+        if known is None or known.to_gltf is None:
+            raise UnwritableError(f"a texture '{texture.type}'")
+        return known.to_gltf(texture, name, self)
 
     def coded(
         self, values: FloatArray, scale: FloatArray, most: float, name: str
@@ -389,11 +250,7 @@ class Surfaces(Losses):
         return {"index": self.add("textures", number), "texCoord": which}
 
 
-def _grey(texels: FloatArray) -> FloatArray:
-    return np.asarray(luminance(Vec3(*np.moveaxis(texels, -1, 0))))
-
-
-def _common(first: _Image, *others: _Image) -> tuple[Any, dict[str, int], FloatArray]:
+def _common(first: GltfImage, *others: GltfImage) -> tuple[Any, dict[str, int], FloatArray]:
     """The shape, sampler and map of images that become one."""
     for one in others:
         same = one.texels.shape == first.texels.shape and one.sampler == first.sampler

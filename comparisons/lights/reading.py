@@ -10,10 +10,11 @@ import numpy as np
 
 from comparisons.cameras.reading import Frame, angle
 from comparisons.mitsuba.backend import cache_folder, mitsuba
+from comparisons.mitsuba.colours import Rgb, colour
 from comparisons.mitsuba.node import Node, Reading, triple
 from comparisons.mitsuba.parse import as_transform
 from comparisons.mitsuba.scene import for_rays
-from comparisons.textures.reading import Rgb, colour, colour_or_texture, projected
+from comparisons.textures.reading import colour_or_texture, projected
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.image_files import open_image
 from reference_rt.core.transform import is_similarity

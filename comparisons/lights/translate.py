@@ -11,13 +11,9 @@ from comparisons.geometry import affine
 from comparisons.geometry.affine import is_similarity
 from comparisons.geometry.flatten import Copy, Leaf, Member
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.context import TranslationContext, UntranslatableError, rgb
 from comparisons.mitsuba.second import described_image
-from comparisons.textures.translate import (
-    TranslationContext,
-    UntranslatableError,
-    projected,
-    rgb,
-)
+from comparisons.textures.translate import projected
 from reference_rt.integrators import Direct, Path, RayCast, Whitted
 from reference_rt.lights import (
     Ambient,

@@ -87,8 +87,8 @@ def _expected_version() -> str | None:
     """The version of Mitsuba that this package requires; None where it is not installed."""
     with contextlib.suppress(importlib.metadata.PackageNotFoundError):
         for requirement in importlib.metadata.requires("reference-rt") or ():
-            if found := re.match(r"mitsuba *== *([^\s;]+)", requirement):
-                return found[1]
+            if match := re.match(r"mitsuba *== *([^\s;]+)", requirement):
+                return match[1]
     return None
 
 
@@ -118,11 +118,11 @@ def choose() -> Backend:
             why = f"forced by {FORCE}" if forced else "the fastest variant that works here"
             return Backend(variant, version, f"{why}, with {name}", path)
         tried.append(f"{name} {problem}")
-    found = "; ".join(tried) or "no libLLVM was found"
+    reasons = "; ".join(tried) or "no libLLVM was found"
     advice = f"to get llvm: {llvm_libraries.ADVICE}"
     if forced:
-        raise ReferenceUnavailableError(f"{FORCE}={forced}: {found}; {advice}")
-    return Backend(SCALAR, version, f"{found}; {advice}", None)
+        raise ReferenceUnavailableError(f"{FORCE}={forced}: {reasons}; {advice}")
+    return Backend(SCALAR, version, f"{reasons}; {advice}", None)
 
 
 def _libraries() -> list[str | None]:
@@ -296,7 +296,11 @@ def _read_memory() -> dict[str, str | None]:
         return {}
     if not isinstance(memory, dict):
         return {}
-    return {key: found for key, found in memory.items() if found is None or isinstance(found, str)}
+    return {
+        key: version
+        for key, version in memory.items()
+        if version is None or isinstance(version, str)
+    }
 
 
 def _write_memory(memory: dict[str, str | None]) -> None:

@@ -88,8 +88,8 @@ class Counterpart:
         return self._moved() + [
             f"a mesh of {s.triangles:,} triangles stands in for shape {shape} ({s.name}); it is at "
             f"most {s.sag:.2g} off, {s.ratio:.2g} times that with half as many triangles a side"
-            for shape, found in self.stand_ins().items()
-            for s in dict.fromkeys(found)
+            for shape, stand_ins in self.stand_ins().items()
+            for s in dict.fromkeys(stand_ins)
         ]
 
     def _moved(self) -> list[str]:
@@ -104,13 +104,13 @@ class Counterpart:
 
     def all_mi_shapes(self) -> list[MitsubaShape]:
         """The Mitsuba shapes of all scenes, operands of solids included."""
-        found = list(self.mi_shapes.values())
+        mi_shapes = list(self.mi_shapes.values())
         if self.instanced_group is not None:
-            found += self.instanced_group.mi_shapes.values()
+            mi_shapes += self.instanced_group.mi_shapes.values()
         for solid in self.solids:
             for operand in solid.operands:
-                found += operand.mi_shapes.values()
-        return found
+                mi_shapes += operand.mi_shapes.values()
+        return mi_shapes
 
     def has_planes(self) -> bool:
         """Whether finite meshes stand in for infinite planes."""
@@ -119,18 +119,18 @@ class Counterpart:
     def beyond_planes(self, ours: Intersections) -> BoolArray:
         """(n,): whether our hit is on a shape with an infinite plane, beyond the finite mesh that
         stands in for it."""
-        found = np.zeros(len(ours.t), bool)
+        beyond = np.zeros(len(ours.t), bool)
         for mi_shape in self.all_mi_shapes():
             extent = mi_shape.plugin.extent
             if extent is not None:
                 away = np.linalg.norm(ours.p - self.frame.out(extent.middle), axis=1)
-                found |= (ours.shape == mi_shape.shape) & (away > extent.radius / self.frame.scale)
-        return found
+                beyond |= (ours.shape == mi_shape.shape) & (away > extent.radius / self.frame.scale)
+        return beyond
 
     def stand_ins(self) -> dict[int, list[StandIn]]:
         """The errors of meshes that stand in for curved surfaces, by the index of the shape, in
         scene units."""
-        found: dict[int, list[StandIn]] = {}
+        by_shape: dict[int, list[StandIn]] = {}
         for mi_shape in self.all_mi_shapes():
             if mi_shape.plugin.stand_in is not None:
                 one = mi_shape.plugin.stand_in
@@ -138,13 +138,15 @@ class Counterpart:
                 one = one._replace(
                     sag=one.sag / scale, slip=one.slip / scale, shift=one.shift / scale
                 )
-                found.setdefault(mi_shape.shape, []).append(one)
-        return found
+                by_shape.setdefault(mi_shape.shape, []).append(one)
+        return by_shape
 
     def sags(self) -> dict[int, float]:
         """The largest distance between a shape and the mesh that stands in for it, by the index of
         the shape, in scene units."""
-        return {shape: max(s.sag for s in found) for shape, found in self.stand_ins().items()}
+        return {
+            shape: max(s.sag for s in stand_ins) for shape, stand_ins in self.stand_ins().items()
+        }
 
 
 def trace(
@@ -161,27 +163,27 @@ def trace(
     `SolidCounterpart.trace`.
     """
     if counterpart.frame.is_ours:
-        found = _trace(counterpart, o, d, tolerance)
+        hits = _trace(counterpart, o, d, tolerance)
     else:
-        found = _trace(counterpart, counterpart.frame.into(o), d, tolerance)
+        hits = _trace(counterpart, counterpart.frame.into(o), d, tolerance)
         scale = counterpart.frame.scale
-        met = found.shape >= 0
-        found.p[met] = counterpart.frame.out(found.p[met])
-        t, sag, height = found.t / scale, found.sag / scale, found.height / scale
-        found = replace(found, t=t, sag=sag, height=height)
-    beyond = np.flatnonzero(np.isfinite(found.t) & (found.t >= t_max))
-    assign(found, beyond, misses(len(beyond)))
-    return found
+        met = hits.shape >= 0
+        hits.p[met] = counterpart.frame.out(hits.p[met])
+        t, sag, height = hits.t / scale, hits.sag / scale, hits.height / scale
+        hits = replace(hits, t=t, sag=sag, height=height)
+    beyond = np.flatnonzero(np.isfinite(hits.t) & (hits.t >= t_max))
+    assign(hits, beyond, misses(len(beyond)))
+    return hits
 
 
 def _trace(counterpart: Counterpart, o: FloatArray, d: FloatArray, tolerance: float) -> MitsubaHits:
     """The same in the counterpart's coordinates."""
-    found = _hits(counterpart.mi_scene, counterpart.mi_shapes, o, d)
+    hits = _hits(counterpart.mi_scene, counterpart.mi_shapes, o, d)
     everything = np.arange(len(o))
     if counterpart.instanced_group is not None and len(o) > 0:
         with scalar():
             assign_nearer(
-                found,
+                hits,
                 everything,
                 _hits(
                     counterpart.instanced_group.mi_scene,
@@ -194,8 +196,8 @@ def _trace(counterpart: Counterpart, o: FloatArray, d: FloatArray, tolerance: fl
         near = solid.box().near(o, d)
         if len(near) == 0:
             continue
-        assign_nearer(found, near, solid.trace(o[near], d[near], tolerance))
-    return found
+        assign_nearer(hits, near, solid.trace(o[near], d[near], tolerance))
+    return hits
 
 
 def _hits(

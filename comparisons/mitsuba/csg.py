@@ -114,7 +114,7 @@ class Operand(NamedTuple):
         rays = box.near(o, d)
         origin = o[rays]
         length2 = np.sum(d * d, axis=1)
-        found: list[Crossings] = []
+        crossings: list[Crossings] = []
         inside = np.zeros(len(o), bool)
         started = rays[box.around(origin)]
         inside[started] = self._inside(ids, mi_shapes, o[started], d[started])
@@ -135,9 +135,9 @@ class Operand(NamedTuple):
             # Otherwise the ray hits the same face again, or an edge whose other side it missed.
             new = enters != within[rays]
             within[rays] = enters
-            found.append(Crossings(rays[new], enters[new], slack[new], rows_of(hits, new)))
+            crossings.append(Crossings(rays[new], enters[new], slack[new], rows_of(hits, new)))
             origin = round32(o[rays] + d[rays] * (hits.t + 0.5 * slack)[:, None])
-        return inside, found
+        return inside, crossings
 
     def _inside(
         self, ids: Mapping[str, int], mi_shapes: list[MitsubaShape], o: FloatArray, d: FloatArray
@@ -213,7 +213,7 @@ class SolidCounterpart:
     ) -> BoolArray:
         """(n,): whether the ray crosses face `primitive` of operand `part` at t, within float32's
         bound."""
-        found = np.zeros(len(o), bool)
+        met = np.zeros(len(o), bool)
         for operand in self.operands:
             rows = np.flatnonzero(part == operand.leaf.part)
             if len(rows) == 0:
@@ -226,8 +226,8 @@ class SolidCounterpart:
                 cosine /= np.linalg.norm(d[mine], axis=1)
                 more = np.maximum(1.0 / (STEEPEST * np.maximum(cosine, TINY)), 1.0)
                 near = np.abs(crossing.at.t - t[mine]) <= crossing.slack * more
-                found[mine] |= near & (crossing.at.primitive == primitive[mine])
-        return found
+                met[mine] |= near & (crossing.at.primitive == primitive[mine])
+        return met
 
     def _first_change(
         self,

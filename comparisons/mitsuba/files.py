@@ -190,10 +190,10 @@ def _check_folder(path: Path, folder: Path) -> None:
         return
     try:
         scene = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
-        found = sorted(file.name for file in folder.iterdir()) if folder.is_dir() else [""]
+        names = sorted(file.name for file in folder.iterdir()) if folder.is_dir() else [""]
     except OSError as error:
         raise ImageError(f"{folder}: cannot be read: {error.strerror}") from None
-    others = [name for name in found if not name or f"{folder.name}/{name}" not in scene]
+    others = [name for name in names if not name or f"{folder.name}/{name}" not in scene]
     if others:
         raise ImageError(
             f"{folder / others[0]}: is not of the scene {path}, and would be lost; expected no "
@@ -344,41 +344,41 @@ def write_scene(scene: SceneModel, path: Path) -> int:
     """
     check_name(path, SUFFIXES)
 
-    def text(found: Files) -> str:
-        changed = _with_files(scene, found)
+    def text(files: Files) -> str:
+        changed = _with_files(scene, files)
         return changed.to_json() if path.suffix.lower() == ".json" else changed.to_yaml()
 
     return write_files(scene, path, text)
 
 
-def _with_files(scene: SceneModel, found: Files) -> SceneModel:
+def _with_files(scene: SceneModel, files: Files) -> SceneModel:
     """The scene that names the written files."""
     return scene.changed(
-        textures={k: _with_image(t, found, "textures", k) for k, t in scene.textures.items()},
-        lights=tuple(_with_image(x, found, "lights", k) for k, x in enumerate(scene.lights)),
-        shapes=tuple(_shape(s, found, "shapes", k) for k, s in enumerate(scene.shapes)),
+        textures={k: _with_image(t, files, "textures", k) for k, t in scene.textures.items()},
+        lights=tuple(_with_image(x, files, "lights", k) for k, x in enumerate(scene.lights)),
+        shapes=tuple(_shape(s, files, "shapes", k) for k, s in enumerate(scene.shapes)),
         groups={
-            name: tuple(_shape(s, found, "groups", name, k) for k, s in enumerate(members))
+            name: tuple(_shape(s, files, "groups", name, k) for k, s in enumerate(members))
             for name, members in scene.groups.items()
         },
     )
 
 
-def _with_image(part: Any, found: Files, *path: str | int) -> Any:
+def _with_image(part: Any, files: Files, *path: str | int) -> Any:
     """A texture or a light with a copy of its image."""
     if getattr(part, "file", None) is None:
         return part
-    return part.model_copy(update={"file": found.copy(part.file, *path, "file")})
+    return part.model_copy(update={"file": files.copy(part.file, *path, "file")})
 
 
-def _shape(shape: Shape, found: Files, *path: str | int) -> Shape:
+def _shape(shape: Shape, files: Files, *path: str | int) -> Shape:
     if isinstance(shape, Solid):
-        parts = tuple(_shape(s, found, *path, "of", k) for k, s in enumerate(shape.of))
+        parts = tuple(_shape(s, files, *path, "of", k) for k, s in enumerate(shape.of))
         return shape.model_copy(update={"of": parts})
     if not isinstance(shape, Mesh):
         return shape
     if shape.file is not None:
-        return shape.model_copy(update={"file": found.copy(shape.file, *path, "file")})
-    name = found.write("mesh.ply", lambda file: file.write_bytes(ply(shape)))
+        return shape.model_copy(update={"file": files.copy(shape.file, *path, "file")})
+    name = files.write("mesh.ply", lambda file: file.write_bytes(ply(shape)))
     arrays = dict.fromkeys(Mesh.array_fields)
     return shape.model_copy(update={**arrays, "file": name})

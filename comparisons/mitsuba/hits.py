@@ -159,11 +159,11 @@ better conditioned."""
 
 def read(hits: RawHits, mi_shapes: Sequence[MitsubaShape], o: FloatArray) -> MitsubaHits:
     """The hits of rays from o in our terms; `hits.which` is an index of `mi_shapes`."""
-    found = misses(len(hits.t))
+    in_ours = misses(len(hits.t))
     met = hits.which >= 0
     for name in ("t", "p", "n", "ns"):
-        getattr(found, name)[:] = getattr(hits, name)
-    found.primitive[met] = hits.prim[met]
+        getattr(in_ours, name)[:] = getattr(hits, name)
+    in_ours.primitive[met] = hits.prim[met]
     order = np.argsort(hits.which, kind="stable")
     numbers, starts = np.unique(hits.which[order], return_index=True)
     for number, rows in zip(numbers.tolist(), np.split(order, starts[1:]), strict=True):
@@ -171,28 +171,28 @@ def read(hits: RawHits, mi_shapes: Sequence[MitsubaShape], o: FloatArray) -> Mit
             continue
         mi_shape = mi_shapes[number]
         plugin = mi_shape.plugin
-        found.shape[rows], found.part[rows] = mi_shape.shape, mi_shape.part
-        found.instance[rows] = mi_shape.instance
+        in_ours.shape[rows], in_ours.part[rows] = mi_shape.shape, mi_shape.part
+        in_ours.instance[rows] = mi_shape.instance
         if plugin.faces is not None:
-            found.primitive[rows] = plugin.faces[hits.prim[rows]]
+            in_ours.primitive[rows] = plugin.faces[hits.prim[rows]]
         if plugin.uv is not None:
             uv = hits.uv[rows]
-            found.uv[rows] = uv if plugin.uv is same_uv else plugin.uv(uv)
-            found.has_uv[rows] = True
+            in_ours.uv[rows] = uv if plugin.uv is same_uv else plugin.uv(uv)
+            in_ours.has_uv[rows] = True
         elif plugin.uv_of_mesh:  # for textures; between vertices they are interpolated
-            found.uv[rows] = hits.uv[rows]
-        found.stands_in[rows] = plugin.faceted
+            in_ours.uv[rows] = hits.uv[rows]
+        in_ours.stands_in[rows] = plugin.faceted
         if plugin.heights is not None:
-            found.height[rows] = plugin.heights[hits.prim[rows]]
+            in_ours.height[rows] = plugin.heights[hits.prim[rows]]
         if plugin.aspects is not None:
-            found.aspect[rows] = plugin.aspects[hits.prim[rows]]
+            in_ours.aspect[rows] = plugin.aspects[hits.prim[rows]]
         if plugin.stand_in is not None:
-            found.sag[rows], found.turn[rows] = plugin.stand_in.sag, plugin.stand_in.turn
-            found.stands_in[rows] = True
+            in_ours.sag[rows], in_ours.turn[rows] = plugin.stand_in.sag, plugin.stand_in.turn
+            in_ours.stands_in[rows] = True
         if plugin.curved > 0.0:
             distance2 = np.sum((hits.p[rows] - o[rows]) ** 2, axis=1)
-            found.sag[rows] = CURVED * UNIT_ROUNDOFF * distance2 / plugin.curved
-    return found
+            in_ours.sag[rows] = CURVED * UNIT_ROUNDOFF * distance2 / plugin.curved
+    return in_ours
 
 
 def misses(n: int) -> MitsubaHits:

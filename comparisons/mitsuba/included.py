@@ -44,27 +44,27 @@ LEAST_ALPHA = 1e-4
 
 def adapt(mi: Any, state: Any) -> list[Note]:
     """Change the description; what was changed."""
-    found: list[Note] = []
+    notes: list[Note] = []
     for index, node in enumerate(state.nodes):
         props, plugin = node.props, str(node.props.plugin_name())
         if plugin in PRIMAL and node.type.name == "Integrator":
-            found.append((index, _primal(props, plugin)))
+            notes.append((index, _primal(props, plugin)))
         elif plugin == "batch" and node.type.name == "Sensor":
-            found += _first_of_batch(mi, state, index)
+            notes += _first_of_batch(mi, state, index)
         elif plugin in ("roughconductor", "roughdielectric", "roughplastic"):
             for key in ("alpha", "alpha_u", "alpha_v"):
                 value = props.get(key, 1.0)
                 if isinstance(value, int | float) and 0.0 <= value < LEAST_ALPHA:
                     props[key] = LEAST_ALPHA
-                    found.append((index, f"'{key}' is {value:g}, for which Mitsuba takes 0.0001"))
+                    notes.append((index, f"'{key}' is {value:g}, for which Mitsuba takes 0.0001"))
         elif plugin == "bitmap" and props.get("filter_type", "") in ("trilinear", "ewa"):
             old = props["filter_type"]
             props["filter_type"] = "bilinear"
-            found.append((index, f"'{old}' filtering of Mitsuba 0.x becomes bilinear"))
+            notes.append((index, f"'{old}' filtering of Mitsuba 0.x becomes bilinear"))
         for key in _WITHOUT_EFFECT.get(plugin, ()):
             if key in props:
                 del props[key]
-    return found
+    return notes
 
 
 def _primal(props: Any, plugin: str) -> str:
@@ -207,7 +207,7 @@ class Included:
             elif tag == "include" and "filename" in attributes:
                 known = re.sub(
                     r"\$(\w+)",
-                    lambda found: self.values.get(found[1], found[0]),
+                    lambda match: self.values.get(match[1], match[0]),
                     attributes["filename"],
                 )
                 includes.append((known, level, parser.CurrentLineNumber))

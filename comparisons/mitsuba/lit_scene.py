@@ -52,10 +52,10 @@ class LitScene(PlainScene):
 
         si, of_solid = super().trace(ray, active)
         for solid in self._solids:
-            found = solid.first(ray, dr.minimum(ray.maxt, si.t), active)
-            met = found.operand != NONE
+            crossing = solid.first(ray, dr.minimum(ray.maxt, si.t), active)
+            met = crossing.operand != NONE
             if dr.any(met):
-                si = solid.interaction(ray, found, si)
+                si = solid.interaction(ray, crossing, si)
                 of_solid |= met
         return si, of_solid
 
@@ -166,20 +166,20 @@ class _Solid:
             start = dr.select(found == k, following[k].start, start)
         return _Found(found, start, began ^ True)
 
-    def interaction(self, ray: Any, found: _Found, si: Any) -> Any:
+    def interaction(self, ray: Any, crossing: _Found, si: Any) -> Any:
         """`si`, overwritten where the solid was found; normals point out of the solid."""
         import drjit as dr
 
         mi = mitsuba()
         for k, operand in enumerate(self.operands):
-            mine = found.operand == k
-            start = dr.select(mine, found.start, 0.0)
+            mine = crossing.operand == k
+            start = dr.select(mine, crossing.start, 0.0)
             near = mi.Ray3f(ray.o + ray.d * start, ray.d, ray.time, ray.wavelengths)
             other = operand.mi_scene.ray_intersect(near, mine)
             other.t += start
             si = dr.select(mine, other, si)
-        met = found.operand != NONE
-        turned = met & ((dr.dot(si.n, ray.d) < 0.0) != found.enters)
+        met = crossing.operand != NONE
+        turned = met & ((dr.dot(si.n, ray.d) < 0.0) != crossing.enters)
         si.n = dr.select(turned, -si.n, si.n)
         si.sh_frame.n = dr.select(turned, -si.sh_frame.n, si.sh_frame.n)
         si.initialize_sh_frame()

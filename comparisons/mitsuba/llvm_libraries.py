@@ -44,11 +44,11 @@ def candidates() -> list[str]:
     own = os.environ.get(LIBRARY)
     if own:
         return [own]
-    found = [*_newest_first(_files_of_wheel()), *_newest_first(_files_of_system())]
-    if not found:
+    files = [*_newest_first(_files_of_wheel()), *_newest_first(_files_of_system())]
+    if not files:
         elsewhere = ctypes.util.find_library("LLVM")
-        found = [elsewhere] if elsewhere else []
-    return list(dict.fromkeys(found))
+        files = [elsewhere] if elsewhere else []
+    return list(dict.fromkeys(files))
 
 
 def needed_by(path: str) -> list[str]:
@@ -56,11 +56,11 @@ def needed_by(path: str) -> list[str]:
     files = list(_files_of_wheel())
     if Path(path).resolve() not in files:
         return []
-    found = []
+    newest = []
     for name in _NEEDED:
         versions = [str(file) for file in files if re.match(rf"{re.escape(name)}\.so\.", file.name)]
-        found += versions[:1]
-    return found
+        newest += versions[:1]
+    return newest
 
 
 def load_needed(path: str) -> None:

@@ -7,7 +7,7 @@ What no reader has taken at the end is an error: nothing of a file is silently l
 import itertools
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -71,13 +71,13 @@ class Node:
         """An error about this element, with file, line, column and plugin."""
         what = f"{self.kind.lower()} '{self.plugin}'"
         place = self._place
-        found = _PLACE.match(place)
-        if found is None:
+        match = _PLACE.match(place)
+        if match is None:
             return SceneError(f"{what}: {message}", file=place)
         return SceneError(
-            f"column {found['col']}: {what}: {message}",
-            file=found["file"].strip('"'),
-            line=int(found["line"]),
+            f"column {match['col']}: {what}: {message}",
+            file=match["file"].strip('"'),
+            line=int(match["line"]),
         )
 
     def unsupported(self, advice: str = "") -> "MissingError":
@@ -192,12 +192,12 @@ class Node:
         if value is None:
             return default
         try:
-            found = np.array(value, np.float64).reshape(3)
+            numbers = np.array(value, np.float64).reshape(3)
         except (TypeError, ValueError):
             raise self.error(f"'{key}' is no vector; expected three numbers") from None
-        if not np.isfinite(found).all():
+        if not np.isfinite(numbers).all():
             raise self.error(f"'{key}' is not finite; expected three finite numbers")
-        return triple(found)
+        return triple(numbers)
 
     def transform(self, key: str = "to_world") -> Affine:
         """(3, 4), the identity by default."""
@@ -264,19 +264,19 @@ class Node:
 
     def named_children(self, *kinds: str) -> list[tuple[str, "Node"]]:
         """The same with the names of the parameters that hold them."""
-        found = []
+        children = []
         for key in list(self._left):
             value = self._props[key]
             if type(value).__name__ == "ResolvedReference":
                 node = Node(self._parsed, value.index())
                 if node.kind in kinds:
                     self._left.pop(key)
-                    found.append((key, node))
+                    children.append((key, node))
             elif self._props.type(key).name == "Object":
                 raise self.error(
                     f"'{key}' is an object of Mitsuba's already; expected its dictionary"
                 )
-        return found
+        return children
 
     def has_children(self, kind: str) -> bool:
         """Whether there is a nested element of this kind."""
@@ -286,10 +286,10 @@ class Node:
 
     def only(self, *kinds: str) -> "Node | None":
         """The nested element of these kinds, if there is one.  Raises SceneError for several."""
-        found = self.children(*kinds)
-        if len(found) > 1:
-            raise self.error(f"has {len(found)} elements of kind {kinds[0]}; expected one at most")
-        return found[0] if found else None
+        nodes = self.children(*kinds)
+        if len(nodes) > 1:
+            raise self.error(f"has {len(nodes)} elements of kind {kinds[0]}; expected one at most")
+        return nodes[0] if nodes else None
 
 
 # ---- what has been read --------------------------------------------------------------------------
@@ -297,9 +297,11 @@ class Node:
 
 @dataclass
 class Reading:
-    """What has been read of a scene so far; notes: what the reader should know of it."""
+    """What has been read of a scene so far; material_name: reads a BSDF, if it is not yet, and says
+    its name; notes: what the reader should know of the scene."""
 
     parsed: Parsed
+    material_name: Callable[["Reading", Node], str]
     textures: dict[str, Any] = field(default_factory=dict)
     materials: dict[str, Any] = field(default_factory=dict)
     groups: dict[str, Any] = field(default_factory=dict)
@@ -316,6 +318,10 @@ class Reading:
     """Files of meshes, as read."""
     numbers: dict[Any, Iterator[int]] = field(default_factory=dict)
     """The numbers that `unused` appends next, by table and name: "diffuse_2", "diffuse_3"."""
+
+    def bsdf(self, node: Node) -> str:
+        """The name of a BSDF among `materials`.  Raises SceneError."""
+        return self.material_name(self, node)
 
     def file(self, node: Node, key: str = "filename") -> Path:
         """The file that an element names.  Raises SceneError if there is none."""

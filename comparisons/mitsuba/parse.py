@@ -78,7 +78,7 @@ def transforms_of(path: Path, defaults: Mapping[str, str]) -> Transforms:
         parser.Parse(as_utf8(path.read_bytes()), True)
     except (OSError, ValueError, xml.parsers.expat.ExpatError):
         return {}
-    return reader.found
+    return reader.written
 
 
 def as_transform(steps: Written | None, m: Affine) -> tuple[dict[str, Any], ...]:
@@ -114,7 +114,7 @@ class _Reader:
 
     def __init__(self, values: dict[str, str]) -> None:
         self.values = values
-        self.found: dict[int, dict[str, Written]] = {}
+        self.written: dict[int, dict[str, Written]] = {}
         self.elements: list[int] = []
         self.name: str | None = None  # of the transform that is being read
         self.steps: list[Step | LookAt] = []
@@ -135,7 +135,7 @@ class _Reader:
         self.elements.pop()
         if tag == "transform" and self.name is not None:
             if self.is_known and self.elements:
-                self.found.setdefault(self.elements[-1], {})[self.name] = tuple(self.steps)
+                self.written.setdefault(self.elements[-1], {})[self.name] = tuple(self.steps)
             self.name = None
 
     def _step(self, tag: str, attributes: dict[str, str]) -> None:
@@ -158,22 +158,22 @@ class _Reader:
 
         match tag:
             case "translate":
-                found: Step | LookAt = Step(tag, vector(0.0))
+                step: Step | LookAt = Step(tag, vector(0.0))
             case "scale":
-                found = Step(tag, vector(1.0))
+                step = Step(tag, vector(1.0))
             case "rotate":
                 (angle,) = numbers.pop("angle")
-                found = Step(tag, (*vector(0.0), angle))
+                step = Step(tag, (*vector(0.0), angle))
             case "matrix":
-                found = Step(tag, _rows(numbers.pop("value")))
+                step = Step(tag, _rows(numbers.pop("value")))
             case "lookat" | "lookAt":
                 origin, target, up = (numbers.pop(key) for key in ("origin", "target", "up"))
-                found = LookAt(_triple(origin), _triple(target), _triple(up))
+                step = LookAt(_triple(origin), _triple(target), _triple(up))
             case _:
                 raise ValueError(tag)
         if numbers:
             raise ValueError("unknown attributes")
-        return found
+        return step
 
     def _numbers(self, text: str) -> list[float]:
         known = re.sub(r"\$(\w+)", lambda name: self.values[name[1]], text)
@@ -285,10 +285,10 @@ def parse_file(path: Path, defaults: Mapping[str, str], allow_missing: bool = Fa
             parsed = _parse_file(path, defaults, check, unknown)
             return parsed._replace(left_out=list(unknown.values()))
         except SceneError as error:
-            found = _LEFT_OUT.search(error.message)
-            if not allow_missing or found is None or found[1] in unknown:
+            match = _LEFT_OUT.search(error.message)
+            if not allow_missing or match is None or match[1] in unknown:
                 raise
-            unknown[found[1]] = f"{error}, and left out on both sides"
+            unknown[match[1]] = f"{error}, and left out on both sides"
 
 
 def _parse_file(
@@ -338,7 +338,7 @@ def _without(names: Collection[str], content: bytes) -> bytes:
         word = re.escape(name.encode())
         element = rb"<%b(\s[^>]*)?/>|<%b(\s[^>]*)?>.*?</%b\s*>" % (word, word, word)
         lines = re.compile(element, re.DOTALL)
-        content = lines.sub(lambda found: b"\n" * found[0].count(b"\n"), content)
+        content = lines.sub(lambda comment: b"\n" * comment[0].count(b"\n"), content)
     return content
 
 
@@ -373,11 +373,11 @@ def _scene_error(message: str, path: Path | None) -> SceneError:
     file, line, column = None if path is None else str(path), None, ""
     places = list(_PLACE.finditer(message))
     if places:
-        found = places[-1]
+        place = places[-1]
         if path is not None:
-            file = found["file"].strip('"')
-        line, column = int(found["line"]), found["col"]
-        message = message[found.end() :]
+            file = place["file"].strip('"')
+        line, column = int(place["line"]), place["col"]
+        message = message[place.end() :]
     elif last := _LAST.search(message):
         line, column = int(last["line"]), last["col"]
         message = message[: last.start()]

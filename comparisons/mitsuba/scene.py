@@ -200,6 +200,6 @@ def picture(mi_scene: Any, spp: int, seed: int, integrator: Any = None) -> Float
         count = min(most, spp - begun)
         # The conversion to an array forces the lazy evaluation.
         part = (seed + k * _APART) % (1 << 32)
-        found = np.array(mitsuba().render(mi_scene, spp=count, seed=part, integrator=integrator))
-        total = total + count / spp * found.astype(np.float64)[..., :3]
+        pixels = np.array(mitsuba().render(mi_scene, spp=count, seed=part, integrator=integrator))
+        total = total + count / spp * pixels.astype(np.float64)[..., :3]
     return np.asarray(total)

@@ -72,25 +72,25 @@ def by_second(shape: Mesh | Triangle, folder: Path, ours: Corners) -> Corners | 
     if shape.file is None:
         faces = np.asarray(shape.faces)
         arrays = (shape.vertices, shape.normals, shape.uv, shape.colours)
-        found = Corners(*(None if a is None else np.asarray(a)[faces] for a in arrays))  # type: ignore[arg-type]
-        if found.normals is not None:
-            found = replace(found, normals=_unit(found.normals))
+        corners = Corners(*(None if a is None else np.asarray(a)[faces] for a in arrays))  # type: ignore[arg-type]
+        if corners.normals is not None:
+            corners = replace(corners, normals=_unit(corners.normals))
     else:
         path = folder / shape.file
         known = None if ours.doubtful else _read(path, path.stat().st_mtime_ns)
         if known is None:
             return None
-        found = _in_order(known, ours)
+        corners = _in_order(known, ours)
     if shape.face_normals:
-        found = replace(found, normals=None, silent=tuple({*found.silent} - {"normals"}))
-    elif found.normals is None and (
-        ours.bent is not None or (shape.smooth and "normals" not in found.silent)
+        corners = replace(corners, normals=None, silent=tuple({*corners.silent} - {"normals"}))
+    elif corners.normals is None and (
+        ours.bent is not None or (shape.smooth and "normals" not in corners.silent)
     ):
         # In float32 the small triangles of a mesh that is far away would have other normals.
-        points = _refined(found.points, ours.points)
-        uv = ours.uv if "uv" in found.silent else found.uv
-        found = _smoothed(replace(found, points=points), uv)
-    return found
+        points = _refined(corners.points, ours.points)
+        uv = ours.uv if "uv" in corners.silent else corners.uv
+        corners = _smoothed(replace(corners, points=points), uv)
+    return corners
 
 
 def described(shape: Mesh | Triangle, folder: Path) -> Corners:
@@ -102,7 +102,7 @@ def described(shape: Mesh | Triangle, folder: Path) -> Corners:
         return ours
     if len(theirs.points) != len(ours.points):
         return theirs
-    found: dict[str, Any] = {
+    columns: dict[str, Any] = {
         name: getattr(ours, name)
         if name in theirs.silent
         else _refined(getattr(theirs, name), getattr(ours, name))
@@ -110,7 +110,9 @@ def described(shape: Mesh | Triangle, folder: Path) -> Corners:
     }
     bent = None if theirs.bent is None else theirs.bent[:, :, None]
     normals = _refined(theirs.normals, ours.normals, bent)
-    return replace(theirs, normals=ours.normals if "normals" in theirs.silent else normals, **found)
+    return replace(
+        theirs, normals=ours.normals if "normals" in theirs.silent else normals, **columns
+    )
 
 
 def _refined(theirs: Any, ours: FloatArray | None, most: FloatArray | None = None) -> Any:
@@ -148,9 +150,9 @@ def _smoothed(mesh: Corners, uv: FloatArray | None) -> Corners:
     length = np.linalg.norm(total, axis=1)
     known = np.asarray(length > error, np.bool_)
     bent = np.where(known, np.minimum(2.0, 2.0 * error / np.maximum(length, error)), 2.0)
-    found = np.where(known[vertex][..., None], _direction(total)[vertex], normal[:, None])
+    normals = np.where(known[vertex][..., None], _direction(total)[vertex], normal[:, None])
     silent = tuple({*mesh.silent} - {"normals"})
-    return replace(mesh, normals=found, bent=bent[vertex], silent=silent)
+    return replace(mesh, normals=normals, bent=bent[vertex], silent=silent)
 
 
 def _direction(v: FloatArray) -> FloatArray:
@@ -167,9 +169,9 @@ def _read(path: Path, modified: int) -> Corners | None:
     float32 does not hold its numbers."""
     for reader in READERS.get(path.suffix.lower(), ()):
         with suppress(Exception):  # of a library: it may refuse what ours has read
-            found = reader(path)
-            if np.isfinite(found.points).all():
-                return found
+            corners = reader(path)
+            if np.isfinite(corners.points).all():
+                return corners
     return None
 
 
@@ -243,17 +245,17 @@ def _by_trimesh(path: Path) -> Corners:
                 columns["normals"].append(_direction(normals))
                 uv = getattr(mesh.visual, "uv", None)
                 columns["uv"].append(None if uv is None else uv[mesh.faces])
-    found: dict[str, Any] = {}
+    arrays: dict[str, Any] = {}
     silent = ["colours"]
     for name, key in (("points", b"POSITION"), ("normals", b"NORMAL"), ("uv", b"TEXCOORD_0")):
         said = content.count(b'"%s"' % key)
         whole = is_gltf and said == content.count(b'"POSITION"')
         if name == "points" or (whole and not any(c is None for c in columns[name])):
-            found[name] = np.concatenate(columns[name])
+            arrays[name] = np.concatenate(columns[name])
         elif said or not is_gltf:
             # trimesh makes normals where a file has none, and drops uv without a material.
             silent.append(name)
-    return Corners(**found, source=TRIMESH, silent=tuple(silent))
+    return Corners(**arrays, source=TRIMESH, silent=tuple(silent))
 
 
 READERS: dict[str, tuple[Callable[[Path], Corners], ...]] = {

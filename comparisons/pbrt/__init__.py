@@ -22,7 +22,8 @@ from scipy.ndimage import map_coordinates
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import Leaf, Member, copies_of
 from comparisons.mitsuba.files import Files, UnwritableError, check_name, ply, write_files
-from comparisons.pbrt.surfaces import Params, Writing, words
+from comparisons.pbrt.surfaces import Writing, words
+from comparisons.renderers.vocabulary import Params
 from comparisons.translator.resolved import Tessellated, placed, tessellated
 from reference_rt import lights
 from reference_rt.cameras import Orthographic, Pinhole, ThinLens, film

@@ -11,6 +11,7 @@ from typing import TextIO
 
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
+from comparisons.report.table import table_of
 from comparisons.results.case import INTERRUPTED, PASSING, Case, Status, how_many
 from comparisons.results.headline import headline
 from comparisons.results.rungs import RUNGS
@@ -146,16 +147,15 @@ def summarise(
     verdicts = ", ".join(f"**{counts[v]}** {v}" for v in SEVERITY if counts[v])
     head = f"## {_markdown(title)}\n\n{how_many(len(cases), len(missing))}: "
     head += f"{verdicts or 'no case was run'}\n\n"
-    head += "| case | verdict | reason |\n| --- | --- | --- |\n"
-    rows = [f"| {_markdown(name)} | ❌ missing | {INTERRUPTED} |\n" for name in missing]
-    rows += [_row(case) for case in ranked(cases)]
-    rows += [
-        f"| {_markdown(name)} | not run | {_markdown(_cut(why))} |\n"
-        for name, why in (not_run or {}).items()
-    ]
+    rows = [(name, "❌ missing", INTERRUPTED) for name in missing]
+    rows += [(case.scene, _signed(case.verdict), headline(case)) for case in ranked(cases)]
+    rows += [(name, "not run", why) for name, why in (not_run or {}).items()]
+    cells = [(name, verdict, _cut(why)) for name, verdict, why in rows]
+    names, line, *lines = table_of(("case", "verdict", "reason"), cells).markdown(_markdown)
+    head += f"{names}\n{line}\n"
     try:
         used = path.stat().st_size if path.exists() else 0
-        text = head + _fitting(rows, MOST_BYTES - used - len(head.encode()) - _ROOM)
+        text = head + _fitting(lines, MOST_BYTES - used - len(head.encode()) - _ROOM)
         if used + len(text.encode()) > MOST_BYTES:
             return  # GitHub would drop the earlier part of the summary too
         with path.open("a", encoding="utf-8", newline="\n") as file:
@@ -164,22 +164,20 @@ def summarise(
         raise ImageError(f"{path}: cannot be written: {error.strerror}") from None
 
 
-def _fitting(rows: Sequence[str], room: int) -> str:
+def _fitting(lines: Sequence[str], room: int) -> str:
     kept: list[str] = []
-    for row in rows:
-        room -= len(row.encode())
+    for line in lines:
+        room -= len(line.encode()) + 1
         if room < 0:
             break
-        kept.append(row)
-    if len(kept) < len(rows):
-        kept.append(f"\n{len(rows) - len(kept)} more cases are not shown: size limit.\n")
+        kept.append(f"{line}\n")
+    if len(kept) < len(lines):
+        kept.append(f"\n{len(lines) - len(kept)} more cases are not shown: size limit.\n")
     return "".join([*kept, "\n"])
 
 
-def _row(case: Case) -> str:
-    why = _cut(headline(case))
-    sign = "✅" if case.verdict in PASSING else "❌"
-    return f"| {_markdown(case.scene)} | {sign} {case.verdict} | {_markdown(why)} |\n"
+def _signed(verdict: Status) -> str:
+    return f"{'✅' if verdict in PASSING else '❌'} {verdict}"
 
 
 def _cut(text: str) -> str:

@@ -18,8 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
+from comparisons.report.biases import biases_of, is_of_statistics
 from comparisons.report.pictures_data import COARSE, EXACT, Bits, as_json, pack
 from comparisons.report.plots import histograms
+from comparisons.report.table import Table, table_of
 from comparisons.report.templates import encoded, template, write
 from comparisons.report.values import label, shown
 from comparisons.results.case import (
@@ -33,7 +35,7 @@ from comparisons.results.case import (
     how_many,
 )
 from comparisons.results.files import named, plain
-from comparisons.results.headline import headline, in_short, is_of_statistics, numbers_rows
+from comparisons.results.headline import headline, in_short
 from comparisons.results.rungs import RUNGS
 from reference_rt.util.files import replacing
 
@@ -246,10 +248,7 @@ def _view(case: Case, mapped: bool, walls: Mapping[str, float]) -> dict[str, Any
         "short": named(short, case.sides),
         "seen": seen,
         "wall": f"{walls[case.scene]:.1f}" if case.scene in walls else "",
-        "found": [
-            [f"{cell[:1].upper()}{cell[1:]}".replace(" %", "\N{NO-BREAK SPACE}%") for cell in row]
-            for row in numbers_rows(case)
-        ],
+        "biases": _biases(case),
         "reason": "" if is_of_statistics(case) else named(case.reason, case.sides),
         "tiers": sorted(case.rungs, key=lambda rung: _rung(rung.name)),
         "pictures": pictures,
@@ -257,21 +256,33 @@ def _view(case: Case, mapped: bool, walls: Mapping[str, float]) -> dict[str, Any
         "figures": _figures(case, pictures, mapped) if pictures else [],
         "witness": of_witness(case.images, case.sides) if pictures and case.images else [],
         "histograms": _histograms(case, pictures) if pictures else [],
-        "metrics": _metric_rows(case.metrics) if case.metrics else [],
+        "metrics": _metrics(case.metrics) if case.metrics else None,
         "times": _times(case),
     }
 
 
-def _times(case: Case) -> list[list[str]]:
-    """The seconds of each step, a column for each side; [] if there are none."""
+def _biases(case: Case) -> Table[Any] | None:
+    """The numbers of the statistics, each with a capital letter; None if there are none."""
+    if (table := biases_of(case)) is None:
+        return None
+    texts: list[list[Any]] = [table.head, *table.cells]
+    head, *rows = (
+        [f"{cell[:1].upper()}{cell[1:]}".replace(" %", "\N{NO-BREAK SPACE}%") for cell in row]
+        for row in texts
+    )
+    return table_of(head, rows)
+
+
+def _times(case: Case) -> Table[Any] | None:
+    """The seconds of each step, a column for each side; None if there are none."""
     sides = dict(zip(("candidate", "reference"), case.sides, strict=True))
     stages = dict.fromkeys(stage for times in case.seconds.values() for stage in times)
     if not stages:
-        return []
+        return None
     columns = case.seconds.values()
     rows = [[label(stage), *(shown(times.get(stage)) for times in columns)] for stage in stages]
     total = ["total", *(shown(sum(times.values())) for times in columns)]
-    return [["Step", *(sides.get(who, who) for who in case.seconds)], *rows, total]
+    return table_of(["Step", *(sides.get(who, who) for who in case.seconds)], [*rows, total])
 
 
 def _common_sides(cases: Sequence[Case]) -> tuple[str, str]:
@@ -324,8 +335,8 @@ def _rung(name: str) -> int:
     return RUNGS.index(name) if name in RUNGS else len(RUNGS)
 
 
-def _metric_rows(metrics: Metrics) -> list[tuple[str, str]]:
-    return [
+def _metrics(metrics: Metrics) -> Table[Any]:
+    rows = [
         ("SSIM", shown(metrics.ssim)),
         ("FLIP", shown(metrics.flip)),
         ("PSNR, dB", shown(metrics.psnr)),
@@ -334,6 +345,7 @@ def _metric_rows(metrics: Metrics) -> list[tuple[str, str]]:
         ("Mean bias", shown(dict(zip("RGB", metrics.mean_bias, strict=True)), "mean_bias")),
         ("Pixels not finite", shown(metrics.nonfinite)),
     ]
+    return table_of(("", ""), rows)
 
 
 SCHEMA = 2

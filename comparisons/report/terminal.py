@@ -6,17 +6,11 @@ each of its other cells.
 
 import os
 import textwrap
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 from rich.console import Console, Group, RenderableType
-from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
-
-from comparisons.results.case import Case
-from comparisons.results.files import named
-from comparisons.results.headline import is_of_statistics, numbers_rows
-from reference_rt.util.errors import printable
 
 MOST_LINES = 3
 """Lines of a cell: it is folded twice."""
@@ -36,35 +30,22 @@ def console(*, stderr: bool = False) -> Console:
     return made
 
 
-def tell(console: Console, case: Case) -> None:
-    """Print what stands below a headline: the numbers of the statistics as a table, or the reason
-    where another rung decides."""
-    rows = numbers_rows(case) if is_of_statistics(case) else []
-    if rows:
-        console.print(Padding.indent(fitted(console.width - _GAP, rows[0], rows[1:]), _GAP))
-    else:
-        reason = printable(named(case.reason, case.sides))
-        console.print(f"  {reason}", markup=False, soft_wrap=True)
-
-
 def fitted(
     width: int,
     names: Sequence[str],
     rows: Sequence[Sequence[str | Text]],
-    *,
-    styles: Sequence[str | None] = (),
-    right: Collection[str] = (),
+    styles: Sequence[str | None],
+    right: Sequence[bool],
     title: str = "",
 ) -> RenderableType:
     """A table of at most `width` columns.
 
     names: of the columns; a newline in one begins a new line of the head; columns without text are
-    left out.  styles: of the rows,
-    default none.  right: the names of columns that are aligned at their right edge.
+    left out.  styles: of the rows.  right: whether a column is aligned at its right edge.
     """
-    styles = styles or [None] * len(rows)
     used = [j for j in range(len(names)) if j == 0 or any(_plain(row[j]) for row in rows)]
     names, rows = [names[j] for j in used], [[row[j] for j in used] for row in rows]
+    right = [right[j] for j in used]
     cells = [[_plain(cell) for cell in row] for row in rows]
     least = [
         max([_least_width(name, len(name)) for name in name_of.split("\n")]
@@ -80,8 +61,9 @@ def fitted(
     ]
     table = Table(title=title or None, title_justify="left", box=None, pad_edge=False)
     table.padding = (0, _GAP, 0, 0)
-    for name, columns in zip(names, _widths(least, natural, room), strict=True):
-        justify = "right" if name in right else "left"
+    widths = _widths(least, natural, room)
+    for name, columns, at_right in zip(names, widths, right, strict=True):
+        justify = "right" if at_right else "left"
         table.add_column(name, width=columns, overflow="fold", justify=justify)  # type: ignore[arg-type]
     for row, style in zip(rows, styles, strict=True):
         table.add_row(*(Text(cell) if isinstance(cell, str) else cell for cell in row), style=style)

@@ -41,9 +41,9 @@ def _differ(case: Case) -> str:
 def in_short(case: Case) -> tuple[str, str]:
     """The headline, and apart from it the smallest bias of the image mean that would have been
     seen; "" if it is unknown."""
-    seen = _detectable(next((rung for rung in case.rungs if rung.name == "statistics"), None))
+    seen = detectable(next((rung for rung in case.rungs if rung.name == "statistics"), None))
     sentence = _none(case) if case.verdict == "agree" else headline(case)
-    return sentence, "" if seen is None else _percent(seen)
+    return sentence, "" if seen is None else percent(seen)
 
 
 def _none(case: Case) -> str:
@@ -64,7 +64,7 @@ def _unchanged(case: Case) -> str:
 
 def _inconclusive(case: Case) -> str:
     rung = _first(case, "inconclusive")
-    seen = _detectable(rung)
+    seen = detectable(rung)
     limit = None if rung is None else rung.numbers.get("limit")
     if rung is None or seen is None or not isinstance(limit, int | float):
         return "too noisy to decide" if rung is None else f"undecided: {_clause(rung.reason)}"
@@ -74,17 +74,17 @@ def _inconclusive(case: Case) -> str:
     more = f"; {advice}" if advice else ""
     if seen > limit:
         return (
-            f"too noisy to decide: only a bias of the image mean above {_percent(seen)} would be "
-            f"seen, and {_percent(limit)} is asked for{more}"
+            f"too noisy to decide: only a bias of the image mean above {percent(seen)} would be "
+            f"seen, and {percent(limit)} is asked for{more}"
         )
     unseen = rung.numbers.get("unseen_light")
     missing = unseen.get("missing_at_most") if isinstance(unseen, Mapping) else None
     if isinstance(missing, int | float) and missing > limit:
         return (
-            f"too few samples met the rare light: {_percent(missing)} of all light may be missing "
-            f"by chance, and {_percent(limit)} is asked for{more}"
+            f"too few samples met the rare light: {percent(missing)} of all light may be missing "
+            f"by chance, and {percent(limit)} is asked for{more}"
         )
-    return f"too near to the limit of {_percent(limit)} to decide with so few samples{more}"
+    return f"too near to the limit of {percent(limit)} to decide with so few samples{more}"
 
 
 def _invalid(case: Case) -> str:
@@ -133,86 +133,6 @@ _SENTENCES: Mapping[Status, Callable[[Case], str]] = {
 }
 
 
-# ---- the numbers of the statistics, as a table ---------------------------------------------------
-
-
-_FAMILIES = (
-    ("tiles", "tiles"),
-    ("pixels", "pixels"),
-    ("lines", "rows and columns"),
-    ("modes", "smooth patterns"),
-)
-"""The numbers of tests of many biases, and what these are called."""
-
-_MAIN = ("tiles", "pixels")
-"""Those that a table has always; it has the others where they differ."""
-
-
-def numbers_rows(case: Case) -> list[tuple[str, ...]]:
-    """The numbers of the statistics as a table: its head (the image mean, tiles, pixels) and three
-    rows, of the biases measured, those that would have been seen, and those that are permitted; []
-    for a case without them."""
-    rung = next((r for r in case.rungs if r.name == "statistics"), None)
-    if rung is not None and "edge_wrong" in rung.numbers:
-        return _of_edges(rung.numbers)
-    seen = _detectable(rung)
-    biases = {} if rung is None else rung.numbers.get("relative_bias")
-    if rung is None or seen is None or not isinstance(biases, Mapping):
-        return []
-    some = [
-        f"{name} {_percent(bias, sign=True)}" for name, bias in biases.items() if bias is not None
-    ]
-    found = ", ".join(some).replace(" %,", ",")
-    known = rung.numbers.get("noise_known", True)
-    would = _percent(seen) if known else "unknown"
-    columns = [("image mean", found, would, _within(rung.numbers.get("limit")))]
-    for key, what in _FAMILIES:
-        cells = rung.numbers.get(key)
-        if isinstance(cells, Mapping) and (key in _MAIN or cells["differ"]):
-            half = cells.get("median_detectable_bias")
-            would = f"{_percent(half)} in half of them" if known and half is not None else ""
-            column = (f"{cells['tested']:,} {what}", _worst(cells), would)
-            columns.append((*column, _within(cells.get("worst_margin"))))
-    return _transposed(columns)
-
-
-def _transposed(columns: list[tuple[str, str, str, str]]) -> list[tuple[str, ...]]:
-    return list(zip(("bias", "measured", "would have been seen", "limit"), *columns, strict=True))
-
-
-def _of_edges(numbers: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    """The same of a picture without noise, whose edges are judged apart."""
-    inside, edge = (
-        f"{n:,} differ" if n else "none differs"
-        for n in (numbers["inside_wrong"], numbers["edge_wrong"])
-    )
-    bound = f"±{_percent(numbers['tolerance'])}{' and half a code' if numbers['codes'] else ''}"
-    columns = [
-        (f"{numbers['inside']:,} pixels inside surfaces", inside, "", bound),
-        (f"{numbers['edge']:,} pixels on edges", edge, "", "what their footprints see"),
-    ]
-    for name, mode in numbers["modes"].items():
-        found, would, margin = (mode[key] for key in ("bias", "detectable", "margin"))
-        columns.append((f"edges: {name}", f"{found:+.2g}", f"{would:.2g}", f"±{margin:g}"))
-    return _transposed(columns)
-
-
-def _worst(cells: Mapping[str, Any]) -> str:
-    """Such as "3 differ; worst -12 ± 2.1 %"."""
-    bias, half = cells.get("worst_bias"), cells.get("worst_half_width")
-    count = f"{cells['differ']:,} differ" if cells["differ"] else "none differs"
-    if bias is None:
-        return count
-    worst = _percent(bias, sign=True)
-    if half is not None:
-        worst = f"{worst.removesuffix(' %')} ± {_percent(half)}"
-    return f"{count}; worst {worst}"
-
-
-def _within(margin: float | None) -> str:
-    return "" if margin is None else f"±{_percent(margin)}"
-
-
 # ---- what differs, by rung ----------------------------------------------------------------------
 
 
@@ -227,7 +147,7 @@ def _of_statistics(rung: RungResult, case: Case) -> str:
     for cells, what in ((tiles, "tiles"), (pixels, "pixels")):
         if cells.get("differ"):
             worst = cells.get("worst_bias")
-            by = "" if worst is None else f", the worst by {_percent(worst, sign=True)}"
+            by = "" if worst is None else f", the worst by {percent(worst, sign=True)}"
             return f"{cells['differ']:,} of {cells['tested']:,} {what} differ{by}"
     return _clause(rung.reason)
 
@@ -243,8 +163,8 @@ def _brighter(biases: Mapping[str, Any], case: Case) -> str:
     if low * high > 0.0 and max(abs(low), abs(high)) < 2.0 * min(abs(low), abs(high)):
         mean = sum(values) / len(values)
         how = "brighter" if mean > 0.0 else "darker"
-        return f"{picture} {_percent(abs(mean))} {how} than {case.sides[1]}"
-    each = ", ".join(f"{name} {_percent(bias, sign=True)}" for name, bias in known.items())
+        return f"{picture} {percent(abs(mean))} {how} than {case.sides[1]}"
+    each = ", ".join(f"{name} {percent(bias, sign=True)}" for name, bias in known.items())
     return f"{picture} of another brightness than {case.sides[1]}: {each}"
 
 
@@ -262,7 +182,7 @@ def _first(case: Case, status: Status, name: str = "") -> RungResult | None:
     return next(found, None)
 
 
-def _detectable(rung: RungResult | None) -> float | None:
+def detectable(rung: RungResult | None) -> float | None:
     """The smallest bias of the image mean that would have been seen; None if it is unknown."""
     biases = {} if rung is None else rung.numbers.get("detectable_bias")
     if not isinstance(biases, Mapping) or not biases or None in biases.values():
@@ -270,17 +190,12 @@ def _detectable(rung: RungResult | None) -> float | None:
     return float(max(biases.values()))
 
 
-def is_of_statistics(case: Case) -> bool:
-    """Whether the case's reason is that of the statistics, whose numbers `numbers_rows` has."""
-    return "statistics" in case.reason.partition(": ")[0].split(", ")
-
-
 def _clause(reason: str) -> str:
     """The first part of a reason."""
     return reason.partition("; ")[0]
 
 
-def _percent(fraction: float, *, sign: bool = False) -> str:
+def percent(fraction: float, *, sign: bool = False) -> str:
     """To two digits, such as "0.31 %", "12 %" or "+140 %"."""
     number = 100.0 * fraction
     if not math.isfinite(number):

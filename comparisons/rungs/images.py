@@ -11,6 +11,7 @@ import numpy as np
 from scipy import special
 
 from comparisons.results.case import FloatArray, Images, Metrics, RungResult
+from comparisons.statistics.filtered import excess_by_filter
 from comparisons.statistics.metric_null import (
     LEVEL,
     NOISE_LIMIT,
@@ -22,7 +23,7 @@ from comparisons.statistics.metric_null import (
 from comparisons.statistics.metrics import decibels, has_flip
 from comparisons.statistics.rare import image_missed
 from comparisons.statistics.shared_noise import excess_by_sharing
-from comparisons.statistics.sides import excess_by_filter, side_of
+from comparisons.statistics.sides import side_of
 
 MEAN_BIAS = 0.001
 """Permitted relative bias of a channel's mean: Mitsuba's ray epsilon causes some, as in the

@@ -12,15 +12,10 @@ import numpy.typing as npt
 
 from comparisons.results.case import FloatArray, RungResult, Status
 from comparisons.statistics.metrics import nonfinite_pixels, white_level
-from comparisons.statistics.ranks import successive
-from comparisons.statistics.shared_noise import (
-    common_noise,
-    correlated_pair,
-    may_be_flat,
-    may_be_the_same,
-    odd_replicate,
-    same_pairs,
-)
+from comparisons.statistics.odd_replicate import odd_replicate
+from comparisons.statistics.order import successive
+from comparisons.statistics.repeated import may_be_flat, may_be_the_same, same_pairs
+from comparisons.statistics.shared_noise import common_noise, correlated_pair
 
 DIM = 1e-3
 """Fraction of the reference's white level above which a pixel counts as lit."""

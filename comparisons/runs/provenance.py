@@ -43,13 +43,13 @@ _PACKAGES = ("reference-rt", "numpy", "numba", "mitsuba", "drjit", "python-flint
 
 def package_versions() -> dict[str, str]:
     """The versions of the packages that verdicts depend on; "" for one that is not installed."""
-    found = {}
+    versions = {}
     for name in _PACKAGES:
         try:
-            found[name] = importlib.metadata.version(name)
+            versions[name] = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
-            found[name] = ""
-    return found
+            versions[name] = ""
+    return versions
 
 
 @functools.cache

@@ -15,13 +15,10 @@ import numpy as np
 from comparisons.geometry import affine
 from comparisons.geometry.sizes import heights_of
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.context import UntranslatableError
 from comparisons.mitsuba.hits import Extent, Plugin, ShapeGroup, same_uv
 from comparisons.mitsuba.second import described
-from comparisons.textures.translate import (
-    VERTEX_COLOUR,
-    VERTEX_LUMINANCE,
-    UntranslatableError,
-)
+from comparisons.textures.vertex_colours import VERTEX_COLOUR, VERTEX_LUMINANCE
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.shapes import Mesh, Plane, Polygon, Triangle

@@ -11,6 +11,7 @@ import numpy as np
 from comparisons.geometry import affine
 from comparisons.geometry.frame import round32
 from comparisons.geometry.sizes import heights_of
+from comparisons.mitsuba.context import UntranslatableError
 from comparisons.mitsuba.hits import Plugin, StandIn
 from comparisons.mitsuba.plugins.exact_coordinates import Coordinates, derivatives_at
 from comparisons.shapes.meshes import (
@@ -22,7 +23,6 @@ from comparisons.shapes.meshes import (
     with_mesh_light,
 )
 from comparisons.shapes.surfaces import Implicit, Limits, Patch, meshed
-from comparisons.textures.translate import UntranslatableError
 from reference_rt.core.arrays import FloatArray
 from reference_rt.shapes.shape import Shape
 

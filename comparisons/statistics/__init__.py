@@ -59,10 +59,11 @@ add a scale: a level and a margin in `scales` (the levels must still sum to 1e-3
 `welch`, its numbers in `wording`, and its verdict in `decide`.
 """
 
-from comparisons.statistics.decide import compare, read, standard_error, worst_regions
+from comparisons.statistics.advice import noise_free_candidate, shortfall
+from comparisons.statistics.decide import compare, read
+from comparisons.statistics.places import standard_error, worst_regions
 from comparisons.statistics.scales import CHANNELS, Margins
 from comparisons.statistics.sides import Known
-from comparisons.statistics.wording import noise_free_candidate, shortfall
 
 __all__ = [
     "CHANNELS",

@@ -22,7 +22,9 @@ from rich.text import Text
 from comparisons.mitsuba.backend import Backend, backend
 from comparisons.renderers import witness_facts
 from comparisons.report import terminal, write_report, write_results
+from comparisons.report.biases import tell
 from comparisons.report.ci import ranked
+from comparisons.report.table import Column, Table
 from comparisons.results.case import PASSING, WARNING, Case, RungResult, how_many
 from comparisons.results.files import named
 from comparisons.results.headline import first_difference, headline
@@ -53,8 +55,6 @@ _STYLES = {
     "differ": "bold red",
     "invalid": "bold red",
 }
-
-_COLUMNS = ("case", "verdict", "likeliest cause", "first difference", "seconds")
 
 _SLOWEST = 3
 
@@ -88,7 +88,7 @@ class Display(Count):
             line.append(named(f": {headline(case)}", case.sides))
         self._console.print(line, soft_wrap=True)
         if told:
-            terminal.tell(self._console, case)
+            tell(self._console, case)
         self._show(1)
 
     def _show(self, ended: int = 0) -> None:
@@ -115,17 +115,14 @@ def summarise(
     console.print(f"{how_many(len(cases), len(missing))}{verdicts}", markup=False)
     shown = [case for case in ranked(cases) if every or case.verdict not in PASSING]
     if shown:
-        rows = [
-            (
-                case.scene,
-                Text(case.verdict, _STYLES[case.verdict]),
-                "" if case.cause is None else case.cause.name,
-                named(first_difference(case), case.sides),
-                f"{walls[case.scene]:.1f}" if case.scene in walls else "",
-            )
-            for case in shown
-        ]
-        console.print(terminal.fitted(console.width, _COLUMNS, rows, right=("seconds",)))
+        columns: tuple[Column[Case], ...] = (
+            Column("case", lambda case: case.scene),
+            Column("verdict", lambda case: Text(case.verdict, _STYLES[case.verdict])),
+            Column("likeliest cause", lambda case: "" if case.cause is None else case.cause.name),
+            Column("first difference", lambda case: named(first_difference(case), case.sides)),
+            Column("seconds", lambda case: walls.get(case.scene), _wall, right=True),
+        )
+        console.print(Table(columns, shown).terminal(console.width))
     slowest = sorted(walls, key=lambda name: walls[name], reverse=True)[:_SLOWEST]
     if slowest:
         times = ", ".join(f"{name} {walls[name]:.1f} s" for name in slowest)
@@ -134,6 +131,10 @@ def summarise(
         console.print(f"not run: {name}: {why}", markup=False, soft_wrap=True)
     if missing:
         console.print(f"missing: {', '.join(missing)}", markup=False, soft_wrap=True)
+
+
+def _wall(seconds: float | None) -> str:
+    return "" if seconds is None else f"{seconds:.1f}"
 
 
 # ---- an output folder, read again ---------------------------------------------------------------

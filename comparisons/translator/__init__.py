@@ -37,6 +37,7 @@ from comparisons.materials.translate import (
     parts_of,
 )
 from comparisons.mitsuba.backend import mitsuba, scalar
+from comparisons.mitsuba.context import TranslationContext, UntranslatableError
 from comparisons.mitsuba.counterpart import Counterpart, InstancedGroup
 from comparisons.mitsuba.csg import Operand, SolidCounterpart
 from comparisons.mitsuba.hits import MitsubaShape, Plugin
@@ -45,7 +46,6 @@ from comparisons.mitsuba.scene import light_id, shape_id
 from comparisons.renderers import ReferenceSampler
 from comparisons.shapes import Site, translate_shape
 from comparisons.shapes.meshes import MOST_INSTANCES
-from comparisons.textures.translate import TranslationContext, UntranslatableError
 from comparisons.translator.moved import frame_of, moved
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid

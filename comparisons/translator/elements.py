@@ -16,20 +16,13 @@ import numpy as np
 from comparisons.cameras.translate import clipping, translate_camera, translate_film
 from comparisons.lights.translate import ambient_of, translate_integrator
 from comparisons.materials.translate import translate_material
+from comparisons.mitsuba.context import TranslationContext, UntranslatableError, transform_steps
 from comparisons.mitsuba.files import Element, Files, Reference, Rgb, Vector, matrix_step
-from comparisons.mitsuba.parse import FLIP, LookAt, Step
+from comparisons.mitsuba.parse import LookAt, Step
 from comparisons.mitsuba.plugins.whitted import MOST_COMPONENTS
-from comparisons.textures.translate import (
-    VERTEX_COLOUR,
-    TranslationContext,
-    UntranslatableError,
-    rgb,
-)
+from comparisons.textures.translate import projected
 from reference_rt.cameras import Orthographic, Perspective, ThinLens
 from reference_rt.cameras.film import Film
-from reference_rt.core import transform
-from reference_rt.core.arrays import FloatArray
-from reference_rt.core.exr import write_exr
 from reference_rt.core.image_files import open_image
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.lights import (
@@ -44,12 +37,8 @@ from reference_rt.lights import (
 from reference_rt.materials import most_branches
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid, Sobol
-from reference_rt.textures import Bitmap, Checker, VertexColours
+from reference_rt.textures import Bitmap, VertexColours
 from reference_rt.textures.image_file import read_image
-from reference_rt.textures.texture import UvMap
-
-IMAGES = (".exr", ".png", ".jpg", ".jpeg", ".hdr", ".pfm", ".bmp", ".tga")
-"""Files that Mitsuba reads, and to the same values as we do."""
 
 OURS = (
     "the {} '{}' is ours: before Mitsuba loads the file, call "
@@ -57,7 +46,12 @@ OURS = (
 )
 """A note on a plugin."""
 
+OUR_PLUGINS = ("textbook_phong", "gltf_pbr", "view_rectangle", "whitted", "mesh_area")
+
 TEXTURES = ("bitmap", "checkerboard", "mesh_attribute", "uniform")
+
+TAGS = ("film", "rfilter", "sampler", "integrator", "emitter")
+"""Names of nested plugins that are their elements' tags, too."""
 
 
 class Surfaces:
@@ -68,9 +62,7 @@ class Surfaces:
         self.elements: dict[Any, Element] = {}
         self.textures: dict[str, Element] = {}
         self.ids: set[str] = set()
-        self.notes: list[str] = []
-        context = TranslationContext.of(scene, native=True)
-        self.context = replace(context, in_file=self.texture)
+        self.context = TranslationContext.of(scene, native=True, files=files)
 
     def id_for(self, name: str) -> str:
         """An id that no element has: the name, if Mitsuba takes it for one."""
@@ -93,7 +85,7 @@ class Surfaces:
                 found = translate_material(self.scene.materials[name], context)
             except ValueError as error:
                 raise self.scene.error(str(error), "materials", name) from None
-            element = self.element(found)
+            element = self.element(found, "bsdf")
             element.id = self.id_for(name)
             self.elements[key] = element
         return Reference(self.elements[key].id)
@@ -101,25 +93,29 @@ class Surfaces:
     def _uses_colours(self) -> bool:
         return any(isinstance(t, VertexColours) for t in self.scene.textures.values())
 
-    def element(self, value: dict[str, Any], tag: str = "bsdf") -> Element:
-        """A plugin's dictionary as an element, nested ones too."""
+    def element(self, value: dict[str, Any], tag: str) -> Element:
+        """A plugin's dictionary as an element, nested ones too: textures as elements of their own,
+        others by the names of their parameters, which are tags but for BSDFs."""
         plugin = value["type"]
-        if plugin in ("textbook_phong", "gltf_pbr"):
-            self.note(OURS.format("BSDF", plugin))
+        if plugin in OUR_PLUGINS:
+            self.context.note(OURS.format("BSDF" if tag == "bsdf" else tag, plugin))
         element = Element(tag, plugin)
         for key, part in value.items():
-            if key == "type":
-                continue
-            if not isinstance(part, dict):
-                element.values[key] = part
-            elif part["type"] == "rgb":
-                r, g, b = part["value"]
-                element.values[key] = Rgb(r, g, b)
-            elif part["type"] in TEXTURES:
-                element.values[key] = self.shared(part)
-            else:
-                element.children.append(self.element(part))
+            if isinstance(part, dict) and part["type"] not in ("rgb", *TEXTURES):
+                element.children.append(self.element(part, key if key in TAGS else "bsdf"))
+            elif key != "type":
+                element.values[key] = self.value(part)
         return element
+
+    def value(self, value: Any) -> Any:
+        """A parameter as an element has it."""
+        if isinstance(value, list):
+            return Vector(*value)
+        if isinstance(value, dict):
+            return Rgb(*value["value"]) if value["type"] == "rgb" else self.shared(value)
+        if hasattr(value, "matrix"):
+            return (matrix_step(np.array(value.matrix, np.float64)[:3]),)
+        return value
 
     def shared(self, value: dict[str, Any]) -> Reference:
         """A texture's dictionary as an element, which is one however often it is used."""
@@ -130,84 +126,7 @@ class Surfaces:
         return Reference(self.textures[key].id)
 
     def note(self, text: str) -> None:
-        if text not in self.notes:
-            self.notes.append(text)
-
-    # ---- textures -------------------------------------------------------------------------------
-
-    def texture(
-        self, name: str, context: TranslationContext, as_number: bool, projected: bool = False
-    ) -> dict[str, Any]:
-        """A texture's dictionary, with steps as its map.  projected: by a light, whose image has
-        v = 0 at the top."""
-        texture = self.scene.textures[name]
-        first = FLIP if projected else ()
-        match texture:
-            case Checker():
-                return self._checker(texture, first, as_number)
-            case Bitmap():
-                return self._bitmap(texture, name, first)
-            case VertexColours():
-                if not context.has_colours:
-                    return (
-                        {"type": "uniform", "value": texture.without[0]}
-                        if as_number
-                        else rgb(texture.without)
-                    )
-                return {"type": "mesh_attribute", "name": VERTEX_COLOUR, "scale": texture.scale}
-        raise UntranslatableError(texture, "texture")
-
-    def _checker(
-        self, texture: Checker, first: tuple[Step, ...], as_number: bool
-    ) -> dict[str, Any]:
-        one, two = texture.first, texture.second
-        if max(*one, *two) > 1.0:  # Mitsuba's are reflectances; an image of four texels is the same
-            texels = np.array([[two, one], [one, two]])
-            return self._image(self.written("checker", texels), "nearest", "repeat", first, texture)
-        if as_number:
-            one, two = two, one  # see `translate.textures`
-        values = {"color0": rgb(one), "color1": rgb(two)}
-        steps = (*first, *steps_of(texture.uv))
-        return {"type": "checkerboard", **values, **({"to_uv": steps} if steps else {})}
-
-    def _bitmap(self, texture: Bitmap, name: str, first: tuple[Step, ...]) -> dict[str, Any]:
-        along_u, along_v = texture.wraps
-        if along_u != along_v or texture.cutoff is not None:
-            raise UntranslatableError("Bitmap with two wraps or a cutoff", "texture")
-        path = self.scene.folder / texture.file
-        suffix = path.suffix.lower()
-        is_integer = suffix in (".png", ".jpg", ".jpeg", ".bmp", ".tga")
-        is_plain = suffix in IMAGES and (texture.scale, texture.channel) == (1.0, "all")
-        if is_plain and (is_integer or texture.encoding not in ("srgb", "radiance")):
-            file = self.files.copy(texture.file, "textures", name, "file")
-            raw = texture.encoding == "raw" or not is_integer
-        else:
-            file, raw = self.written(path.stem, texture.read(self.scene.folder).linear), True
-            self.note(f"the image {texture.file} is written as linear float32 values")
-        return self._image(file, texture.filter, along_u, first, texture, raw)
-
-    def written(self, stem: str, texels: FloatArray) -> str:
-        """The name of an image file of linear radiance."""
-        planes = dict(zip("RGB", np.moveaxis(texels, -1, 0), strict=True))
-        return self.files.write(f"{stem}.exr", lambda file: write_exr(file, planes, {}))
-
-    def _image(
-        self,
-        file: str,
-        filter_type: str,
-        wrap: str,
-        first: tuple[Step, ...],
-        texture: Bitmap | Checker,
-        raw: bool = True,
-    ) -> dict[str, Any]:
-        return {
-            "type": "bitmap",
-            "filename": file,
-            "raw": raw,
-            "filter_type": filter_type,
-            "wrap_mode": wrap,
-            "to_uv": (*first, *steps_of(texture.uv), *FLIP),
-        }
+        self.context.note(text)
 
     def pixels_of(self, name: str) -> tuple[int, int]:
         """Width and height of a texture's image; (1, 1) for others."""
@@ -216,22 +135,6 @@ class Surfaces:
             return 1, 1
         image = open_image(self.scene.folder / texture.file)
         return image.width, image.height
-
-
-def steps_of(uv: UvMap) -> tuple[Step, ...]:
-    """A map of texture coordinates as steps, none for the identity."""
-    if uv.matrix is not None:
-        (a, b, c), (d, e, f) = uv.matrix
-        rows = np.array([[a, b, 0.0, c], [d, e, 0.0, f], [0.0, 0.0, 1.0, 0.0]])
-        return (matrix_step(rows),)
-    found = []
-    if uv.scale != (1.0, 1.0):
-        found.append(Step("scale", (*uv.scale, 1.0)))
-    if uv.rotate != 0.0:
-        found.append(Step("rotate", (0.0, 0.0, 1.0, uv.rotate)))
-    if uv.offset != (0.0, 0.0):
-        found.append(Step("translate", (*uv.offset, 0.0)))
-    return tuple(found)
 
 
 # ---- camera, film, sampler, integrator and lights ------------------------------------------------
@@ -350,7 +253,7 @@ def _light(light: Any, number: int, surfaces: Surfaces) -> Element:
             values = {"scale": light.scale}
             if light.encoding == "radiance":
                 texels = read_image(surfaces.scene.folder / light.file, "radiance")
-                values["filename"] = surfaces.written(Path(light.file).stem, texels)
+                values |= surfaces.context.image(Path(light.file).stem, texels)
             else:
                 values["filename"] = surfaces.files.copy(light.file, "lights", number, "file")
             if light.transform:
@@ -375,8 +278,7 @@ def _spot(light: Spot, surfaces: Surfaces) -> dict[str, Any]:
         x, y, z = np.eye(3)[int(np.argmin(np.abs(light.axis)))].tolist()
         up = (x, y, z)
     else:
-        texture = surfaces.texture(light.texture, surfaces.context, False, projected=True)
-        found["texture"] = surfaces.shared(texture)
+        found["texture"] = surfaces.shared(projected(light.texture, surfaces.context))
     return {
         "to_world": (LookAt(light.origin, light.target, up),),
         "intensity": Rgb(*light.intensity),
@@ -391,8 +293,7 @@ def _projector(light: Projector, surfaces: Surfaces) -> dict[str, Any]:
     value: Any
     if isinstance(irradiance, str):
         pixels = surfaces.pixels_of(irradiance)
-        texture = surfaces.texture(irradiance, surfaces.context, False, projected=True)
-        value = surfaces.shared(texture)
+        value = surfaces.shared(projected(irradiance, surfaces.context))
     else:
         value = Rgb(*irradiance)
     shape = pixels[0] / pixels[1]
@@ -413,20 +314,3 @@ def _such_that(x: float, is_exact: Callable[[float], bool]) -> float:
     """x, or a number next to it that the reader turns into exactly what we have."""
     near = (x, math.nextafter(x, 0.0), math.nextafter(x, math.inf))
     return next((y for y in near if is_exact(y)), x)
-
-
-def transform_steps(steps: Any) -> tuple[Step, ...]:
-    """Our transform as steps of Mitsuba's: a rotation about any axis but x, y and z as a matrix, as
-    Mitsuba does not make the axis a unit vector."""
-    found = []
-    for step in steps:
-        match step:
-            case transform.Translate(translate=v):
-                found.append(Step("translate", v))
-            case transform.Scale(scale=v):
-                found.append(Step("scale", v))
-            case transform.Rotate(rotate=turn) if sorted(map(abs, turn.axis)) == [0.0, 0.0, 1.0]:
-                found.append(Step("rotate", (*turn.axis, turn.degrees)))
-            case _:
-                found.append(matrix_step(step.matrix_of()))
-    return tuple(found)

@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 from comparisons.cameras.reading import read_sensor
 from comparisons.lights.reading import belongs_to_shape, read_light
+from comparisons.materials.reading import material_name
 from comparisons.mitsuba.node import MissingError, Node, Reading
 from comparisons.mitsuba.parse import Parsed, module, parse_dict, parse_file
 from comparisons.shapes.reading import read_shape
@@ -111,9 +112,9 @@ def read_file(
 def read_dict(scene: Mapping[str, Any], cls: type[M], folder: Path | None = None) -> M:
     """The scene in a dictionary for `mitsuba.load_dict`;  folder: of its files.  Raises as
     `read_file` does."""
-    found = _scene(parse_dict(scene, Path() if folder is None else folder), cls)
-    found._source = None
-    return found
+    read = _scene(parse_dict(scene, Path() if folder is None else folder), cls)
+    read._source = None
+    return read
 
 
 def read_supported(parsed: Parsed, cls: type[M]) -> tuple[M, list[str]]:
@@ -122,7 +123,7 @@ def read_supported(parsed: Parsed, cls: type[M]) -> tuple[M, list[str]]:
 
 
 def _scene(parsed: Parsed, cls: type[M]) -> M:
-    reading = Reading(parsed)
+    reading = Reading(parsed, material_name)
     for index, text in parsed.notes:
         reading.note(Node(parsed, index), text)
     root = Node(parsed, 0)
@@ -131,19 +132,19 @@ def _scene(parsed: Parsed, cls: type[M]) -> M:
     # They concern how rays are traced, not what they find.
     root.ignore("embree_use_robust_intersections", "allow_thread_reordering")
     root.ignore("compact_acceleration_structures")
-    found = root.children(*_KINDS)
+    nodes = root.children(*_KINDS)
     root.children("BSDF", "Texture", "Film", "Sampler", "ReconstructionFilter")  # used by others
-    sensors = [node for node in found if node.kind == "Sensor"]
+    sensors = [node for node in nodes if node.kind == "Sensor"]
     if len(sensors) > 1:
         reading.note(sensors[0], f"is the first of {len(sensors)} sensors; the others are left out")
-    for node in found:
+    for node in nodes:
         if node.kind in ("Medium", "Volume", "PhaseFunction"):
             raise node.unsupported("expected a scene without media")
         if node.kind == "Shape":
             read_shape(reading, node)
         elif node.kind == "Emitter" and not belongs_to_shape(node):
             read_light(reading, node)
-    integrators = [node for node in found if node.kind == "Integrator"]
+    integrators = [node for node in nodes if node.kind == "Integrator"]
     if len(integrators) > 1:
         raise integrators[1].error("is a second integrator; expected one")
     integrator, layers = read_integrator(reading, integrators[0] if integrators else None)

@@ -14,12 +14,13 @@ from comparisons.lights.translate import (
     in_place_of,
 )
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.colours import index_of_refraction
+from comparisons.mitsuba.context import TranslationContext, UntranslatableError
 from comparisons.mitsuba.node import Node
 from comparisons.mitsuba.parse import Parsed, parse_file
 from comparisons.mitsuba.plugins.exact_coat import COLOURS, SUBSTITUTE
 from comparisons.renderers import ReferenceSampler
-from comparisons.textures.reading import index_of_refraction, to_uv
-from comparisons.textures.translate import TranslationContext, UntranslatableError
+from comparisons.textures.texture import matrix_of
 from comparisons.translator.notes import note_of, notes_of_integrator
 from comparisons.translator.reading import read_supported
 from reference_rt.materials import (
@@ -102,7 +103,7 @@ def _bump(state: Any, index: int, node: Node) -> None:
     mi, props = mitsuba(), state.nodes[index].props
     ((base, _),) = node.named_children("BSDF")
     ((height, image),) = node.named_children("Texture")
-    m = to_uv(image)
+    m = matrix_of(image)
     copied = mi.parser.SceneNode()
     old = state.nodes[props[height].index()]
     copied.type, copied.props = old.type, mi.Properties(old.props)
@@ -230,23 +231,23 @@ def own_scene(scene: Scene, sampler: ReferenceSampler = "independent") -> Any:
         resolver.prepend(str(folder))
     mi.set_file_resolver(resolver)
     try:
-        found = mi.parser.instantiate(config, state)
+        mi_scene = mi.parser.instantiate(config, state)
     except RuntimeError as error:
         reason = " ".join(str(error).split())
         raise ReferenceUnavailableError(f"Mitsuba does not load {parsed.file}: {reason}") from None
     finally:
         mi.set_file_resolver(old)
-    return found
+    return mi_scene
 
 
 def changes_to(scene: Scene) -> list[str]:
     """What `own_scene` changes in the file beyond the film and the samples, for the report."""
-    parsed, found = _parsed(scene)
-    found += notes_of_integrator(scene)
-    found += dict.fromkeys(note for _, note in inexact(scene))
-    found += sample_visible(parsed)
-    found += dict.fromkeys(text for _, text in parsed.notes)
-    return found
+    parsed, changes = _parsed(scene)
+    changes += notes_of_integrator(scene)
+    changes += dict.fromkeys(note for _, note in inexact(scene))
+    changes += sample_visible(parsed)
+    changes += dict.fromkeys(text for _, text in parsed.notes)
+    return changes
 
 
 def _parsed(scene: Scene) -> tuple[Parsed, list[str]]:
@@ -263,11 +264,11 @@ def _parsed(scene: Scene) -> tuple[Parsed, list[str]]:
 
 def _properties(mi: Any, described: dict[str, Any]) -> Any:
     """A plugin's dictionary as Mitsuba's properties."""
-    found = mi.Properties(described["type"])
+    properties = mi.Properties(described["type"])
     for name, value in described.items():
         if name != "type":
-            found[name] = value
-    return found
+            properties[name] = value
+    return properties
 
 
 def _first(state: Any, kind: Any) -> int | None:
@@ -280,8 +281,8 @@ def _first(state: Any, kind: Any) -> int | None:
 
 
 def _references(props: Any) -> list[int]:
-    found = (props[key] for key in props.keys())  # noqa: SIM118
-    return [value.index() for value in found if type(value).__name__ == "ResolvedReference"]
+    values = (props[key] for key in props.keys())  # noqa: SIM118
+    return [value.index() for value in values if type(value).__name__ == "ResolvedReference"]
 
 
 def _child(mi: Any, state: Any, parent: int, kind: Any, plugin: str) -> int:

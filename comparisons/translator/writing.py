@@ -17,12 +17,12 @@ import numpy as np
 from comparisons.geometry.flatten import Copy, copies_of, place_of
 from comparisons.materials.translate import is_textured
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.context import UntranslatableError, transform_steps
 from comparisons.mitsuba.files import (
     ATTRIBUTE,
     Element,
     Files,
     Reference,
-    Rgb,
     Vector,
     check_name,
     matrix_step,
@@ -32,9 +32,9 @@ from comparisons.mitsuba.files import (
 from comparisons.mitsuba.hits import Plugin
 from comparisons.shapes import Site, translate_shape
 from comparisons.shapes.primitives import is_round
-from comparisons.textures.translate import UntranslatableError
+from comparisons.textures.translate import colour
 from comparisons.translator import elements
-from comparisons.translator.elements import OURS, Surfaces, transform_steps
+from comparisons.translator.elements import OURS, Surfaces
 from reference_rt.core import transform
 from reference_rt.materials import Emissive
 from reference_rt.rendering.scene import Scene
@@ -129,14 +129,7 @@ class Shapes:
             return element
         if material.base is not None:
             element.children.append(self.surfaces.bsdf(material.base, has_colours))
-        radiance: Any
-        if isinstance(material.radiance, str):
-            context = self.surfaces.context
-            found = self.surfaces.texture(material.radiance, context, False)
-            is_plain = found["type"] == "rgb"
-            radiance = Rgb(*found["value"]) if is_plain else self.surfaces.shared(found)
-        else:
-            radiance = Rgb(*material.radiance)
+        radiance = self.surfaces.value(colour(material.radiance, self.surfaces.context))
         plugin = "area"
         if has_normals or (element.plugin == "ply" and isinstance(radiance, Reference)):
             plugin = "mesh_area"  # Mitsuba's own is not exact there
@@ -300,7 +293,7 @@ def write_xml(scene: Scene, path: Path) -> tuple[int, list[str]]:
             *shapes,
             *lights,
         ]
-        notes.extend(surfaces.notes)
+        notes.extend(surfaces.context.notes)
         head = [f"<!-- {' '.join(_plain(line).split())} -->" for line in _comments(scene, notes)]
         body = ["    " + line for part in parts for line in part.lines()]
         return "\n".join([*head, f'<scene version="{VERSION}">', *body, "</scene>", ""])

@@ -93,7 +93,7 @@ def chosen(names: Sequence[str]) -> list[Case]:
     """The cases of these names, areas, or patterns such as 'glass_*'; all for none, or for "all".
     Raises ValueError for one that matches nothing."""
     known = cases()
-    found: dict[str, Case] = {}
+    selected: dict[str, Case] = {}
     for name in names or ("all",):
         some = [
             one
@@ -105,5 +105,5 @@ def chosen(names: Sequence[str]) -> list[Case]:
                 f"there is no case '{name}'; expected all, a pattern such as 'glass_*', an area "
                 f"({', '.join(AREAS)}) or a case: {', '.join(known)}"
             )
-        found |= {one.name: one for one in some}
-    return list(found.values())
+        selected |= {one.name: one for one in some}
+    return list(selected.values())

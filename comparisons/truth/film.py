@@ -48,8 +48,8 @@ def coverage(polygon: npt.ArrayLike, width: int, height: int) -> FloatArray:
         column, x = np.where(left, 0, column), np.where(left, 0.0, x)
         np.add.at(cells, (row, column), rise * (column + 1.0 - x))
         np.add.at(beyond, (row, column + 1), rise)
-    found = (cells + np.cumsum(beyond, axis=1))[:, :width]
-    return np.asarray(found if found.sum() >= 0.0 else -found)
+    areas = (cells + np.cumsum(beyond, axis=1))[:, :width]
+    return np.asarray(areas if areas.sum() >= 0.0 else -areas)
 
 
 def _pieces(
@@ -57,7 +57,7 @@ def _pieces(
 ) -> list[tuple[FloatArray, FloatArray]]:
     """The edges p to q, cut at whole x and y."""
     short = np.all(np.floor(p) == np.floor(q), axis=1)
-    found = [(p[short], q[short])]
+    pieces = [(p[short], q[short])]
     for a, b in zip(p[~short], q[~short], strict=True):
         cuts = [np.array([0.0, 1.0])]
         for axis, most in ((0, width), (1, height)):
@@ -67,8 +67,8 @@ def _pieces(
                 cuts.append(t[(t > 0.0) & (t < 1.0)])
         t = np.unique(np.concatenate(cuts))[:, None]
         points = a + t * (b - a)
-        found.append((points[:-1], points[1:]))
-    return found
+        pieces.append((points[:-1], points[1:]))
+    return pieces
 
 
 DENSE = 1 << 17

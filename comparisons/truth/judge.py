@@ -87,16 +87,16 @@ def judge(
     expected: Expected, pictures: Sequence[npt.ArrayLike] | FloatArray, level: float = LEVEL
 ) -> Judged:
     """The verdict on replicates (replicates, height, width, 3)."""
-    found = np.asarray(pictures, float)
+    given = np.asarray(pictures, float)
     height, width = expected.pixels.shape[:2]
-    if found.shape[1:] != expected.pixels.shape:
-        size = f"{found.shape[2]} x {found.shape[1]}"
+    if given.shape[1:] != expected.pixels.shape:
+        size = f"{given.shape[2]} x {given.shape[1]}"
         return Judged("invalid", f"is {size} pixels; expected {width} x {height}")
-    if not np.isfinite(found).all():
-        return Judged("invalid", f"{int((~np.isfinite(found)).sum())} values are not finite")
+    if not np.isfinite(given).all():
+        return Judged("invalid", f"{int((~np.isfinite(given)).sum())} values are not finite")
     stated = expected.stated
     truth = np.where(stated[..., None], expected.pixels, 0.0)
-    residual = np.where(stated[..., None], found - truth, 0.0)
+    residual = np.where(stated[..., None], given - truth, 0.0)
     labels = _labels(height, width, TILES)
     count = _sums(stated.astype(float), labels)
     sums = _sums(residual.mean(axis=0), labels)
@@ -111,7 +111,7 @@ def judge(
     count, sums, variance, squares, scale = (
         a[used] for a in (count, sums, variance, squares, scale)
     )
-    relative = expected.bound + rounding(found)
+    relative = expected.bound + rounding(given)
     allowed = relative * (scale / count + scale[-1] / count[-1])
     mean, error = sums / count, np.sqrt(variance) / count
     beyond = np.maximum(np.abs(mean) - allowed, 0.0)
@@ -151,9 +151,9 @@ def _labels(height: int, width: int, parts: int) -> npt.NDArray[np.int64]:
 
 def _sums(values: FloatArray, labels: npt.NDArray[np.int64]) -> FloatArray:
     """(tiles, ...): sums over tiles of (height, width, ...)."""
-    found = np.zeros((int(labels.max()) + 1, *values.shape[2:]))
-    np.add.at(found, labels, values)
-    return found
+    sums = np.zeros((int(labels.max()) + 1, *values.shape[2:]))
+    np.add.at(sums, labels, values)
+    return sums
 
 
 COMMON = 0.9

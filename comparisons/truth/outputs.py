@@ -1,17 +1,18 @@
 """The results of truth for people and machines: a table, `results.json`, a page, a badge."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from rich.console import RenderableType
+from rich.console import Console
 
+from comparisons.report.table import Column, Table, table_of
 from comparisons.report.templates import template
 from comparisons.report.templates import write as write_text
-from comparisons.report.terminal import fitted
 from comparisons.report.thumbnails import BLUE, RED, WHITE, png_url
 from comparisons.results.files import plain, write_json
 from comparisons.statistics.metrics import encode, white_level
@@ -71,8 +72,17 @@ def exit_code(rows: Sequence[Row]) -> int:
     return 3 if "invalid" in found else int(bool(found & {"off", "noisy"}))
 
 
-Score = tuple[str, str, int, int]
-"""(area, renderer, cases that are right, cases that could be judged)."""
+class Score(NamedTuple):
+    """right: cases of an area that a renderer has right;  judged: cases that could be judged."""
+
+    area: str
+    renderer: str
+    right: int
+    judged: int
+
+    @property
+    def words(self) -> str:
+        return f"{self.right} of {self.judged}"
 
 
 def scores(rows: Sequence[Row]) -> list[Score]:
@@ -84,7 +94,7 @@ def scores(rows: Sequence[Row]) -> list[Score]:
             judged = [r for r in some if r.status != "not comparable"]
             if judged:
                 right = sum(r.status == "right" for r in judged)
-                found.append((area, renderer, right, len(judged)))
+                found.append(Score(area, renderer, right, len(judged)))
     return found
 
 
@@ -114,18 +124,17 @@ def write(out: Path, rows: Sequence[Row], provenance: Mapping[str, Any]) -> None
     write_json(out / "results.json", plain(document))
     totals = {}
     for renderer in dict.fromkeys(row.renderer for row in rows):
-        of = [score for score in scores(rows) if score[1] == renderer]
-        totals[renderer] = sum(s[2] for s in of), sum(s[3] for s in of)
+        of = [score for score in scores(rows) if score.renderer == renderer]
+        totals[renderer] = sum(s.right for s in of), sum(s.judged for s in of)
     page = template("truth.html.jinja", "truth").render(
         totals=[(renderer, *total) for renderer, total in totals.items()],
         provenance=provenance,
         level=LEVEL,
-        areas_right=[(AREAS[a], r, f"{n} of {m}") for a, r, n, m in scores(rows)],
+        score=Table(SCORE, scores(rows)),
         areas=[(AREAS[a], [r for r in rows if r.case.area == a]) for a in AREAS],
         signs=SIGNS,
-        triple=_triple,
         plain=plain_formula,
-        number=_number,
+        numbers_of=_numbers,
     )
     write_text(out / "report.html", page)
     for renderer, (right, judged) in totals.items():
@@ -156,42 +165,77 @@ def _badge(right: int, judged: int) -> str:
     )
 
 
-def table(rows: Sequence[Row], width: int) -> RenderableType:
-    """For a terminal: a line for each case and renderer."""
-    lines = []
-    for row in rows:
-        j = row.judged
-        numbers = ("", "", "") if j is None or not j.value else (
-            f"{_number(j.errors)} of {j.threshold:.2g}", f"{j.percent:+.3f}", f"{j.power:.2g}"
-        )  # fmt: skip
-        reason = "" if row.status == "right" else row.reason
-        lines.append([row.case.name, row.renderer, row.status, *numbers, reason])
-    names = ["case", "renderer", "", "standard errors", "percent", "± percent", "reason"]
-    return fitted(width, names, lines, right=names[3:6])
+def _of_numbers(written: Callable[[Judged], str]) -> Callable[[Row], str]:
+    """What is written of a row's numbers, if it has any."""
+    return lambda row: written(row.judged) if row.judged is not None and row.judged.value else ""
 
 
-def score_card(rows: Sequence[Row], width: int) -> RenderableType:
-    """For a terminal: right cases by area."""
-    lines = [[AREAS[a], r, f"{n} of {m}"] for a, r, n, m in scores(rows)]
-    return fitted(width, ["area", "renderer", "right"], lines, right=["right"])
+COLUMNS = (
+    Column[Row]("case", lambda row: row.case.name),
+    Column[Row]("renderer", lambda row: row.renderer),
+    Column[Row]("", lambda row: row.status),
+    Column[Row](
+        "standard errors",
+        _of_numbers(lambda j: f"{_number(j.errors)} of {j.threshold:.2g}"),
+        right=True,
+    ),
+    Column[Row]("percent", _of_numbers(lambda j: f"{j.percent:+.3f}"), right=True),
+    Column[Row]("± percent", _of_numbers(lambda j: f"{j.power:.2g}"), right=True),
+    Column[Row]("reason", lambda row: "" if row.status == "right" else row.reason),
+)
+
+SCORE = (
+    Column[Score]("area", lambda score: AREAS[score.area]),
+    Column[Score]("renderer", lambda score: score.renderer),
+    Column[Score]("right", lambda score: score.words, right=True),
+)
+
+
+def show(console: Console, rows: Sequence[Row]) -> None:
+    """Print a line for each case and renderer, and, if there are several, right cases by area."""
+    console.print(Table(COLUMNS, rows).terminal(console.width))
+    if len(rows) > 1:
+        console.print(Table(SCORE, scores(rows)).terminal(console.width))
+
+
+def _numbers(row: Row) -> Table[Any] | None:
+    """What the page says of a row's numbers; None if there are none."""
+    if (j := row.judged) is None or not j.value:
+        return None
+    errors = f"{_number(j.errors)} of {j.threshold:.2g} ({j.worst})"
+    rows = [
+        ("value", _triple(j.value)),
+        ("formula", _triple(j.expected)),
+        ("off, percent", f"{j.percent:+.4f} ± {j.power:.2g}"),
+        ("standard errors", errors),
+    ]
+    return table_of(("", ""), rows)
 
 
 def markdown(rows: Sequence[Row], provenance: Mapping[str, Any]) -> str:
     """The tables of docs/truth.md: a line for each case, with what docs/make_pictures.py shows."""
     renderers = list(dict.fromkeys(row.renderer for row in rows))
-    text = ["| area | " + " | ".join(renderers) + " |", "|---" * (len(renderers) + 1) + "|"]
-    right = {(a, r): f"{n} of {m}" for a, r, n, m in scores(rows)}
+    right = {(score.area, score.renderer): score.words for score in scores(rows)}
     areas = [area for area in AREAS if any(row.case.area == area for row in rows)]
+    card = [[AREAS[a], *(right.get((a, renderer), "") for renderer in renderers)] for a in areas]
+    text = table_of(["area", *renderers], card).markdown()
     for area in areas:
-        cells = [right.get((area, renderer), "") for renderer in renderers]
-        text.append(f"| {AREAS[area]} | {' | '.join(cells)} |")
-    for area in areas:
-        text += ["", f"### {AREAS[area].capitalize()}", "", "| picture | case |", "|---|---|"]
-        for name in dict.fromkeys(row.case.name for row in rows if row.case.area == area):
-            some = [row for row in rows if row.case.name == name]
-            text.append(f"| ![{name}](pictures/truth/{name}.png) | {_words(some)} |")
+        of_area = [row for row in rows if row.case.area == area]
+        table = Table(CASES, [[*some] for _, some in groupby(of_area, lambda row: row.case.name)])
+        text += ["", f"### {AREAS[area].capitalize()}", "", *table.markdown()]
     where = f"{provenance['machine']}, {provenance['cores']} cores, {provenance['date'][:10]}"
     return "\n".join([*text, "", f"`reference-rt truth`; {where}.", ""])
+
+
+CASES = (
+    Column[list[Row]]("picture", lambda rows: _picture(rows[0].case.name)),
+    Column[list[Row]]("case", lambda rows: _words(rows)),
+)
+"""Of the rows of each case."""
+
+
+def _picture(name: str) -> str:
+    return f"![{name}](pictures/truth/{name}.png)"
 
 
 def _words(rows: Sequence[Row]) -> str:
@@ -202,7 +246,7 @@ def _words(rows: Sequence[Row]) -> str:
     parts = [
         f"`{case.name}`: {case.tests}",
         f"{large}{source}",
-        case.derivation.replace("|", "\\|").replace("*", "\\*"),
+        case.derivation.replace("*", "\\*"),
         "; ".join(f"{row.renderer}: {_cell(row)}" for row in rows),
     ]
     return "<br>".join(parts)

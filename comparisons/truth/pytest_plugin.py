@@ -35,8 +35,8 @@ def truth_gate() -> Callable[[str, Any], None]:
         if listed and all(hasattr(p, "__fspath__") or isinstance(p, str) for p in pictures):
             pictures = stacked([p for path in pictures for p in read_candidates(Path(path))])
         array = np.asarray(pictures, np.float64)
-        found = judge(case.compute(), array if array.ndim == 4 else array[None])
-        if found.verdict != "right":
-            pytest.fail(f"{name}: {found.verdict}: {found.reason}")
+        verdict = judge(case.compute(), array if array.ndim == 4 else array[None])
+        if verdict.verdict != "right":
+            pytest.fail(f"{name}: {verdict.verdict}: {verdict.reason}")
 
     return check

@@ -93,8 +93,8 @@ def judged(case: Case, pictures: Sequence[Picture], seconds: float | None = None
         if picture.quantised:
             reason = f"{picture.name} has 8 bits per channel; expected floats of linear radiance"
             return Row(case, CANDIDATE, "invalid", reason)
-    expected, found = case.compute(), stacked(pictures)
-    return Row.of(case, CANDIDATE, judge(expected, found), expected, np.asarray(found), seconds)
+    expected, given = case.compute(), stacked(pictures)
+    return Row.of(case, CANDIDATE, judge(expected, given), expected, np.asarray(given), seconds)
 
 
 @dataclass(frozen=True)

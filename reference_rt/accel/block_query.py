@@ -22,7 +22,7 @@ from reference_rt.core.ray import (
 )
 from reference_rt.core.ray import hit_of as hit_in_block
 from reference_rt.jit.function_pointer import call_pointer
-from reference_rt.jit.kernel import ByClass, kernel, signature_of
+from reference_rt.jit.kernel import by_class, kernel, signature_of
 from reference_rt.jit.links import Link
 from reference_rt.jit.parallel_compile import Call
 
@@ -92,8 +92,5 @@ def _hit_through_link(geometry: Link, ray: Ray, hits: HitBlock, j: int) -> Hit:
     return hit_in_block(hits, j)
 
 
-_choice = ByClass("hit_of")
-_choice.register(Geometry, _hit_in_geometry)
-_choice.register(Link, _hit_through_link)
-hit_of = _choice.function
+hit_of = by_class("hit_of", {Geometry: _hit_in_geometry, Link: _hit_through_link})
 """hit_of(geometry, ray, hits, j): the hit of ray j after `closest_hits`."""

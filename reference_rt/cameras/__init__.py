@@ -6,35 +6,32 @@ kernel camera_ray(view, x, y, lens) -> `Ray` with a unit direction and no end, f
 (x, y), each in [0, 1] across the picture from its top left corner; and, for a camera with a lens,
 lens_sample(view, sampler), which draws the lens point.
 
-To add a camera: its description and kernel, in a module that has no other `camera_ray`; `AnyCamera`
-and the registrations below; a translator function in `comparisons.translator`; a scene; a
-row in the tests' tuple.
+To add a camera: its description and kernel, in a module that has no other `camera_ray`, and its
+line in `AnyCamera`.
 """
 
 from typing import Annotated, Any
 
 from pydantic import Field
 
-from reference_rt.cameras import orthographic, perspective, thin_lens
-from reference_rt.cameras.camera import LENS_CENTRE, no_lens
-from reference_rt.cameras.orthographic import Orthographic, OrthographicView
-from reference_rt.cameras.perspective import Perspective, PerspectiveView, Pinhole
-from reference_rt.cameras.thin_lens import ThinLens, ThinLensView
+from reference_rt.cameras.camera import LENS_CENTRE as LENS_CENTRE
+from reference_rt.cameras.camera import no_lens
+from reference_rt.cameras.orthographic import Orthographic as Orthographic
+from reference_rt.cameras.perspective import Perspective as Perspective
+from reference_rt.cameras.perspective import Pinhole as Pinhole
+from reference_rt.cameras.thin_lens import ThinLens as ThinLens
+from reference_rt.core.model import module_of, setups_of
 from reference_rt.core.ray import Ray
-from reference_rt.jit.kernel import ByClass
+from reference_rt.jit.kernel import by_class
 from reference_rt.jit.links import Linkable
 
 AnyCamera = Annotated[Perspective | Orthographic | Pinhole | ThinLens, Field(discriminator="type")]
 
-VIEWS = (PerspectiveView, OrthographicView, ThinLensView)
+VIEWS = (*setups_of(AnyCamera),)
 """The classes that `setup` returns.  `Pinhole` has no own one: its rays are those of a
 `PerspectiveView`."""
 
-_ray = ByClass("camera_ray")
-_ray.register(PerspectiveView, perspective.camera_ray)
-_ray.register(OrthographicView, orthographic.camera_ray)
-_ray.register(ThinLensView, thin_lens.camera_ray)
-_ray_of = _ray.function
+_ray_of = by_class("camera_ray", {view: module_of(view).camera_ray for view in VIEWS})
 
 views = Linkable()
 """The operation `camera_ray`, on a view or on a link to one."""
@@ -49,22 +46,12 @@ def camera_ray(view: Any, x: float, y: float, lens: tuple[float, float]) -> Ray:
     return ray
 
 
-_lens = ByClass("lens_sample")
-_lens.register(PerspectiveView, no_lens)
-_lens.register(OrthographicView, no_lens)
-_lens.register(ThinLensView, thin_lens.lens_sample)
-lens_sample = _lens.function
+_lens_samples = {view: getattr(module_of(view), "lens_sample", no_lens) for view in VIEWS}
+lens_sample = by_class("lens_sample", _lens_samples)
 """lens_sample(view, sampler) -> `lens` for a sample's ray: drawn for a camera with a lens, else
 LENS_CENTRE."""
 
-__all__ = [
-    "LENS_CENTRE",
-    "VIEWS",
-    "AnyCamera",
-    "Orthographic",
-    "Perspective",
-    "Pinhole",
-    "ThinLens",
-    "camera_ray",
-    "lens_sample",
-]
+
+def has_lens(view: Any) -> bool:
+    """Whether lens points are drawn for a camera."""
+    return _lens_samples[type(view)] is not no_lens

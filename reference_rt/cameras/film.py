@@ -14,14 +14,14 @@ in `comparisons.translator`; a scene.
 
 import functools
 import math
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BeforeValidator, Field
 
 from reference_rt.core.arrays import FloatArray, IdArray, IntArray
-from reference_rt.core.model import Description, Positive
-from reference_rt.jit.kernel import ByClass, kernel
+from reference_rt.core.model import Description, Examples, Positive
+from reference_rt.jit.kernel import by_class, kernel
 from reference_rt.jit.links import Linkable
 from reference_rt.sampling.blocks import BLOCK_SAMPLES, SINGLY
 from reference_rt.sampling.distribution import guide, guided_cell_of, running_sums
@@ -79,6 +79,7 @@ class BoxFilter(Filter):
 class TentFilter(Filter):
     """Falls linearly to zero at `radius` pixels, in x and in y."""
 
+    EXAMPLES: ClassVar[Examples] = ({}, {"radius": 1.5})
     type: Literal["tent"] = "tent"
     radius: Positive = 1.0
     """Half the filter's width in x and in y, in pixels."""
@@ -93,6 +94,7 @@ class TentFilter(Filter):
 class GaussianFilter(TabulatedFilter):
     """exp(-x² / 2 s²), lowered to reach zero at 4 s, in x and in y."""
 
+    EXAMPLES: ClassVar[Examples] = ({}, {"stddev": 0.8})
     type: Literal["gaussian"] = "gaussian"
     stddev: Positive = 0.5
     """The standard deviation s, in pixels."""
@@ -111,6 +113,7 @@ Unit = Annotated[float, Field(ge=0, le=1)]
 class MitchellFilter(TabulatedFilter):
     """Two cubics on each side, to 2 pixels (Mitchell & Netravali 1988, eq. 8)."""
 
+    EXAMPLES: ClassVar[Examples] = ({}, {"b": 0.2, "c": 0.4})
     type: Literal["mitchell"] = "mitchell"
     b: Unit = 1.0 / 3.0
     """Blur, from 0 to 1: 1 with `c` = 0 is the cubic B-spline."""
@@ -139,6 +142,7 @@ class CatmullRomFilter(TabulatedFilter):
 class LanczosFilter(TabulatedFilter):
     """A sinc under the middle lobe of a wider one: sharp, with `lobes` - 1 rings (Duchon 1979)."""
 
+    EXAMPLES: ClassVar[Examples] = ({}, {"lobes": 2})
     type: Literal["lanczos"] = "lanczos"
     lobes: Annotated[int, Field(ge=1, le=64)] = 3
     """Lobes on each side, from 1 to 64; also the filter's radius in pixels."""
@@ -316,11 +320,9 @@ def _tabulated_offset(table: Tabulated, u: float) -> tuple[float, float]:
     return cells[k, 0] + table.half * z, weight
 
 
-_offset = ByClass("film_offset")
-_offset.register(BoxSetup, _box_offset)
-_offset.register(TentSetup, _tent_offset)
-_offset.register(Tabulated, _tabulated_offset)
-_offset_by = _offset.function
+_offset_by = by_class(
+    "film_offset", {BoxSetup: _box_offset, TentSetup: _tent_offset, Tabulated: _tabulated_offset}
+)
 
 film_filters = Linkable()
 """The operations `film_offset` and `stratum_of`, on a filter's setup or on a link to one."""
@@ -379,11 +381,9 @@ def _stratum_of_table(table: Tabulated, seed: int, pixel: int, sample: int) -> S
     )
 
 
-_stratum = ByClass("stratum")
-_stratum.register(BoxSetup, _whole)
-_stratum.register(TentSetup, _whole)
-_stratum.register(Tabulated, _stratum_of_table)
-_stratum_by = _stratum.function
+_stratum_by = by_class(
+    "stratum", {BoxSetup: _whole, TentSetup: _whole, Tabulated: _stratum_of_table}
+)
 
 
 @film_filters.operation

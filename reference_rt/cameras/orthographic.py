@@ -1,12 +1,12 @@
 """Orthographic camera: parallel rays that start on the view rectangle."""
 
-from typing import Literal, NamedTuple, Self
+from typing import ClassVar, Literal, NamedTuple, Self
 
 from pydantic import model_validator
 
 from reference_rt.cameras.camera import Camera, Clip
 from reference_rt.cameras.view_rectangle import Edges, Rectangle, by_width, place, vec3
-from reference_rt.core.model import Positive
+from reference_rt.core.model import Examples, Positive
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
@@ -15,6 +15,7 @@ from reference_rt.jit.kernel import kernel
 class Orthographic(Camera):
     """Parallel rays through a view rectangle at the eye, perpendicular to the view direction."""
 
+    EXAMPLES: ClassVar[Examples] = ({}, {"width": 3.0}, {"view": (-1.0, 2.0, -0.5, 1.0)})
     type: Literal["orthographic"] = "orthographic"
     width: Positive | None = None
     """Width of the view rectangle, centred on the eye, in scene units; its height follows from the

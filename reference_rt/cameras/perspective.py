@@ -1,12 +1,12 @@
 """Perspective cameras: all rays pass one point, the eye or the hole of a `Pinhole`."""
 
-from typing import Literal, NamedTuple, Self
+from typing import ClassVar, Literal, NamedTuple, Self
 
 from pydantic import model_validator
 
 from reference_rt.cameras.camera import Camera, Clip, clipped_ray
 from reference_rt.cameras.view_rectangle import CentralCamera, at_distance_1, by_width, place
-from reference_rt.core.model import Positive
+from reference_rt.core.model import Examples, Positive
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
@@ -15,6 +15,11 @@ from reference_rt.jit.kernel import kernel
 class Perspective(CentralCamera):
     """The ideal pinhole camera: rays from the eye through a view rectangle in front of it."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {},
+        {"eye": (0.0, 1.0, 5.0), "up": (0.1, 1.0, 0.0), "fov": 60.0, "fov_axis": "smaller"},
+        {"view": (-1.0, 2.0, -0.5, 1.0), "distance": 2.0, "near": 0.5, "far": 9.0},
+    )
     type: Literal["perspective"] = "perspective"
 
     def setup(self, width: int, height: int) -> "PerspectiveView":
@@ -51,6 +56,7 @@ class Pinhole(Camera):
     between film and hole is seen.
     """
 
+    EXAMPLES: ClassVar[Examples] = ({}, {"film_width": 2.0, "film_distance": 1.5})
     type: Literal["pinhole"] = "pinhole"
     film_width: Positive = 1.0
     """Width of the film in scene units; its height follows from the picture's shape."""

@@ -1,13 +1,13 @@
 """Thin-lens camera: perspective through a round lens, in focus in one plane."""
 
 import math
-from typing import Literal, NamedTuple, Self
+from typing import ClassVar, Literal, NamedTuple, Self
 
 from pydantic import model_validator
 
 from reference_rt.cameras.camera import Clip, clipped_ray
 from reference_rt.cameras.view_rectangle import STEEPEST, CentralCamera, place, vec3
-from reference_rt.core.model import Positive
+from reference_rt.core.model import Examples, Positive
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
@@ -23,6 +23,11 @@ class ThinLens(CentralCamera):
     centre, and everything is sharp.
     """
 
+    EXAMPLES: ClassVar[Examples] = (
+        {"aperture_radius": 0.1},
+        {"aperture_radius": 0.2, "focus_distance": 3.0, "fov": 60.0, "fov_axis": "y"},
+        {"aperture_radius": 0.2, "view": (-1.0, 2.0, -0.5, 1.0), "distance": 2.0},
+    )
     type: Literal["thin_lens"] = "thin_lens"
     aperture_radius: Positive
     """Radius of the lens in scene units: larger ones blur more out of focus."""

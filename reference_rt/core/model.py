@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from itertools import pairwise
 from textwrap import fill
+from types import ModuleType
 from typing import (
     TYPE_CHECKING,
     Annotated,
@@ -26,6 +27,7 @@ from typing import (
     cast,
     get_args,
     get_origin,
+    get_type_hints,
 )
 
 import numpy as np
@@ -257,6 +259,9 @@ class _Helped(ModelMetaclass):
         return [] if is_help() else super().__dir__()
 
 
+Examples = tuple[dict[str, Any], ...]
+
+
 class Description(BaseModel, metaclass=_Helped):
     """A frozen part of a scene.  Unknown keys, wrong types, NaN and infinity are errors.
 
@@ -267,6 +272,9 @@ class Description(BaseModel, metaclass=_Helped):
     model_config: ClassVar[ConfigDict] = ConfigDict(
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False
     )
+    EXAMPLES: ClassVar[Examples] = ({},)
+    """The fields of a few descriptions that cover the options of a type.  What they name is in
+    `reference_rt.scene.examples`."""
     array_fields: ClassVar[frozenset[str]] = frozenset()
     """Names of the fields that take arrays without conversion to lists."""
 
@@ -431,3 +439,28 @@ Reflectance = Annotated[_Triple, BeforeValidator(reflectance), WithJsonSchema(co
 """Linear sRGB, each from 0 to 1; a single number stands for grey."""
 
 Positive = Annotated[float, Field(gt=0)]
+
+
+def types_of(union: Any) -> tuple[Any, ...]:
+    """The types of descriptions in a union, such as `AnyShape`, in its order."""
+    of = get_args(union)[0] if get_origin(union) is Annotated else union
+    return get_args(of)
+
+
+def name_of(description: type[Description]) -> str:
+    """The name of a type in scene files, its field `type`."""
+    return str(description.__pydantic_fields__["type"].default)
+
+
+def setups_of(union: Any) -> dict[type, type[Description]]:
+    """The classes that `setup` of a union's types returns, each with the first such type."""
+    of: dict[type, type[Description]] = {}
+    for cls in types_of(union):
+        if hasattr(cls, "setup"):
+            of.setdefault(get_type_hints(cls.setup)["return"], cls)
+    return of
+
+
+def module_of(cls: type) -> ModuleType:
+    """The module that defines a class, and the kernels that take it."""
+    return sys.modules[cls.__module__]

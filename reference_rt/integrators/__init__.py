@@ -9,28 +9,30 @@ origin from its (unit) direction; 0 is black.
 hit to the BSDF's input), `direct_light` (one light sample, power heuristic), `scene_tables` (what
 kernels read), `path.Scratch` (buffers of a block).
 
-To add an integrator: its file with description, NamedTuple and kernel; `AnyIntegrator` and its
-registrations below; its counterpart in `comparisons`.
+To add an integrator: its file with description, NamedTuple and kernel, and its line in
+`AnyIntegrator`.
 """
 
 from typing import Annotated, Any
 
 from pydantic import Field
 
+from reference_rt.core.model import module_of, setups_of
 from reference_rt.core.ray import put_vector, ray_of
-from reference_rt.integrators import direct, path, whitted
-from reference_rt.integrators.direct import Direct, DirectSetup
-from reference_rt.integrators.path import Path, PathSetup, Scratch
-from reference_rt.integrators.ray_cast import RayCast
+from reference_rt.integrators.direct import Direct as Direct
+from reference_rt.integrators.path import Path as Path
+from reference_rt.integrators.path import Scratch
+from reference_rt.integrators.ray_cast import RayCast as RayCast
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.integrators.whitted import Whitted, WhittedSetup
-from reference_rt.jit.kernel import ByClass, kernel
+from reference_rt.integrators.whitted import Whitted as Whitted
+from reference_rt.integrators.whitted import WhittedSetup as WhittedSetup
+from reference_rt.jit.kernel import by_class, kernel
 from reference_rt.sampling import Samplers, sampler_of
 
 AnyIntegrator = Annotated[RayCast | Whitted | Direct | Path, Field(discriminator="type")]
 
-INTEGRATORS: dict[type, str] = {PathSetup: "path", DirectSetup: "direct", WhittedSetup: "whitted"}
-"""The names of the integrators, by the classes of their setups."""
+SETUPS = (*setups_of(AnyIntegrator),)
+"""The classes that `setup` returns."""
 
 
 def setup_of(integrator: Whitted | Direct | Path, has_numbers: bool) -> Any:
@@ -41,30 +43,28 @@ def setup_of(integrator: Whitted | Direct | Path, has_numbers: bool) -> Any:
     return integrator.setup()
 
 
-@kernel
-def _one_by_one(
-    setup: Any, scene: SceneTables, samplers: Samplers, n: int, scratch: Scratch
-) -> None:
-    for j in range(n):
-        ray, sampler = ray_of(scratch.rays, j), sampler_of(samplers, j)
-        put_vector(scratch.totals, 0, j, whitted.radiance(setup, scene, ray, sampler))
+def traces_blocks(setup: type) -> bool:
+    """Whether an integrator, by the class of its setup, has a kernel for a block of rays."""
+    return hasattr(module_of(setup), "radiances")
 
 
-_radiances = ByClass("radiances")
-_radiances.register(PathSetup, path.radiances)
-_radiances.register(DirectSetup, direct.radiances)
-_radiances.register(WhittedSetup, _one_by_one)
-radiances = _radiances.function
+def _radiances_of(setup: type) -> Any:
+    """The kernel `radiances` of an integrator; or, of one ray after another, `radiance`."""
+    if traces_blocks(setup):
+        return module_of(setup).radiances
+    radiance = module_of(setup).radiance
+
+    @kernel
+    def one_by_one(
+        setup: Any, scene: SceneTables, samplers: Samplers, n: int, scratch: Scratch
+    ) -> None:
+        for j in range(n):
+            ray, sampler = ray_of(scratch.rays, j), sampler_of(samplers, j)
+            put_vector(scratch.totals, 0, j, radiance(setup, scene, ray, sampler))
+
+    return one_by_one
+
+
+radiances = by_class("radiances", {setup: _radiances_of(setup) for setup in SETUPS})
 """radiances(setup, scene, samplers, n, scratch): estimates of the radiance along the first n of
 `scratch.rays`, into `scratch.totals`."""
-
-__all__ = [
-    "AnyIntegrator",
-    "Direct",
-    "Path",
-    "RayCast",
-    "Whitted",
-    "WhittedSetup",
-    "radiances",
-    "setup_of",
-]

@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt.accel.block_query import closest_hits, hit_of
-from reference_rt.core.model import Description
+from reference_rt.core.model import Description, Examples
 from reference_rt.core.ray import (
     BLOCK,
     HIT_FLOATS,
@@ -66,6 +66,11 @@ class Direct(Description):
     """Emission, and light that is scattered once, by sampling lights and materials with multiple
     importance sampling."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {},
+        {"light_samples": 2, "bsdf_samples": 3, "hide_emitters": True},
+        {"shadows": False},
+    )
     deterministic: ClassVar[bool] = False
     type: Literal["direct"] = "direct"
     light_samples: _Count = 1

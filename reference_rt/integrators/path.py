@@ -29,7 +29,7 @@ from reference_rt import materials as any_material
 from reference_rt import sampling
 from reference_rt.accel.block_query import any_hits, closest_hits, hit_of
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.model import Description
+from reference_rt.core.model import Description, Examples
 from reference_rt.core.ray import (
     BLOCK,
     RAY_FLOATS,
@@ -165,6 +165,12 @@ class Path(Description):
     """Path tracing: unbiased global illumination by light sampling, BSDF sampling and Russian
     roulette."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {},
+        {"max_depth": 3, "rr_depth": 2, "hide_emitters": True},
+        {"sampling": "lights"},
+        {"sampling": "bsdf"},
+    )
     deterministic: ClassVar[bool] = False
     type: Literal["path"] = "path"
     max_depth: Annotated[int, Field(ge=0)] | None = None

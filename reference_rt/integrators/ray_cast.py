@@ -4,7 +4,7 @@ import math
 from typing import ClassVar, Literal, NamedTuple
 
 from reference_rt.accel.geometry import closest_hit, colour, coordinates, owner
-from reference_rt.core.model import Description
+from reference_rt.core.model import Description, Examples
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3, length
 from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
@@ -22,6 +22,9 @@ class RayCast(Description):
     All layers are computed; `show` selects the picture.
     """
 
+    EXAMPLES: ClassVar[Examples] = tuple(
+        {"show": what} for what in ("colour", "distance", "normal", "id", "uv")
+    )
     deterministic: ClassVar[bool] = True
     follows_scattered: ClassVar[bool] = False
     type: Literal["ray_cast"] = "ray_cast"

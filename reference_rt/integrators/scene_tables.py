@@ -6,7 +6,7 @@ from reference_rt import shapes as any_shape
 from reference_rt.accel.geometry import Geometry
 from reference_rt.accel.geometry import surface as surface_in_geometry
 from reference_rt.core.ray import Hit, Ray, SurfacePoint
-from reference_rt.jit.kernel import ByClass, kernel
+from reference_rt.jit.kernel import by_class, kernel
 from reference_rt.lights import Lights, LinkedLights
 from reference_rt.materials import Materials
 from reference_rt.shapes import Shapes
@@ -37,13 +37,6 @@ class LinkedScene(NamedTuple):
     textures: Any
 
 
-def _for(name: str, of_tables: Any, of_linked: Any) -> Any:
-    choice = ByClass(name)
-    choice.register(SceneTables, of_tables)
-    choice.register(LinkedScene, of_linked)
-    return choice.function
-
-
 @kernel
 def _own_shapes(scene: SceneTables) -> Shapes:
     return scene.geometry.shapes
@@ -54,7 +47,7 @@ def _linked_shapes(scene: LinkedScene) -> Any:
     return scene.shapes
 
 
-shapes_of = _for("shapes_of", _own_shapes, _linked_shapes)
+shapes_of = by_class("shapes_of", {SceneTables: _own_shapes, LinkedScene: _linked_shapes})
 """shapes_of(scene): the tables of shapes, or the link to them."""
 
 
@@ -70,5 +63,5 @@ def _surface_through_link(scene: LinkedScene, ray: Ray, hit: Hit) -> SurfacePoin
     return any_shape.surface(scene.shapes, ray, hit)
 
 
-surface = _for("surface", _surface_in_tables, _surface_through_link)
+surface = by_class("surface", {SceneTables: _surface_in_tables, LinkedScene: _surface_through_link})
 """surface(scene, ray, hit): the surface point, in world space, of a hit."""

@@ -13,7 +13,7 @@ from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt.accel.geometry import closest_hit
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Description
+from reference_rt.core.model import Description, Examples
 from reference_rt.core.ray import Ray, ray_from
 from reference_rt.core.vec3 import Vec3, max_component, to_world
 from reference_rt.integrators.direct_light import fixed_lights
@@ -31,6 +31,7 @@ class Whitted(Description):
     glass, but lights nothing else.
     """
 
+    EXAMPLES: ClassVar[Examples] = ({}, {"max_depth": 3, "min_contribution": 0.01})
     deterministic: ClassVar[bool] = True
     follows_scattered: ClassVar[bool] = False
     type: Literal["whitted"] = "whitted"

@@ -1,4 +1,5 @@
-"""`ByCode`: generates the kernels that choose among all types of shapes, or of materials.
+"""`ByCode`: generates the kernels that choose among all types of shapes, or of materials; and
+`tables_of`, which numbers the types.
 
 A scene has one table for each type of shape: `Shapes` has the fields spheres, boxes, ..., and None
 in place of the table of a type that the scene lacks.  A hit names a table by an integer code.  From
@@ -37,15 +38,44 @@ which `uv` has number 3:
 
 import functools
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, TypeVar
+from types import ModuleType
+from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 from numba import types
 
 from reference_rt.jit.kernel import is_named_tuple, kernel, overload_kernel
-from reference_rt.jit.links import Group, Link, Row, stop
+from reference_rt.jit.links import Group, Link, Operation, Row, stop
 from reference_rt.jit.numba_codegen import define, parameters_of
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+class Table(NamedTuple):
+    """A type of table.  code: its number;  field: of the NamedTuple of all tables;  table: the
+    class;  module: what has its kernels as attributes."""
+
+    code: int
+    field: str
+    table: Any
+    module: Any
+
+
+def tables_of(of_all: type) -> tuple[Table, ...]:
+    """The tables in a NamedTuple of all tables of a kind, whose fields of tables are annotated as
+    Annotated[Spheres | None, sphere]: the table, None where there is none, and its kernels.  Their
+    order is that of the codes, from 0 on."""
+    hints = get_type_hints(of_all, include_extras=True).items()
+    fields = [(field, *get_args(hint)) for field, hint in hints if get_origin(hint) is Annotated]
+    return tuple(
+        Table(code, field, get_args(table)[0], module)
+        for code, (field, table, module) in enumerate(fields)
+    )
+
+
+def described_in(module: ModuleType, union: Any) -> type:
+    """The description in a module, of those in a union."""
+    (found,) = (cls for cls in get_args(union) if cls.__module__ == module.__name__)
+    return found  # type: ignore[no-any-return]
 
 
 class ByCode(Group):
@@ -91,7 +121,9 @@ class ByCode(Group):
 
             operation, body = self._add(otherwise, rows), kernel(otherwise)
             linked = functools.partial(operation.through_link, tables, code, body)
-            return _chosen(otherwise, [tables, *others], rows, lines, linked, otherwise=body)
+            chosen = _chosen(otherwise, [tables, *others], rows, lines, linked, otherwise=body)
+            Operation.of[chosen] = operation
+            return chosen
 
         return decorate
 

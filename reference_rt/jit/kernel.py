@@ -15,7 +15,7 @@ follow these rules for that:
 
 import gc
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
@@ -164,17 +164,17 @@ class ByClass:
     """
 
     def __init__(self, name: str) -> None:
-        self._kernels: dict[type, Callable[..., Any]] = {}
+        self.kernels: dict[type, Callable[..., Any]] = {}
 
         def choose(first: Any, *rest: Any) -> Any:
-            return self._kernels[type(first)](first, *rest)
+            return self.kernels[type(first)](first, *rest)
 
         choose.__name__ = name
         self.function: Callable[..., Any] = choose
 
         @overload_kernel(choose)
         def _compiled(first: Any, *rest: Any) -> Callable[..., Any] | None:
-            for cls, function in self._kernels.items():
+            for cls, function in self.kernels.items():
                 if is_named_tuple(first, cls) or (
                     cls is type(None) and isinstance(first, types.NoneType)
                 ):
@@ -183,7 +183,15 @@ class ByClass:
 
     def register(self, cls: type, function: Callable[..., Any]) -> None:
         """Call `function` if the first argument is a `cls`; `cls` is type(None) for None."""
-        self._kernels[cls] = function
+        self.kernels[cls] = function
+
+
+def by_class(name: str, kernels: Mapping[type, Callable[..., Any]]) -> Any:
+    """The function of a `ByClass` with these kernels, by the class of the first argument."""
+    choice = ByClass(name)
+    for cls, function in kernels.items():
+        choice.register(cls, function)
+    return choice.function
 
 
 def _local_array(dtype: Any) -> Any:

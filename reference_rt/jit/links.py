@@ -25,7 +25,7 @@ import typing
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
-from typing import Annotated, Any, NamedTuple, TypeVar
+from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar
 
 import numba
 import numpy as np
@@ -218,23 +218,28 @@ class Row(NamedTuple):
 class Operation:
     """An operation of a group of tables: one kernel for each type that has it."""
 
-    def __init__(self, function: Callable[..., Any], number: int, rows: Sequence[Row]) -> None:
+    of: ClassVar[dict[Callable[..., Any], "Operation"]] = {}
+    """By the function that kernels call."""
+
+    def __init__(
+        self, group: "Group", function: Callable[..., Any], number: int, rows: Sequence[Row]
+    ) -> None:
+        self.group, self.function = group, function
         self.name, self.number, self.module = function.__name__, number, function.__module__
         self.rows = {row.code: row.kernel for row in rows}
         self.parameters = parameters_of(function)[1:]
-        self._function = function
         self._entries: dict[int, Any] = {}
 
     @cached_property
     def arguments(self) -> tuple[Any, ...]:
         """The types of the arguments after the table."""
-        hints = typing.get_type_hints(self._function, include_extras=True)
+        hints = typing.get_type_hints(self.function, include_extras=True)
         return tuple(type_of(hints[name]) for name in self.parameters)
 
     @cached_property
     def returns(self) -> Any:
         """The type of the result."""
-        return type_of(typing.get_type_hints(self._function, include_extras=True)["return"])
+        return type_of(typing.get_type_hints(self.function, include_extras=True)["return"])
 
     def call_for(self, code: int, table: Any) -> tuple[Any, Any]:
         """The entry kernel for a type of table, and the signature to compile it for.  table:
@@ -313,7 +318,7 @@ class Group:
 
     def _add(self, function: Callable[..., Any], rows: Sequence[Row]) -> Operation:
         number = len(self.operations) + 1
-        operation = Operation(function, number, rows)
+        operation = Operation(self, function, number, rows)
         where = f"{operation.module}.{operation.name}"
         if operation.name in self.operations:
             raise TypeError(f"{where}: an operation of this name exists; expected another name")
@@ -350,6 +355,7 @@ class Linkable(Group):
         def _compiled(table: Any, *rest: Any) -> Callable[..., Any]:
             return operation.through_link(first) if is_named_tuple(table, Link) else body
 
+        Operation.of[choose] = operation
         return choose  # type: ignore[return-value]
 
 

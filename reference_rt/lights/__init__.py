@@ -18,114 +18,29 @@ units for distances; colours are linear sRGB.  Lights that can be sampled are nu
 
 Shapes whose material is `emissive` are lights too (`emitters/area.py`).
 
-To add a light: a file in `emitters/`; a code in `light.py`; in `tables.py` a field of `Lights`
-and a line in `TABLES`; below, a member of `AnyLight` and a line in `TABLES`; a translator in
-`comparisons.translator`; a scene; a row in the tests' tuple.  Step by step:
+To add a light: a file in `emitters/`, and its lines in `tables.py`.  Step by step:
 docs/extending.md.
 """
 
-from typing import Annotated, Any
-
-from pydantic import Field
-
-from reference_rt.lights.dispatch import (
-    ambient,
-    area_pdf,
-    background,
-    background_of,
-    count,
-    emitted,
-    environment_pdf,
-    is_area,
-    pick,
-    pick_probability,
-    sample_fixed,
-    sample_one,
-    sample_picked,
-)
-from reference_rt.lights.emitters import directional, point, projector, spot
-from reference_rt.lights.emitters.area import Areas
-from reference_rt.lights.emitters.constant import Ambient, Constant, Environment
-from reference_rt.lights.emitters.directional import Directional
-from reference_rt.lights.emitters.environment_map import Ahead, EnvironmentMap, EnvironmentMaps
-from reference_rt.lights.emitters.point import Point
-from reference_rt.lights.emitters.projector import Projector
-from reference_rt.lights.emitters.spot import Spot
-from reference_rt.lights.light import (
-    AREA,
-    DIRECTIONAL,
-    ENVIRONMENT,
-    POINT,
-    PROJECTOR,
-    SPOT,
-    LightSample,
-    shadow_ray,
-)
-from reference_rt.lights.selection.choice import LightSampler, Pick
-from reference_rt.lights.tables import (
-    Lights,
-    LinkedLights,
-    depends_on_normal,
-    depends_on_point,
-    map_of,
-    sky_floats,
-)
-
-AnyLight = Annotated[
-    Point | Spot | Projector | Directional | Constant | EnvironmentMap | Ambient,
-    Field(discriminator="type"),
-]
-
-TABLES: tuple[tuple[int, str, type, Any], ...] = (
-    (POINT, "points", Point, point),
-    (SPOT, "spots", Spot, spot),
-    (PROJECTOR, "projectors", Projector, projector),
-    (DIRECTIONAL, "directionals", Directional, directional),
-)
-"""(code, field of Lights, description, module) of those that are neither surfaces nor surround the
-scene, in the order in which `Lights.choice` lists them."""
-
-__all__ = [
-    "AREA",
-    "DIRECTIONAL",
-    "ENVIRONMENT",
-    "POINT",
-    "PROJECTOR",
-    "SPOT",
-    "TABLES",
-    "Ahead",
-    "Ambient",
-    "AnyLight",
-    "Areas",
-    "Constant",
-    "Directional",
-    "Environment",
-    "EnvironmentMap",
-    "EnvironmentMaps",
-    "LightSample",
-    "LightSampler",
-    "Lights",
-    "LinkedLights",
-    "Pick",
-    "Point",
-    "Projector",
-    "Spot",
-    "ambient",
-    "area_pdf",
-    "background",
-    "background_of",
-    "count",
-    "depends_on_normal",
-    "depends_on_point",
-    "emitted",
-    "environment_pdf",
-    "is_area",
-    "map_of",
-    "pick",
-    "pick_probability",
-    "sample_fixed",
-    "sample_one",
-    "sample_picked",
-    "shadow_ray",
-    "sky_floats",
-]
+from reference_rt.lights.dispatch import ambient as ambient
+from reference_rt.lights.dispatch import area_pdf as area_pdf
+from reference_rt.lights.dispatch import background as background
+from reference_rt.lights.dispatch import background_of as background_of
+from reference_rt.lights.dispatch import count as count
+from reference_rt.lights.dispatch import emitted as emitted
+from reference_rt.lights.dispatch import environment_pdf as environment_pdf
+from reference_rt.lights.dispatch import is_area as is_area
+from reference_rt.lights.dispatch import pick as pick
+from reference_rt.lights.dispatch import pick_probability as pick_probability
+from reference_rt.lights.dispatch import sample_fixed as sample_fixed
+from reference_rt.lights.dispatch import sample_one as sample_one
+from reference_rt.lights.dispatch import sample_picked as sample_picked
+from reference_rt.lights.emitters.area import Areas as Areas
+from reference_rt.lights.emitters.constant import Environment as Environment
+from reference_rt.lights.emitters.environment_map import Ahead as Ahead
+from reference_rt.lights.emitters.environment_map import EnvironmentMaps as EnvironmentMaps
+from reference_rt.lights.light import LightSample as LightSample
+from reference_rt.lights.light import shadow_ray as shadow_ray
+from reference_rt.lights.selection.choice import LightSampler as LightSampler
+from reference_rt.lights.selection.choice import Pick as Pick
+from reference_rt.lights.tables import *

@@ -11,10 +11,12 @@ from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.lights.emitters import area, environment_map
 from reference_rt.lights.emitters.environment_map import Ahead
-from reference_rt.lights.light import AREA, ENVIRONMENT, NO_LIGHT, LightSample
+from reference_rt.lights.light import NO_LIGHT, LightSample
 from reference_rt.lights.selection import choice
 from reference_rt.lights.selection.choice import Pick
 from reference_rt.lights.tables import (
+    AREA,
+    ENVIRONMENT,
     Lights,
     by_code,
     emitters,
@@ -71,7 +73,7 @@ def _emitted(lights: Lights, q: SurfacePoint, at: At, w: Vec3) -> Vec3:
     return Vec3(0.0, 0.0, 0.0)
 
 
-@by_code(lambda module: area.pdf if module is area else None, code=str(AREA))
+@by_code(lambda module: area.density if module is area else None, code=str(AREA))
 def _area_density(lights: Lights, i: int, shapes: Shapes, p: Vec3, q: SurfacePoint) -> float:
     return 0.0
 

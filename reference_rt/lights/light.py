@@ -1,4 +1,4 @@
-"""The codes of the types of lights, and the sample that their kernels return."""
+"""The sample that the kernels of lights return, and what lights at a point share."""
 
 import math
 from typing import NamedTuple
@@ -6,9 +6,6 @@ from typing import NamedTuple
 from reference_rt.core.ray import Ray, SurfacePoint, ray_from, segment_to
 from reference_rt.core.vec3 import Vec3, dot
 from reference_rt.jit.kernel import kernel
-
-# Codes of `Lights.kind`.
-AREA, POINT, SPOT, DIRECTIONAL, ENVIRONMENT, PROJECTOR = range(6)
 
 
 class LightSample(NamedTuple):

@@ -1,11 +1,17 @@
-"""The tables of all types of lights, themselves or behind links."""
+"""The register of lights: their descriptions, and their tables, themselves or behind links.
 
-from typing import Any, NamedTuple
+A new light has a line in `AnyLight` and, unless it surrounds the scene, one in `Lights`; all else
+follows from these two.  Its import as itself makes it a name of `reference_rt.lights`.
+"""
+
+from typing import Annotated, Any, NamedTuple, get_args
+
+from pydantic import Field
 
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3
-from reference_rt.jit.by_code import ByCode
-from reference_rt.jit.kernel import ByClass, kernel
+from reference_rt.jit.by_code import ByCode, described_in, tables_of
+from reference_rt.jit.kernel import by_class, kernel
 from reference_rt.jit.links import LINK, Link, declare
 from reference_rt.lights.emitters import (
     area,
@@ -16,50 +22,27 @@ from reference_rt.lights.emitters import (
     projector,
     spot,
 )
-from reference_rt.lights.emitters.area import Areas
+from reference_rt.lights.emitters.constant import Ambient as Ambient
+from reference_rt.lights.emitters.constant import Constant as Constant
 from reference_rt.lights.emitters.constant import Environment
-from reference_rt.lights.emitters.directional import Directionals
+from reference_rt.lights.emitters.directional import Directional as Directional
 from reference_rt.lights.emitters.environment_map import AHEAD_FLOATS, EnvironmentMaps
-from reference_rt.lights.emitters.point import Points
-from reference_rt.lights.emitters.projector import Projectors
-from reference_rt.lights.emitters.spot import Spots
-from reference_rt.lights.light import (
-    AREA,
-    DIRECTIONAL,
-    ENVIRONMENT,
-    POINT,
-    PROJECTOR,
-    SPOT,
-    LightSample,
-)
+from reference_rt.lights.emitters.environment_map import EnvironmentMap as EnvironmentMap
+from reference_rt.lights.emitters.point import Point as Point
+from reference_rt.lights.emitters.projector import Projector as Projector
+from reference_rt.lights.emitters.spot import Spot as Spot
+from reference_rt.lights.light import LightSample
 from reference_rt.lights.selection.choice import LightSampler, LightTree
 
-
-class Lights(NamedTuple):
-    """The table of each type, None for types that the scene lacks.
-
-    ambient (1, 3): the ambient radiance;  choice: the entries of the light sampler, None if no
-    light can be picked;  tree: the light tree, None for few lights.  Entries are in this order: all
-    areas, points, spots, projectors, directional lights, the environment.  So area light i is entry
-    i.
-    """
-
-    points: Points | None
-    spots: Spots | None
-    projectors: Projectors | None
-    directionals: Directionals | None
-    areas: Areas | None
-    environment: Environment | EnvironmentMaps | None
-    ambient: FloatArray | None
-    choice: LightSampler | None
-    tree: LightTree | None
+AnyLight = Annotated[
+    Point | Spot | Projector | Directional | Constant | EnvironmentMap | Ambient,
+    Field(discriminator="type"),
+]
 
 
 def _of_environment(name: str) -> Any:
-    kernels = ByClass(name)
-    kernels.register(Environment, getattr(constant, name))
-    kernels.register(EnvironmentMaps, getattr(environment_map, name))
-    return kernels.function
+    modules = {Environment: constant, EnvironmentMaps: environment_map}
+    return by_class(name, {table: getattr(module, name) for table, module in modules.items()})
 
 
 _radiance_of = _of_environment("radiance")
@@ -89,19 +72,45 @@ class _Surroundings:
         return found
 
 
+class Lights(NamedTuple):
+    """The table of each type, None for types that the scene lacks.
+
+    ambient (1, 3): the ambient radiance;  choice: the entries of the light sampler, None if no
+    light can be picked;  tree: the light tree, None for few lights.  Entries are in the order of
+    the tables: all areas, points, spots, and so on, the environment last.  So area light i is entry
+    i.
+    """
+
+    areas: Annotated[area.Areas | None, area]
+    points: Annotated[point.Points | None, point]
+    spots: Annotated[spot.Spots | None, spot]
+    projectors: Annotated[projector.Projectors | None, projector]
+    directionals: Annotated[directional.Directionals | None, directional]
+    environment: Annotated[Environment | EnvironmentMaps | None, _Surroundings]
+    ambient: FloatArray | None
+    choice: LightSampler | None
+    tree: LightTree | None
+
+
 declare(Lights, LINK)
 
-TABLES: tuple[tuple[int, str, Any], ...] = (
-    (AREA, "areas", area),
-    (POINT, "points", point),
-    (SPOT, "spots", spot),
-    (PROJECTOR, "projectors", projector),
-    (DIRECTIONAL, "directionals", directional),
-    (ENVIRONMENT, "environment", _Surroundings),
-)
-"""(code, field of Lights, module with its kernels)."""
+ALL = tables_of(Lights)
+"""Of all lights, surfaces and the environment included."""
 
-by_code = ByCode(TABLES)
+by_code = ByCode((code, field, module) for code, field, _, module in ALL)
+
+_CODES = {field: code for code, field, _, _ in ALL}
+AREA, ENVIRONMENT = _CODES["areas"], _CODES["environment"]
+POINT, SPOT, PROJECTOR = _CODES["points"], _CODES["spots"], _CODES["projectors"]
+DIRECTIONAL = _CODES["directionals"]
+
+TABLES: tuple[tuple[int, str, Any, Any], ...] = tuple(
+    (code, field, described_in(module, get_args(AnyLight)[0]), module)
+    for code, field, _, module in ALL
+    if code not in (AREA, ENVIRONMENT)
+)
+"""(code, field of Lights, description, module) of those that are neither surfaces nor surround the
+scene, in the order in which `Lights.choice` lists them."""
 
 
 class LinkedLights(NamedTuple):
@@ -114,13 +123,6 @@ class LinkedLights(NamedTuple):
     ambient: FloatArray
 
 
-def _for(name: str, of_lights: Any, of_linked: Any) -> Any:
-    chosen = ByClass(name)
-    chosen.register(Lights, of_lights)
-    chosen.register(LinkedLights, of_linked)
-    return chosen.function
-
-
 @kernel
 def _themselves(lights: Any) -> Any:
     return lights
@@ -131,7 +133,7 @@ def _emitters_of(lights: LinkedLights) -> Link:
     return lights.emitters
 
 
-emitters = _for("emitters", _themselves, _emitters_of)
+emitters = by_class("emitters", {Lights: _themselves, LinkedLights: _emitters_of})
 """emitters(lights): the tables, or the link to them."""
 
 
@@ -150,11 +152,11 @@ def _always(lights: LinkedLights) -> bool:
     return True
 
 
-depends_on_point = _for("depends_on_point", _point_matters, _always)
+depends_on_point = by_class("depends_on_point", {Lights: _point_matters, LinkedLights: _always})
 """depends_on_point(lights): whether any probability or density depends on the point p: a
 constant."""
 
-depends_on_normal = _for("depends_on_normal", _normal_matters, _always)
+depends_on_normal = by_class("depends_on_normal", {Lights: _normal_matters, LinkedLights: _always})
 """depends_on_normal(lights): whether any probability depends on the normal n: a constant."""
 
 
@@ -169,13 +171,11 @@ def _no_map(lights: Any) -> None:
     return None
 
 
-_maps = ByClass("as_map")
-_maps.register(EnvironmentMaps, _themselves)
-_maps.register(Environment, _no_map)
-_maps.register(type(None), _no_map)
-_as_map = _maps.function
+_as_map = by_class(
+    "as_map", {EnvironmentMaps: _themselves, Environment: _no_map, type(None): _no_map}
+)
 
-map_of = _for("map_of", _map_of, _no_map)
+map_of = by_class("map_of", {Lights: _map_of, LinkedLights: _no_map})
 """map_of(lights): the environment map whose light is computed ahead, None if there is none."""
 
 
@@ -197,5 +197,5 @@ def _any_areas(lights: Lights) -> bool:
     return lights.areas is not None
 
 
-has_areas = _for("has_areas", _any_areas, _always)
+has_areas = by_class("has_areas", {Lights: _any_areas, LinkedLights: _always})
 """has_areas(lights): whether a surface may be a light: a constant."""

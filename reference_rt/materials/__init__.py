@@ -15,120 +15,46 @@ Call `prepare` once at each hit, before the others.  Then
   means that sampling failed and the path ends here;
 - `branches` returns the delta lobes, as directions with factors on radiance, black for none.
 
-To add a material: a file in `bsdfs/` or, if it is made of others, in `nested/`, whose docstrings
-say what else is needed; a member of `AnyMaterial` below; a translator in
-`comparisons.translator`; a scene; a row in the tests' tuple.  Step by step:
-docs/extending.md.
+To add a material: a file in `bsdfs/`, and its lines in `bsdfs/tables.py`; or, if it is made of
+others, one in `nested/`, and its line in `AnyMaterial` below.  Step by step: docs/extending.md.
 """
 
 from typing import Annotated
 
 from pydantic import Field
 
-from reference_rt.materials.bsdfs.conductor import Conductor
-from reference_rt.materials.bsdfs.dielectric import Dielectric
-from reference_rt.materials.bsdfs.diffuse import Diffuse
-from reference_rt.materials.bsdfs.gltf_pbr import GltfPbr
-from reference_rt.materials.bsdfs.mirror import Mirror
-from reference_rt.materials.bsdfs.phong import Phong
-from reference_rt.materials.bsdfs.plastic import Plastic
-from reference_rt.materials.bsdfs.principled import Principled
-from reference_rt.materials.bsdfs.principled_thin import PrincipledThin
-from reference_rt.materials.bsdfs.rough_conductor import RoughConductor
-from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric
-from reference_rt.materials.bsdfs.rough_plastic import RoughPlastic
-from reference_rt.materials.bsdfs.tables import BLACK
-from reference_rt.materials.bsdfs.thin_dielectric import ThinDielectric
-from reference_rt.materials.dispatch import (
-    Materials,
-    ambient,
-    any_smooth,
-    any_transmits,
-    branch_count,
-    branches,
-    eval_pdf,
-    evaluate,
-    is_oriented,
-    is_smooth,
-    most_branches,
-    pdf,
-    prepare,
-    sample,
-    scratch_floats,
-    takes_light_from_behind,
-    uses_textures,
-    uses_u_lobe,
-)
-from reference_rt.materials.material import Branches, BsdfSample, Emissive, Material, Shading
-from reference_rt.materials.nested.tilted import Bump, NormalMap
-from reference_rt.materials.nested.wrappers import Blend, Mask, TwoSided, Wrapper
+from reference_rt.materials.bsdfs.tables import *
+from reference_rt.materials.bsdfs.tables import Bsdf as Bsdf
+from reference_rt.materials.dispatch import Materials as Materials
+from reference_rt.materials.dispatch import ambient as ambient
+from reference_rt.materials.dispatch import any_smooth as any_smooth
+from reference_rt.materials.dispatch import any_transmits as any_transmits
+from reference_rt.materials.dispatch import branch_count as branch_count
+from reference_rt.materials.dispatch import branches as branches
+from reference_rt.materials.dispatch import eval_pdf as eval_pdf
+from reference_rt.materials.dispatch import evaluate as evaluate
+from reference_rt.materials.dispatch import is_oriented as is_oriented
+from reference_rt.materials.dispatch import is_smooth as is_smooth
+from reference_rt.materials.dispatch import most_branches as most_branches
+from reference_rt.materials.dispatch import pdf as pdf
+from reference_rt.materials.dispatch import prepare as prepare
+from reference_rt.materials.dispatch import sample as sample
+from reference_rt.materials.dispatch import scratch_floats as scratch_floats
+from reference_rt.materials.dispatch import takes_light_from_behind as takes_light_from_behind
+from reference_rt.materials.dispatch import uses_textures as uses_textures
+from reference_rt.materials.dispatch import uses_u_lobe as uses_u_lobe
+from reference_rt.materials.material import Branches as Branches
+from reference_rt.materials.material import BsdfSample as BsdfSample
+from reference_rt.materials.material import Emissive as Emissive
+from reference_rt.materials.material import Material as Material
+from reference_rt.materials.material import Shading as Shading
+from reference_rt.materials.nested.tilted import Bump as Bump
+from reference_rt.materials.nested.tilted import NormalMap as NormalMap
+from reference_rt.materials.nested.wrappers import Blend as Blend
+from reference_rt.materials.nested.wrappers import Mask as Mask
+from reference_rt.materials.nested.wrappers import TwoSided as TwoSided
+from reference_rt.materials.nested.wrappers import Wrapper as Wrapper
 
 AnyMaterial = Annotated[
-    Diffuse
-    | Mirror
-    | Dielectric
-    | Conductor
-    | ThinDielectric
-    | RoughConductor
-    | RoughDielectric
-    | Plastic
-    | RoughPlastic
-    | Principled
-    | PrincipledThin
-    | GltfPbr
-    | Phong
-    | Emissive
-    | Mask
-    | TwoSided
-    | Blend
-    | Bump
-    | NormalMap,
-    Field(discriminator="type"),
-]
-
-__all__ = [
-    "BLACK",
-    "AnyMaterial",
-    "Blend",
-    "Branches",
-    "BsdfSample",
-    "Bump",
-    "Conductor",
-    "Dielectric",
-    "Diffuse",
-    "Emissive",
-    "GltfPbr",
-    "Mask",
-    "Material",
-    "Materials",
-    "Mirror",
-    "NormalMap",
-    "Phong",
-    "Plastic",
-    "Principled",
-    "PrincipledThin",
-    "RoughConductor",
-    "RoughDielectric",
-    "RoughPlastic",
-    "Shading",
-    "ThinDielectric",
-    "TwoSided",
-    "Wrapper",
-    "ambient",
-    "any_smooth",
-    "any_transmits",
-    "branch_count",
-    "branches",
-    "eval_pdf",
-    "evaluate",
-    "is_oriented",
-    "is_smooth",
-    "most_branches",
-    "pdf",
-    "prepare",
-    "sample",
-    "scratch_floats",
-    "takes_light_from_behind",
-    "uses_textures",
-    "uses_u_lobe",
+    Bsdf | Emissive | Mask | TwoSided | Blend | Bump | NormalMap, Field(discriminator="type")
 ]

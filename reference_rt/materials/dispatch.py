@@ -11,7 +11,7 @@ from reference_rt.core.arrays import IntArray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.links import is_absent
-from reference_rt.materials.bsdfs import tables as bsdf
+from reference_rt.materials.bsdfs import dispatch as bsdf
 from reference_rt.materials.bsdfs.tables import Leaves
 from reference_rt.materials.material import Branches, BsdfSample, Scattered, Shading
 from reference_rt.materials.nested import flattened

@@ -11,7 +11,7 @@ import math
 from typing import Any, ClassVar, Literal, NamedTuple
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Description
+from reference_rt.core.model import Description, Examples
 from reference_rt.core.ray import UNIT_ROUNDOFF, SurfacePoint
 from reference_rt.core.vec3 import (
     Frame,
@@ -198,6 +198,11 @@ def oriented_frame(ns: Vec3, tangents: Tangents) -> Frame:
 class Emissive(Material):
     """Emits the same radiance in all directions of its front: its shape is an area light."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {"radiance": 1.0},
+        {"radiance": (3.0, 2.0, 1.0), "base": "base"},
+        {"radiance": "texture"},
+    )
     type: Literal["emissive"] = "emissive"
     radiance: ColourParameter
     """Emitted radiance: W sr^-1 m^-2, linear sRGB, or a texture."""

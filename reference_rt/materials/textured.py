@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.jit.kernel import ByClass, kernel
+from reference_rt.jit.kernel import by_class, kernel
 from reference_rt.materials.material import Emissive, Material
 from reference_rt.materials.nested.tilted import Bump
 from reference_rt.materials.nested.wrappers import Wrapper
@@ -93,9 +93,6 @@ def _look(textured: Textured, m: int, at: At, colours: FloatArray) -> At:
     return At(CachedLookups(colours), at.u, at.v, at.colour)
 
 
-_choice = ByClass("look")
-_choice.register(type(None), _nothing)
-_choice.register(Textured, _look)
-evaluate_textures = _choice.function
+evaluate_textures = by_class("look", {type(None): _nothing, Textured: _look})
 """look(textured, m, at, colours) -> At.  Evaluates the textures of material m at `at`, into the
 scratch buffer `colours`, and returns a place where `lookup` reads these."""

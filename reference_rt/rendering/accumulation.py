@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.integrators import INTEGRATORS, RayCast, setup_of
+from reference_rt.integrators import RayCast, setup_of
 from reference_rt.integrators.path import PathSetup
 from reference_rt.integrators.scene_tables import LinkedScene
 from reference_rt.rendering.tiles import aov_tile, cost_tile, first_hits_tile, render_tile
@@ -45,14 +45,14 @@ COSTS = {"bvh_steps": slice(0, 1), "intersections": slice(1, 2)}
 class Job:
     """A kernel of `tiles`.
 
-    integrator: see `linking.linked_scene`;  arguments: from the scene, the view and the filter,
-    each the tables themselves or linked, to the kernel's arguments before its sums;  sums: the
-    names of these, "" for one that is absent;  columns: of a kernel that computes values, once for
-    each pixel, instead of adding up samples: by name, the columns that are stored.
+    setup: the class of its integrator's setup, None for others;  arguments: from the scene, the
+    view and the filter, each the tables themselves or linked, to the kernel's arguments before its
+    sums;  sums: the names of these, "" for one that is absent;  columns: of a kernel that computes
+    values, once for each pixel, instead of adding up samples: by name, the columns that are stored.
     """
 
     kernel: Any
-    integrator: str
+    setup: type | None
     arguments: Callable[[Any, Any, Any], tuple[Any, ...]]
     sums: tuple[str, ...]
     columns: Mapping[str, slice] = field(default_factory=dict)
@@ -85,9 +85,9 @@ def jobs_of(scene: BuiltScene) -> list[Job]:
 
     wanted = set(scene.film.layers)
     asked: dict[str, slice] = {name: columns for name, columns in COSTS.items() if name in wanted}
-    costs = [Job(cost_tile, "cost", centres, (_CENTRE,), asked)] if asked else []
+    costs = [Job(cost_tile, None, centres, (_CENTRE,), asked)] if asked else []
     if isinstance(scene.integrator, RayCast):
-        return [Job(aov_tile, "ray_cast", centres, (_CENTRE,), _CENTRE_COLUMNS), *costs]
+        return [Job(aov_tile, None, centres, (_CENTRE,), _CENTRE_COLUMNS), *costs]
     sampler = scene.resolved_sampler
     has_variance = "variance" in wanted
     setup = setup_of(scene.integrator, not isinstance(sampler, Grid))
@@ -98,10 +98,10 @@ def jobs_of(scene: BuiltScene) -> list[Job]:
         def first_hits(tables: Any, view: Any, film_filter: Any) -> tuple[Any, ...]:
             return tables, view, film_filter, random_numbers, shape
 
-        jobs.append(Job(first_hits_tile, "first_hits", first_hits, OF_FIRST_HITS))
+        jobs.append(Job(first_hits_tile, None, first_hits, OF_FIRST_HITS))
     if {"depth", "id"} & wanted:
         columns = {name: _CENTRE_COLUMNS[name] for name in ("distance", "id")}
-        jobs.append(Job(aov_tile, "ray_cast", centres, (_CENTRE,), columns))
+        jobs.append(Job(aov_tile, None, centres, (_CENTRE,), columns))
     return jobs + costs
 
 
@@ -116,7 +116,7 @@ def radiance_job(setup: Any, sampler: Any, shape: tuple[int, int], has_variance:
         return own, tables, view, film_filter, random_numbers, shape
 
     sums = ("colour", "m2" if has_variance else "")
-    return Job(render_tile, INTEGRATORS[type(setup)], arguments, sums)
+    return Job(render_tile, type(setup), arguments, sums)
 
 
 def widths_of(scene: BuiltScene) -> dict[str, int]:

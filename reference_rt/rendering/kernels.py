@@ -22,6 +22,7 @@ import numba
 import numpy as np
 
 from reference_rt.accel.block_query import tracer_of
+from reference_rt.integrators import traces_blocks
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit import parallel_compile
 from reference_rt.jit.function_pointer import pointer_to
@@ -39,6 +40,7 @@ from reference_rt.rendering.accumulation import ABSENT, Job
 from reference_rt.rendering.linking import (
     EMPTY_SCENE,
     EMPTY_VIEW,
+    calls_of,
     linked_filter,
     linked_scene,
     linked_view,
@@ -174,7 +176,7 @@ class Linked:
         self.calls: list[Call] = []
         for job in jobs:
             given = job.arguments(
-                linked_scene(linker, tables, job.integrator),
+                linked_scene(linker, tables, calls_of(job.kernel, job.setup)),
                 linked_view(linker, view),
                 linked_filter(linker, film_filter),
             )
@@ -198,7 +200,7 @@ class Specialised:
     def __init__(
         self, jobs: Sequence[Job], tables: SceneTables, view: Any, film_filter: Any
     ) -> None:
-        has_blocks = any(job.integrator in ("path", "direct") for job in jobs)
+        has_blocks = any(job.setup is not None and traces_blocks(job.setup) for job in jobs)
         self._tracer = tracer_of(tables.geometry) if has_blocks else None
         if self._tracer is not None:
             geometry = tables.geometry._replace(tracer=np.zeros(1, np.intp))

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from reference_rt.accel.geometry import Geometry, geometries
-from reference_rt.cameras import views
+from reference_rt.cameras import has_lens, views
 from reference_rt.cameras.film import film_filters
-from reference_rt.cameras.thin_lens import ThinLensView
 from reference_rt.integrators.scene_tables import LinkedScene, SceneTables
-from reference_rt.jit.links import Link, Linker
+from reference_rt.jit.called import called
+from reference_rt.jit.links import Group, Link, Linker, Operation
 from reference_rt.lights import Lights, LightSampler, LinkedLights
 from reference_rt.lights import tables as light_tables
 from reference_rt.lights.emitters.area import Areas
@@ -24,7 +24,7 @@ from reference_rt.shapes import TABLES as SHAPES
 from reference_rt.shapes import Packets, Shapes
 from reference_rt.shapes import tables as shape_tables
 from reference_rt.textures import Textures
-from reference_rt.textures.lookup import textures_operations
+from reference_rt.textures.lookup import lookups
 from reference_rt.textures.parameter import Colours, Numbers
 
 _NO_INTEGERS = np.zeros(0, np.int64)
@@ -63,7 +63,7 @@ def linked_view(linker: Linker, view: Any) -> LinkedView:
         return LinkedView(Link(0), 0, view)
     link = linker.link(views.operations, views.operations, {0: view})
     nothing: Any = np.zeros((0, 3))
-    return LinkedView(link, int(isinstance(view, ThinLensView)), GivenRays(nothing, nothing))
+    return LinkedView(link, int(has_lens(view)), GivenRays(nothing, nothing))
 
 
 def linked_filter(linker: Linker, setup: Any) -> Link:
@@ -71,109 +71,133 @@ def linked_filter(linker: Linker, setup: Any) -> Link:
     return linker.link(film_filters.operations, film_filters.operations, {0: setup})
 
 
-def linked_scene(linker: Linker, tables: SceneTables, integrator: str) -> LinkedScene:
-    """A scene behind links.  integrator: `path`, `direct`, `whitted`, `first_hits`, `ray_cast`
-    or `cost`: whose kernel takes it."""
-    geometry, materials, lights = tables.geometry, tables.materials, tables.lights
-    is_textured = tables.textures is not None and integrator != "cost"
-    is_oriented = materials.oriented is not None and integrator in ("path", "direct", "whitted")
-    textures = linked_textures(linker, tables.textures if is_textured else None, is_oriented)
-    shapes = _shapes(linker, tables, integrator, is_textured, is_oriented)
+# ---- what is called ------------------------------------------------------------------------------
+
+Calls = frozenset[Operation]
+"""Operations that kernels call."""
+
+
+def calls_of(kernel: Any, setup: type | None = None) -> Calls:
+    """The operations that a kernel calls through links.  setup: the class of its integrator's."""
+    return called(kernel, _CLASSES if setup is None else _CLASSES | {setup})
+
+
+def calls_of_geometry(names: Iterable[str]) -> Calls:
+    """Operations on a geometry, and the operations on shapes that they call."""
+    found = frozenset(geometries.operations[name] for name in names)
+    rows = (row for operation in found for row in operation.rows.values())
+    return found.union(*(called(row, _CLASSES, geometries) for row in rows))
+
+
+_CLASSES = frozenset((Link, LinkedScene, LinkedLights, LinkedView))
+
+
+def _names(calls: Calls, group: Group) -> set[str]:
+    return {operation.name for operation in calls if operation.group is group}
+
+
+# What a scene does not call, though it is in the code of kernels: so that it is not compiled.  What
+# is missing here costs time, and nothing else.
+
+
+def _without(calls: Calls, group: Group, *names: str) -> Calls:
+    return calls - {group.operations[name] for name in names}
+
+
+def _of_geometry(calls: Calls, geometry: Geometry) -> Calls:
+    """Of the operations those that are called for a geometry."""
+    shapes, others = shape_tables.by_code, _names(calls, geometries)
+    if geometry.solids is None:
+        calls = _without(calls, shapes, "spans", "enters")
+    if geometry.bvh is not None:
+        return _without(calls, shapes, "nearest_of_type", "nearest_of_block", "complete_block")
+    if not others & {"closest_hit", "occluded"}:
+        calls = _without(calls, shapes, "nearest_of_type")
+    if others & _QUERIES or geometry.solids is not None:
+        return calls
+    if "owner" not in others:
+        calls = _without(calls, shapes, "face")
+        if geometry.parts is None:
+            calls = _without(calls, shapes, "owner")
+    return _without(calls, shapes, "intersect")
+
+
+_QUERIES = {"next_crossing", "crossings_of_solid", "traversal_cost"}
+"""Operations on a geometry that need those on single shapes without a hierarchy, too."""
+
+
+def _of_scene(calls: Calls, tables: SceneTables) -> Calls:
+    """Of the operations those that are called for a scene."""
+    shapes, geometry = shape_tables.by_code, tables.geometry
+    calls = _of_geometry(calls, geometry)
+    if geometry.parts is None and geometry.instances is None:  # as `LinkedScene.is_placed`
+        calls = _without(calls, geometries, "surface")
+    if tables.textures is None and geometries.operations["owner"] not in calls:  # as ray casting
+        calls = _without(calls, geometries, "coordinates")
+        calls = _without(calls, shapes, "uv", "colour")
+    if tables.materials.oriented is None:
+        calls = _without(calls, geometries, "tangents")
+        calls = _without(calls, shapes, "tangents")
+        calls = _without(calls, lookups, "gradient")
+    if tables.lights.areas is None:
+        calls = _without(calls, shapes, "sample", "sample_fixed", "pdf")
+    return calls
+
+
+# ---- tables behind links -------------------------------------------------------------------------
+
+
+def linked_scene(linker: Linker, tables: SceneTables, calls: Calls) -> LinkedScene:
+    """A scene behind links, with the operations of `calls` that it needs."""
+    calls = _of_scene(calls, tables)
+    geometry, lights = tables.geometry, tables.lights
+    textures = linked_textures(linker, tables.textures, calls)
+    shapes = linked_shapes(linker, geometry.shapes, calls, lights.areas)
     return LinkedScene(
-        geometry=_geometry(linker, geometry, shapes, integrator, is_textured, is_oriented),
+        geometry=linked_geometry(linker, geometry, shapes, calls),
         shapes=shapes,
         is_placed=int(geometry.parts is not None or geometry.instances is not None),
-        materials=linked_materials(linker, materials, integrator, is_textured),
-        lights=linked_lights(linker, lights, integrator),
+        materials=linked_materials(linker, tables.materials, calls, textures.address != 0),
+        lights=linked_lights(linker, lights, calls),
         textures=textures,
     )
 
 
-def linked_textures(linker: Linker, textures: Textures | None, is_oriented: bool) -> Link:
-    """Textures behind a link; None has a link to nothing.  is_oriented: whether materials are,
-    which alone take gradients."""
-    if textures is None:
+def geometry_of(linker: Linker, geometry: Geometry, names: Iterable[str]) -> Link:
+    """A geometry behind a link that has these operations, and what they call."""
+    calls = _of_geometry(calls_of_geometry(names), geometry)
+    shapes = linked_shapes(linker, geometry.shapes, calls)
+    return linked_geometry(linker, geometry, shapes, calls)
+
+
+def linked_textures(linker: Linker, textures: Textures | None, calls: Calls) -> Link:
+    """Textures behind a link; None, and those that nothing looks up, have a link to nothing."""
+    wanted = _names(calls, lookups)
+    if textures is None or not wanted:
         return Link(0)
-    wanted = {"evaluate", "gradient"} if is_oriented else {"evaluate"}
-    return linker.link(textures_operations, wanted, {0: textures})
+    return linker.link(lookups.operations, wanted, {0: textures})
 
 
-def _shapes(
-    linker: Linker, tables: SceneTables, integrator: str, is_textured: bool, is_oriented: bool
-) -> Link:
-    geometry = tables.geometry
-    blocks = integrator in ("path", "direct")
-    wanted = {"surface"}
-    if integrator == "cost":
-        wanted = {"primitive_count", "intersect", "owner", "face"}
-    elif geometry.bvh is None:
-        wanted |= {"nearest_of_block", "complete_block"} if blocks else {"nearest_of_type"}
-    else:
-        wanted |= {"intersect", "owner", "face"}
-    if geometry.parts is not None:
-        wanted |= {"owner"}
-    if geometry.solids is not None:
-        wanted |= {"spans", "enters", "intersect", "surface"}
-    if is_textured or integrator == "ray_cast":
-        wanted |= {"uv", "colour"}
-    if integrator == "ray_cast":
-        wanted |= {"owner", "face"}
-    if is_oriented:
-        wanted |= {"tangents"}
-    if tables.lights.areas is not None:
-        others = {"whitted": {"sample_fixed", "sample"}}
-        others |= {name: set() for name in ("ray_cast", "first_hits", "cost")}
-        wanted |= others.get(integrator, {"sample", "pdf"})
-    return linked_shapes(linker, geometry.shapes, wanted, tables.lights.areas)
-
-
-def linked_shapes(
-    linker: Linker, shapes: Shapes, wanted: Iterable[str], areas: Areas | None = None
-) -> Link:
-    """Shapes behind a link, with the operations `wanted`.  areas: the area lights, whose types of
-    shape alone are sampled."""
+def linked_shapes(linker: Linker, shapes: Shapes, calls: Calls, areas: Areas | None = None) -> Link:
+    """Shapes behind a link.  areas: the area lights, whose types of shape alone are sampled."""
+    group = shape_tables.by_code
     found = {
         code: table for code, field, _, _ in SHAPES if (table := getattr(shapes, field)) is not None
     }
     kinds: set[int] = set() if areas is None else set(areas.kind.tolist())
     only = dict.fromkeys(("sample", "sample_fixed", "pdf"), kinds)
-    return linker.link(shape_tables.by_code.operations, wanted, found, only)
+    return linker.link(group.operations, _names(calls, group), found, only)
 
 
-def _geometry(
-    linker: Linker,
-    geometry: Geometry,
-    shapes: Link,
-    integrator: str,
-    is_textured: bool,
-    is_oriented: bool,
-) -> Link:
-    blocks = integrator in ("path", "direct")
-    wanted = {"closest_hits", "any_hits"} if blocks else {"closest_hit"}
-    if integrator == "whitted":
-        wanted |= {"occluded"}
-    if integrator == "ray_cast":
-        wanted |= {"owner", "coordinates"}
-    if integrator == "cost":
-        wanted = {"traversal_cost"}
-    elif geometry.parts is not None or geometry.instances is not None:
-        wanted |= {"surface"}
-    if is_textured:
-        wanted |= {"coordinates"}
-    if is_oriented:
-        wanted |= {"tangents"}
-    return linked_geometry(linker, geometry, shapes, wanted)
-
-
-def linked_geometry(linker: Linker, geometry: Geometry, shapes: Any, wanted: Iterable[str]) -> Link:
-    """A geometry behind a link, with the operations `wanted`.  shapes: the link to its shapes."""
+def linked_geometry(linker: Linker, geometry: Geometry, shapes: Any, calls: Calls) -> Link:
+    """A geometry behind a link.  shapes: the link to its shapes."""
     nothing: Any = np.zeros((0, 1, 8))
     packets = Packets(*(nothing if p is None else p for p in geometry.packets))
     bvh = geometry.bvh
     if bvh is not None and bvh.corners is None:  # one type less: without triangles none are read
         bvh = bvh._replace(corners=_NO_FLOATS)
     table = geometry._replace(shapes=shapes, packets=packets, bvh=bvh, tracer=None)
-    return linker.link(geometries.operations, wanted, {0: table})
+    return linker.link(geometries.operations, _names(calls, geometries), {0: table})
 
 
 def _present(array: Any, n: int, value: int) -> Any:
@@ -190,33 +214,20 @@ def _always_textured(table: Any) -> Any:
 
 
 def linked_materials(
-    linker: Linker, materials: Materials, integrator: str, is_textured: bool
+    linker: Linker, materials: Materials, calls: Calls, is_textured: bool
 ) -> Materials:
-    """Materials whose tables are behind links.  integrator: see `linked_scene`."""
+    """Materials whose tables are behind links."""
     n = len(materials.shown.value)
     tables = {
         code: _always_textured(table)
         for code, field, _, _, _ in bsdfs.TABLES
         if (table := getattr(materials.leaves, field)) is not None
     }
-    wanted = {
-        "path": {"eval_pdf", "sample", "branches"},
-        "direct": {"eval_pdf", "sample", "branches"},
-        "whitted": {"eval_pdf", "branches", "ambient"},
-    }.get(integrator, set())
-    leaves: Any = linker.link(bsdfs.by_code.operations, wanted, tables)
-    flat = _NOTHING
-    if materials.flat_leaves is not None and wanted:
-        nested = {
-            "path": {"eval_pdf_nested", "sample_nested"},
-            "direct": {"eval_pdf_nested", "sample_nested"},
-            "whitted": {"eval_pdf_nested", "branches_nested", "ambient_nested", "leaf_count"},
-        }[integrator] | {"_most", "_prepare"}
-        flat = linker.link(
-            flattened_materials.operations,
-            nested,
-            {0: _always_textured(materials.flat_leaves)},
-        )
+    leaves: Any = linker.link(bsdfs.by_code.operations, _names(calls, bsdfs.by_code), tables)
+    flat, nested = _NOTHING, _names(calls, flattened_materials)
+    if materials.flat_leaves is not None and nested:
+        table = _always_textured(materials.flat_leaves)
+        flat = linker.link(flattened_materials.operations, nested, {0: table})
     only = list(tables)
     kind = materials.kind if materials.kind is not None else np.full(n, only[0] if only else -1)
     row = materials.row if materials.row is not None else np.arange(n)
@@ -238,19 +249,14 @@ def linked_materials(
     )
 
 
-def linked_lights(linker: Linker, lights: Lights, integrator: str) -> LinkedLights:
-    """Lights behind links.  integrator: see `linked_scene`."""
-    wanted = {
-        "path": {"_background", "_environment_density", "_emitted", "_area_density", "_sample"},
-        "direct": {"_background", "_environment_density", "_emitted", "_area_density", "_sample"},
-        "whitted": {"_background", "_emitted", "_sample_fixed", "_sample"},
-    }.get(integrator, set())
+def linked_lights(linker: Linker, lights: Lights, calls: Calls) -> LinkedLights:
+    """Lights behind links."""
     emitters = linker.link(
         light_tables.by_code.operations,
-        wanted,
+        _names(calls, light_tables.by_code),
         {
             code: _always_textured(table)
-            for code, field, _ in light_tables.TABLES
+            for code, field, _, _ in light_tables.ALL
             if (table := getattr(lights, field)) is not None
         },
     )
@@ -259,10 +265,10 @@ def linked_lights(linker: Linker, lights: Lights, integrator: str) -> LinkedLigh
         choice = _NO_LIGHTS
     if choice.cumulative is None:
         choice = choice._replace(cumulative=np.ones(1))
-    tree = Link(0)
+    tree, picked = Link(0), _names(calls, light_trees)
     if lights.tree is None:
         choice = choice._replace(bounded=np.zeros(1))
-    elif integrator in ("path", "direct"):  # the others pick no light
-        tree = linker.link(light_trees.operations, light_trees.operations, {0: lights.tree})
+    elif picked:
+        tree = linker.link(light_trees.operations, picked, {0: lights.tree})
     ambient = np.zeros((1, 3)) if lights.ambient is None else lights.ambient
     return LinkedLights(emitters, choice, tree, ambient)

@@ -13,8 +13,8 @@ import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.exr import EXR_ROWS, exr_rows
-from reference_rt.integrators import AnyIntegrator, Direct, RayCast, Whitted
-from reference_rt.integrators import Path as PathTracing
+from reference_rt.core.model import name_of, types_of
+from reference_rt.integrators import AnyIntegrator, RayCast
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.parallel_compile import Report
 from reference_rt.rendering.accumulation import layers_of, samples_of, widths_of
@@ -375,7 +375,7 @@ def _rows_of(layers: Mapping[str, FloatArray], width: int) -> dict[str, FloatArr
 
 S = TypeVar("S", bound=SceneModel)
 
-_INTEGRATORS = {"ray_cast": RayCast, "whitted": Whitted, "direct": Direct, "path": PathTracing}
+_INTEGRATORS: dict[str, Any] = {name_of(cls): cls for cls in types_of(AnyIntegrator)}
 
 
 def with_settings(

@@ -33,7 +33,7 @@ from reference_rt.integrators.path import STATE_FLOATS, VECTOR_FLOATS, Scratch, 
 from reference_rt.integrators.ray_cast import cast
 from reference_rt.integrators.scene_tables import SceneTables, surface
 from reference_rt.integrators.shading import texture_place
-from reference_rt.jit.kernel import ByClass, entry_kernel, kernel, local_floats, local_integers
+from reference_rt.jit.kernel import by_class, entry_kernel, kernel, local_floats, local_integers
 from reference_rt.jit.links import Link
 from reference_rt.lights import sky_floats
 from reference_rt.materials import scratch_floats
@@ -46,8 +46,6 @@ from reference_rt.sampling import (
     sampler_of,
     start_sample,
 )
-from reference_rt.sampling.grid import GridSetup
-from reference_rt.sampling.independent import IndependentSetup
 from reference_rt.sampling.sobol import SobolSetup
 from reference_rt.textures import colour_at
 
@@ -149,21 +147,12 @@ def _linked_view(view: LinkedView) -> Link:
     return view.link
 
 
-_views, _lenses = ByClass("view_of"), ByClass("lens_of")
-_views.register(LinkedView, _linked_view)
-_lenses.register(LinkedView, _linked_lens)
-for _view in VIEWS:
-    _views.register(_view, _itself)
-    _lenses.register(_view, _own_lens)
-_view_of, _lens_of = _views.function, _lenses.function
-
-
-_film_rays = ByClass("film_ray")
-_film_rays.register(LinkedView, _linked_film_ray)
-_film_rays.register(GivenRays, _given_ray)
-for _view in VIEWS:
-    _film_rays.register(_view, _camera_film_ray)
-_film_ray = _film_rays.function
+_view_of = by_class("view_of", dict.fromkeys(VIEWS, _itself) | {LinkedView: _linked_view})
+_lens_of = by_class("lens_of", dict.fromkeys(VIEWS, _own_lens) | {LinkedView: _linked_lens})
+_film_ray = by_class(
+    "film_ray",
+    dict.fromkeys(VIEWS, _camera_film_ray) | {LinkedView: _linked_film_ray, GivenRays: _given_ray},
+)
 
 
 @kernel
@@ -177,11 +166,10 @@ def _stratum_of_others(setup: Any, film_filter: Any, pixel: int, sample: int) ->
     return no_stratum(pixel, sample)
 
 
-_strata = ByClass("stratum_of_sample")
-_strata.register(SobolSetup, _stratum_of_sobol)
-_strata.register(IndependentSetup, _stratum_of_others)
-_strata.register(GridSetup, _stratum_of_others)
-_stratum = _strata.function
+_stratum = by_class(
+    "stratum_of_sample",
+    dict.fromkeys(sampling.SETUPS, _stratum_of_others) | {SobolSetup: _stratum_of_sobol},
+)
 """_stratum(sampler_setup, film_filter, pixel, sample)."""
 
 

@@ -10,55 +10,38 @@ scene, and its place in `linked_calls`.
 """
 
 from collections.abc import Iterable, Iterator
-from itertools import chain, cycle, product
+from itertools import cycle, product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from reference_rt.cameras import Orthographic, Perspective, ThinLens
-from reference_rt.cameras.film import (
-    AnyFilter,
-    BoxFilter,
-    CatmullRomFilter,
-    Film,
-    GaussianFilter,
-    LanczosFilter,
-    LayerName,
-    MitchellFilter,
-    TentFilter,
-)
+from reference_rt.cameras import AnyCamera
+from reference_rt.cameras.film import AnyFilter, Film, LayerName
+from reference_rt.core.model import name_of, types_of
 from reference_rt.integrators import Direct, RayCast, Whitted
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import signature_of
 from reference_rt.jit.links import Link, Linker
 from reference_rt.jit.parallel_compile import Call
-from reference_rt.lights import Constant, Directional, EnvironmentMap, Point, Projector, Spot
+from reference_rt.lights import TABLES as LIGHTS
+from reference_rt.lights import Constant, EnvironmentMap, Point
 from reference_rt.lights.selection.choice import FEW
 from reference_rt.materials import (
     Blend,
+    Bsdf,
     Bump,
-    Conductor,
-    Dielectric,
     Diffuse,
     Emissive,
-    GltfPbr,
     Mirror,
     NormalMap,
-    Phong,
-    Plastic,
-    Principled,
-    PrincipledThin,
     RoughConductor,
-    RoughDielectric,
-    RoughPlastic,
-    ThinDielectric,
     TwoSided,
 )
 from reference_rt.rendering.accumulation import Job, jobs_of
 from reference_rt.rendering.kernels import Linked, Specialised, cost
-from reference_rt.rendering.linking import EMPTY_SCENE
+from reference_rt.rendering.linking import EMPTY_SCENE, geometry_of
 from reference_rt.rendering.query.bsdf import scatter_kernel
 from reference_rt.rendering.query.hits import (
     OCCLUDED,
@@ -82,25 +65,15 @@ from reference_rt.rendering.query.tracing import (
     describe,
     empty_hits,
     empty_primitives,
-    geometry_of,
 )
-from reference_rt.sampling import Grid, Independent, Sobol
+from reference_rt.sampling import AnySampler, Grid
 from reference_rt.scene.build import BuiltScene
-from reference_rt.shapes import (
-    Box,
-    Disk,
-    Mesh,
-    Plane,
-    Polygon,
-    Quadric,
-    Rectangle,
-    Sphere,
-    Torus,
-)
+from reference_rt.scene.examples import examples, write_files
+from reference_rt.shapes import Mesh, Primitive, Sphere, Triangle
 from reference_rt.shapes.csg import Union
 from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.meshes.files.obj_scanner import scan_call
-from reference_rt.textures import Bitmap, Checker, Product, VertexColours
+from reference_rt.textures import AnyTexture, Product
 from reference_rt.util.files import temporary_folder
 
 
@@ -191,14 +164,15 @@ def query_calls(scene: BuiltScene) -> list[Call]:
 # are kept as rich as possible, since a kernel is needed only if the scene asks for it: tangents,
 # for example, if a material is anisotropic.
 
-_IMAGE = "image.npy"
 _LAYERS: tuple[LayerName, ...] = ("albedo", "depth")  # each is written by a kernel of its own
 
 _TEXTURES = {
-    "checker": Checker(),
-    "bitmap": Bitmap(file=_IMAGE, encoding="raw"),
-    "vertex colours": VertexColours(),
+    name: first
+    for of in types_of(AnyTexture)
+    if (name := name_of(of)) != "product"
+    for first in examples(of)[:1]
 }
+"""One of each type that has a table of its own for lookups."""
 
 _FEW = {
     "diffuse": Diffuse(),
@@ -210,16 +184,7 @@ _FEW = {
 
 _LEAVES = {
     **_FEW,
-    "dielectric": Dielectric(),
-    "conductor": Conductor(eta=(0.2, 0.2, 0.2), k=(3.0, 3.0, 3.0)),
-    "thin": ThinDielectric(),
-    "frosted": RoughDielectric(),
-    "plastic": Plastic(),
-    "rough plastic": RoughPlastic(),
-    "principled": Principled(),
-    "principled thin": PrincipledThin(),
-    "gltf": GltfPbr(),
-    "phong": Phong(diffuse=(0.1, 0.1, 0.1)),
+    **{name_of(of): examples(of)[0] for of in types_of(Bsdf)},
 }
 """Every BSDF."""
 
@@ -231,33 +196,16 @@ _NESTED = {
 """Each has a table of its own, which a scene without such materials lacks."""
 
 _LAMPS = (
-    Spot(origin=(0.0, 3.0, 0.0), target=(0.0, 0.0, 0.0), intensity=(1.0, 1.0, 1.0)),
-    Projector(
-        origin=(0.0, 3.0, 0.0),
-        target=(0.0, 0.0, 0.0),
-        up=(0.0, 0.0, 1.0),
-        irradiance=(1.0, 1.0, 1.0),
-    ),
-    Directional(direction=(0.0, -1.0, 0.0), irradiance=(1.0, 1.0, 1.0)),
-    *(Point(position=(k, 3.0, 0.0), intensity=(1.0, 1.0, 1.0)) for k in range(FEW)),
+    *(examples(description)[0] for _, _, description, _ in LIGHTS),
+    *examples(Point) * FEW,
 )
 """With a lamp of any other type more than FEW lights: a tree picks among them."""
 
-_SKIES = (
-    Constant(radiance=(1.0, 1.0, 1.0)),
-    EnvironmentMap(file=_IMAGE),
-)
+_SKIES = *examples(Constant), examples(EnvironmentMap)[0]
 
-_SAMPLERS = Sobol(spp=4), Independent(spp=4), Grid(spp=4)
-_CAMERAS = Perspective(), Orthographic(), ThinLens(aperture_radius=0.1)
-_FILTERS: tuple[AnyFilter, ...] = (
-    BoxFilter(),
-    TentFilter(),
-    GaussianFilter(),
-    MitchellFilter(),
-    CatmullRomFilter(),
-    LanczosFilter(),
-)
+_SAMPLERS = [examples(of)[-1] for of in types_of(AnySampler)]
+_CAMERAS = [examples(of)[0] for of in types_of(AnyCamera)]
+_FILTERS = [examples(of)[0] for of in types_of(AnyFilter)]
 
 
 def _mesh(normals: bool, uv: bool, colours: bool) -> Mesh:
@@ -272,26 +220,12 @@ def _mesh(normals: bool, uv: bool, colours: bool) -> Mesh:
     )
 
 
-_TETRAHEDRON = Mesh(
-    vertices=np.concatenate([np.zeros((1, 3)), np.eye(3)]),
-    faces=np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
+_SHAPES = tuple(
+    examples(of)[0].model_copy(update={"material": "lamp"})
+    for of in types_of(Primitive)
+    if of not in (Triangle, Mesh)
 )
-
-_FEW_SHAPES: tuple[tuple[Any, ...], ...] = (
-    (
-        Sphere(material="lamp"),
-        Rectangle(material="lamp"),
-        Box(material="lamp"),
-        Disk(material="lamp"),
-        Plane(),
-    ),
-    (
-        Polygon(rings=(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),)),
-        Quadric(coefficients=(1, 1, 1, 0, 0, 0, 0, 0, 0, -1), lower=(-1, -1, -1), upper=(1, 1, 1)),
-        Torus(),
-    ),
-)
-"""One of each type but triangles; few enough together to need no hierarchy."""
+"""One of each type but triangles."""
 
 _SOLID = Union(of=(Sphere(), Sphere(center=(1.0, 0.0, 0.0))))
 _COPY = Instance(group="group")
@@ -300,14 +234,14 @@ _COPY = Instance(group="group")
 def scenes() -> Iterator[BuiltScene]:
     """Scenes that have, together, every type of table, and their tables are built."""
     with temporary_folder() as folder:
-        np.save(folder / _IMAGE, np.full((2, 2, 3), 0.5))
+        write_files(folder)
         for scene in _scenes(folder):
             assert scene.tables
             yield scene
 
 
 def _scenes(folder: Path) -> Iterator[BuiltScene]:
-    """folder: has the image."""
+    """folder: has the files that examples name."""
 
     def scene(**parts: Any) -> BuiltScene:
         rich = {
@@ -321,9 +255,9 @@ def _scenes(folder: Path) -> Iterator[BuiltScene]:
         made._folder = folder
         return made
 
-    for shapes in _FEW_SHAPES:
-        yield scene(shapes=shapes)
-    yield scene(shapes=(*chain(*_FEW_SHAPES), _SOLID), hierarchy="sah")
+    for k in range(0, len(_SHAPES), 3):  # so few that there is no hierarchy
+        yield scene(shapes=_SHAPES[k : k + 3])
+    yield scene(shapes=(*_SHAPES, _SOLID), hierarchy="sah")
     # Triangles and nested materials: their choices are independent, and share scenes.
     for columns, names in zip(product((False, True), repeat=3), _subsets(_NESTED), strict=True):
         # A sheet is nested, but has no table of its own.
@@ -335,7 +269,7 @@ def _scenes(folder: Path) -> Iterator[BuiltScene]:
         yield scene(
             shapes=(
                 Sphere(),
-                *(_TETRAHEDRON,) * triangles,
+                *(examples(Mesh)[0],) * triangles,
                 *(_SOLID,) * solids,
                 *(_COPY,) * copies,
             ),

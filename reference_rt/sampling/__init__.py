@@ -7,27 +7,33 @@ tabulated densities by inversion.
 A sampler's module has a `Description` with `spp` and `setup()`, which returns a NamedTuple for
 kernels; start(setup, pixel, sample) -> a NamedTuple for one sample of one pixel (pixels counted
 along rows, samples from 0); and draw(that, dimension) -> (u0, u1).  To add one: the module; below
-`AnySampler`, `Sample` and the three registrations; a scene and a row in the tests' tuples.
+its lines in `AnySampler` and `Sample`.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, get_args
 
 from pydantic import Field
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.jit.kernel import ByClass, kernel
-from reference_rt.sampling import blocks, grid, independent, sobol
+from reference_rt.core.model import module_of, setups_of
+from reference_rt.jit.kernel import by_class, kernel
+from reference_rt.sampling import blocks
 from reference_rt.sampling.blocks import FLOATS as PAIR_FLOATS
 from reference_rt.sampling.blocks import INTEGERS as PAIR_INTEGERS
 from reference_rt.sampling.blocks import BlockSample
-from reference_rt.sampling.grid import Grid, GridSample, GridSetup
-from reference_rt.sampling.independent import Independent, IndependentSample, IndependentSetup
+from reference_rt.sampling.grid import Grid, GridSample
+from reference_rt.sampling.independent import Independent, IndependentSample
 from reference_rt.sampling.sobol import GROUP, Sobol, SobolSample, SobolSetup
 
 AnySampler = Annotated[Sobol | Independent | Grid, Field(discriminator="type")]
 
 Sample = SobolSample | BlockSample | IndependentSample | GridSample
 """The sampler of one sample of one pixel."""
+
+SETUPS = (*setups_of(AnySampler),)
+"""The classes that `setup` returns."""
+
+_MODULES = {sample: module_of(sample) for sample in get_args(Sample)}
 
 # Every decision has a fixed dimension, so that the draws of one never shift the numbers of another.
 # Each dimension gives a pair (u0, u1), stratified in the unit square. The pairs of one bounce, the
@@ -38,11 +44,7 @@ FILM, LIGHT_AND_LOBE, LIGHT_POINT, BSDF_DIRECTION, LENS = range(PER_BOUNCE)
 ROULETTE = PER_BOUNCE
 """The dimension of Russian roulette: each later bounce has it where the first one has FILM."""
 
-_start = ByClass("start_sample")
-_start.register(SobolSetup, sobol.start)
-_start.register(IndependentSetup, independent.start)
-_start.register(GridSetup, grid.start)
-start_sample = _start.function
+start_sample = by_class("start_sample", {setup: module_of(setup).start for setup in SETUPS})
 """start_sample(setup, pixel, sample) -> the sampler of one sample of one pixel."""
 
 
@@ -51,11 +53,9 @@ def _without_blocks(setup: Any, pixel: int, sample: int, pairs: FloatArray, made
     return start_sample(setup, pixel, sample)
 
 
-_start_in_block = ByClass("start_in_block")
-_start_in_block.register(SobolSetup, blocks.start)
-_start_in_block.register(IndependentSetup, _without_blocks)
-_start_in_block.register(GridSetup, _without_blocks)
-start_in_block = _start_in_block.function
+start_in_block = by_class(
+    "start_in_block", dict.fromkeys(SETUPS, _without_blocks) | {SobolSetup: blocks.start}
+)
 """start_in_block(setup, pixel, sample, pairs, made) -> a sampler with the same numbers, which
 computes those of several samples of the pixel at once: see `Samplers`."""
 
@@ -90,22 +90,15 @@ def sampler_of(samplers: Samplers, k: int) -> Sample:
     return made
 
 
-_split = ByClass("split_sample")
-_split.register(SobolSample, sobol.split)
-_split.register(BlockSample, blocks.split)
-_split.register(IndependentSample, independent.split)
-split_sample = _split.function
+split_sample = by_class(
+    "split_sample", {sample: of.split for sample, of in _MODULES.items() if hasattr(of, "split")}
+)
 """split_sample(sampler, n, k) -> the sampler of part k of the n that a sample is split into.  With
 Sobol' points the parts of all samples of a pixel are one sequence: n times as many points, which
 are stratified together.  (Measured on soft shadows: 0.68 of the variance for two parts, 0.5 for
 sixteen, of n sequences.)"""
 
-_draw = ByClass("draw_pair")
-_draw.register(SobolSample, sobol.draw)
-_draw.register(BlockSample, blocks.draw)
-_draw.register(IndependentSample, independent.draw)
-_draw.register(GridSample, grid.draw)
-draw_pair = _draw.function
+draw_pair = by_class("draw_pair", {sample: of.draw for sample, of in _MODULES.items()})
 """draw_pair(sampler, dimension) -> (u0, u1), each in [0, 1)."""
 
 __all__ = [

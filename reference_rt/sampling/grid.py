@@ -1,11 +1,11 @@
 """Grid sampler: n x n fixed points in each pixel, for integrators that draw no random numbers."""
 
 import math
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field
 
-from reference_rt.core.model import Description
+from reference_rt.core.model import Description, Examples
 from reference_rt.jit.kernel import kernel
 
 
@@ -19,6 +19,7 @@ class Grid(Description):
     """The centres of n x n equal cells of the pixel, without random numbers: for deterministic
     integrators, and for `direct` where all lights are points, spots, projectors or directional."""
 
+    EXAMPLES: ClassVar[Examples] = ({}, {"spp": 4})
     type: Literal["grid"] = "grid"
     spp: Annotated[int, Field(ge=1, le=2**31), AfterValidator(_square)] = 1
     """Samples per pixel: the square of a whole number."""

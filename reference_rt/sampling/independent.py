@@ -1,17 +1,18 @@
 """Independent sampler: each number is a hash of (seed, pixel, sample, dimension)."""
 
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
-from reference_rt.core.model import Description
+from reference_rt.core.model import Description, Examples
 from reference_rt.jit.kernel import kernel
 
 
 class Independent(Description):
     """Independent uniform random numbers: the plain Monte Carlo baseline."""
 
+    EXAMPLES: ClassVar[Examples] = ({"spp": 4}, {"spp": 4, "seed": 3})
     type: Literal["independent"] = "independent"
     spp: Annotated[int, Field(ge=1, le=2**31)] = 16
     """Samples per pixel."""

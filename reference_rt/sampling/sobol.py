@@ -6,13 +6,13 @@ are stratified in every pair, and every number is uniform.  Groups of pairs are 
 are pixels; the pairs of a group take their points in different orders, which stratify them jointly.
 """
 
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from reference_rt.core.model import Description
+from reference_rt.core.model import Description, Examples
 from reference_rt.jit.kernel import kernel
 from reference_rt.sampling.independent import LOW32, combine, mix
 
@@ -33,6 +33,7 @@ class Sobol(Description):
     """Owen-scrambled Sobol' points: stratified and unbiased, with the least noise for powers of
     two."""
 
+    EXAMPLES: ClassVar[Examples] = ({"spp": 4}, {"spp": 4, "seed": 3})
     type: Literal["sobol"] = "sobol"
     spp: Annotated[int, Field(ge=1, le=2**31)] = 16
     """Samples per pixel; powers of two have the least noise."""

@@ -17,7 +17,6 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.lights import (
     AREA,
-    DIRECTIONAL,
     ENVIRONMENT,
     Ambient,
     Areas,
@@ -52,6 +51,9 @@ from reference_rt.shapes.meshes.triangle_table import shared
 from reference_rt.textures import TABLES as TEXTURE_TABLES
 from reference_rt.textures import Colours, Palette, Product, Textures, bitmap, product
 from reference_rt.textures.parameter import join
+
+_PLACED = (AREA, *(code for code, _, _, module in LIGHT_TABLES if hasattr(module, "bounds")))
+"""The codes of lights that have a position: a light tree may hold them."""
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -128,7 +130,7 @@ def _choice(kind: Any, row: Any, weight: FloatArray) -> LightSampler | None:
 
 
 def _choice_by(kind: Any, row: Any, probability: FloatArray) -> LightSampler:
-    bounded = probability[(kind != DIRECTIONAL) & (kind != ENVIRONMENT)].sum()
+    bounded = probability[np.isin(kind, _PLACED)].sum()
     cumulative = np.cumsum(probability) if len(probability) > 1 else None
     return LightSampler(kind, row, probability, cumulative, np.array([bounded]))
 
@@ -149,7 +151,7 @@ def _tree(lights: Lights, geometry: Geometry, power: FloatArray) -> LightTree | 
     if lights.choice is None:
         return None
     kind = lights.choice.kind
-    placed = np.flatnonzero((power > 0.0) & (kind != DIRECTIONAL) & (kind != ENVIRONMENT))
+    placed = np.flatnonzero((power > 0.0) & np.isin(kind, _PLACED))
     if len(placed) <= FEW:
         return None
     parts = []
@@ -157,12 +159,10 @@ def _tree(lights: Lights, geometry: Geometry, power: FloatArray) -> LightTree | 
         areas = lights.areas
         intensity = power[: len(areas.area)] / np.pi
         parts.append(bounds.of_areas(geometry.shapes, areas.kind, areas.row, intensity))
-    if lights.points is not None:
-        parts.append(bounds.of_points(lights.points))
-    if lights.spots is not None:
-        parts.append(bounds.of_spots(lights.spots))
-    if lights.projectors is not None:
-        parts.append(bounds.of_projectors(lights.projectors))
+    for _, field, _, module in LIGHT_TABLES:
+        table = getattr(lights, field)
+        if table is not None and hasattr(module, "bounds"):
+            parts.append(module.bounds(table))
     columns = (np.concatenate(column)[placed] for column in zip(*parts, strict=True))
     return build(LightBounds(*columns), placed, len(kind))
 

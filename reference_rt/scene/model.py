@@ -14,19 +14,11 @@ from pydantic import Field, PrivateAttr, model_validator
 from reference_rt.cameras import AnyCamera
 from reference_rt.cameras.film import Film
 from reference_rt.cameras.perspective import Perspective
-from reference_rt.core.model import AS_DIGEST, Description, as_linear
+from reference_rt.core.model import AS_DIGEST, Description, as_linear, name_of
 from reference_rt.integrators import AnyIntegrator, Direct
 from reference_rt.integrators import Path as PathTracing
-from reference_rt.lights import (
-    Ambient,
-    AnyLight,
-    Constant,
-    Directional,
-    EnvironmentMap,
-    Point,
-    Projector,
-    Spot,
-)
+from reference_rt.lights import TABLES as LIGHT_TABLES
+from reference_rt.lights import Ambient, AnyLight, Constant, EnvironmentMap
 from reference_rt.materials import AnyMaterial, Emissive, Material, Wrapper
 from reference_rt.materials.nested.paths import material_paths
 from reference_rt.sampling import AnySampler, Grid, Sobol
@@ -139,11 +131,11 @@ class SceneModel(Description):
                 "expected 'sobol' or 'independent'",
                 ("sampler", "type"),
             )
-        points = Point | Spot | Projector | Directional | Ambient
+        points = tuple(description for _, _, description, _ in LIGHT_TABLES)
         extended: list[tuple[tuple[str | int, ...], str]] = [
             (("lights", i), light.type)
             for i, light in enumerate(self.lights)
-            if not isinstance(light, points)
+            if not isinstance(light, (*points, Ambient))
         ]
         extended += [
             (("materials", name), "emissive")
@@ -153,8 +145,8 @@ class SceneModel(Description):
         for path, light in extended:
             raise SceneError(
                 f"'{kind}' needs random numbers for the light '{light}', which 'grid' does not "
-                "have; expected 'sobol' or 'independent', or lights without extent alone (point, "
-                "spot, projector, directional)",
+                "have; expected 'sobol' or 'independent', or lights without extent alone "
+                f"({', '.join(map(name_of, points))})",
                 path,
             )
 

@@ -17,97 +17,30 @@ world coordinates and scene units, for row i of the table or the row of a hit:
 - `sample(table, i, area, p, u0, u1) -> LightPoint` and `pdf(table, i, area, p, q)` of shapes that
   can be lights, with `areas(table)`: a density per solid angle at p; 0 means that no light arrives;
 - `spans(table, i, ray) -> Spans` of solids: where the line, at all t, is inside; t = inf for none;
+- `crossings(table, i, ray) -> Spans` of shapes that a ray can cross more than once: all crossings;
+- `unit_normals(table)` (n, 3) of flat shapes that can be lights;
 - `face_of(table, hit)` of shapes with several faces: the number of the face;
 - `nearer` of shapes that `ray_simd.py` tests against several rays at once, with `arguments(table,
   i)`, what its `distance` takes of a row, and `found(table, i, ray, t)`, the crossing at t.
 
-To add a shape: its file; what `tables.py` says; a translator in `comparisons.translator`; a
-scene; a row in the tests' tuple.  Step by step: docs/extending.md.
+To add a shape: its file, and its lines in `tables.py`.  Step by step: docs/extending.md.
 """
 
-from reference_rt.core.arrays import IntArray
-from reference_rt.shapes.box import Box
-from reference_rt.shapes.brute_force import Packets, nearest, nearest_of_ray, nearest_of_rays
-from reference_rt.shapes.curved.quadric import Cone, Cylinder, Quadric
-from reference_rt.shapes.curved.sphere import Sphere
-from reference_rt.shapes.curved.torus import Torus
-from reference_rt.shapes.dispatch import (
-    colour,
-    enters,
-    face,
-    intersect,
-    owner,
-    pdf,
-    sample,
-    sample_fixed,
-    spans,
-    surface,
-    tangents,
-    uv,
-)
-from reference_rt.shapes.flat.disk import Disk
-from reference_rt.shapes.flat.plane import Plane
-from reference_rt.shapes.flat.polygon import Polygon
-from reference_rt.shapes.flat.rectangle import Rectangle
-from reference_rt.shapes.meshes.mesh import Mesh
-from reference_rt.shapes.meshes.triangle import Triangle
-from reference_rt.shapes.shape import Shape
-from reference_rt.shapes.tables import (
-    BOX,
-    DISK,
-    PLANE,
-    POLYGON,
-    QUADRIC,
-    RECTANGLE,
-    SPHERE,
-    TABLES,
-    TORUS,
-    TRIANGLE,
-    Primitive,
-    Shapes,
-)
-
-__all__ = [
-    "BOX",
-    "DISK",
-    "PLANE",
-    "POLYGON",
-    "QUADRIC",
-    "RECTANGLE",
-    "SPHERE",
-    "TABLES",
-    "TORUS",
-    "TRIANGLE",
-    "Box",
-    "Cone",
-    "Cylinder",
-    "Disk",
-    "IntArray",
-    "Mesh",
-    "Packets",
-    "Plane",
-    "Polygon",
-    "Primitive",
-    "Quadric",
-    "Rectangle",
-    "Shape",
-    "Shapes",
-    "Sphere",
-    "Torus",
-    "Triangle",
-    "colour",
-    "enters",
-    "face",
-    "intersect",
-    "nearest",
-    "nearest_of_ray",
-    "nearest_of_rays",
-    "owner",
-    "pdf",
-    "sample",
-    "sample_fixed",
-    "spans",
-    "surface",
-    "tangents",
-    "uv",
-]
+from reference_rt.shapes.brute_force import Packets as Packets
+from reference_rt.shapes.brute_force import nearest as nearest
+from reference_rt.shapes.brute_force import nearest_of_ray as nearest_of_ray
+from reference_rt.shapes.brute_force import nearest_of_rays as nearest_of_rays
+from reference_rt.shapes.dispatch import colour as colour
+from reference_rt.shapes.dispatch import enters as enters
+from reference_rt.shapes.dispatch import face as face
+from reference_rt.shapes.dispatch import intersect as intersect
+from reference_rt.shapes.dispatch import owner as owner
+from reference_rt.shapes.dispatch import pdf as pdf
+from reference_rt.shapes.dispatch import sample as sample
+from reference_rt.shapes.dispatch import sample_fixed as sample_fixed
+from reference_rt.shapes.dispatch import spans as spans
+from reference_rt.shapes.dispatch import surface as surface
+from reference_rt.shapes.dispatch import tangents as tangents
+from reference_rt.shapes.dispatch import uv as uv
+from reference_rt.shapes.shape import Shape as Shape
+from reference_rt.shapes.tables import *

@@ -177,6 +177,9 @@ def spans(boxes: Boxes, i: int, ray: Ray) -> Spans:
     return no_spans()
 
 
+crossings = spans
+
+
 @kernel
 def intersect(boxes: Boxes, i: int, ray: Ray) -> Crossing:
     """Where the ray meets box i."""

@@ -6,6 +6,7 @@ generated from `TABLES`.  A function's body is for types without the kernel (onl
 """
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, miss
@@ -21,7 +22,7 @@ from reference_rt.shapes.shape import (
     no_spans,
     one_span,
 )
-from reference_rt.shapes.tables import BOX, QUADRIC, SPHERE, TORUS, Shapes, by_code
+from reference_rt.shapes.tables import Shapes, by_code
 
 
 @by_code("intersect")
@@ -120,21 +121,24 @@ class Along(NamedTuple):
     v: float
 
 
-@kernel
+def _along_of(module: Any) -> Callable[..., Along] | None:
+    crossings = getattr(module, "crossings", None)
+    if crossings is None:
+        return None
+
+    @kernel
+    def of_several(table: Any, i: int, ray: Ray) -> Along:
+        return Along(crossings(table, i, ray), 0.0)
+
+    return of_several
+
+
+@by_code(_along_of)
 def along(shapes: Shapes, kind: int, i: int, ray: Ray, shear: Shear) -> Along:
     """The crossings with primitive i of a kind, in order.  For shapes that can have several, t may
     be 0 or negative."""
-    if kind in (SPHERE, BOX, TORUS):
-        return Along(spans(shapes, kind, i, ray), 0.0)
-    if kind == QUADRIC:
-        return Along(_of_quadric(shapes, kind, i, ray), 0.0)
-    found = intersect(shapes, kind, i, ray, shear)
-    return Along(one_span(found.t, found.u, math.inf, 0.0), found.v)
-
-
-@by_code("crossings")
-def _of_quadric(shapes: Shapes, kind: int, i: int, ray: Ray) -> Spans:
-    return no_spans()
+    first = intersect(shapes, kind, i, ray, shear)
+    return Along(one_span(first.t, first.u, math.inf, 0.0), first.v)
 
 
 @kernel

@@ -1,11 +1,12 @@
 """Instances: copies of a group of shapes, which is stored once, each under its own map."""
 
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.model import Examples
 from reference_rt.core.ray import Ray, SurfacePoint
 from reference_rt.core.transform import FLAT, affine, flattens, singular
 from reference_rt.core.vec3 import length, normalize
@@ -24,6 +25,7 @@ from reference_rt.util.files import open_input
 class Instance(Shape):
     """A copy of a group's shapes, which are stored once, under a transform; or many copies."""
 
+    EXAMPLES: ClassVar[Examples] = ({"group": "group"}, {"group": "group", "file": "copies.npy"})
     type: Literal["instance"] = "instance"
     group: str
     """Name of the group in the scene's `groups`."""

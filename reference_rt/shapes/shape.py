@@ -3,13 +3,13 @@
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from reference_rt.core.arrays import Bounds, FloatArray
-from reference_rt.core.model import Description
+from reference_rt.core.model import Description, Examples
 from reference_rt.core.transform import FLAT, IDENTITY, Affine, Transform, affine, compose, flattens
 from reference_rt.core.vec3 import Vec3, dot, frame_from_normal
 from reference_rt.jit.kernel import kernel
@@ -79,6 +79,7 @@ class Solid(Shape):
     Operands without a material have that of the solid, so that a cut face looks as what cuts it.
     """
 
+    EXAMPLES: ClassVar[Examples] = ({"of": ({"type": "box"}, {"type": "sphere", "radius": 1.2})},)
     of: Annotated[tuple["AnyOperand", ...], Field(strict=False, min_length=1)]  # type: ignore[name-defined]  # noqa: F821
     """The operands, at least one: shapes that enclose space, or solids again."""
     # `AnyOperand` names every type of shape: `shapes/csg.py` completes the models.

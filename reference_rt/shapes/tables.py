@@ -1,33 +1,32 @@
-"""The tables of all types of shapes, and their codes.
+"""The register of shapes: their descriptions, and the tables that hold them.
 
-To add a shape: a file with its description, table and kernels; here its code, its field of
-`Shapes`, its line in `TABLES`, and `Primitive`.  docs/extending.md has the whole recipe.
+A new shape has a line in `Primitive` and, unless its rows are of a table that is there, one in
+`Shapes`; all else follows from these two.  Its import as itself makes it a name of
+`reference_rt.shapes`.
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from reference_rt.jit.by_code import ByCode
+from reference_rt.jit.by_code import ByCode, Table, tables_of
 from reference_rt.jit.kernel import ByClass
 from reference_rt.jit.links import LINK, declare
 from reference_rt.shapes import box
-from reference_rt.shapes.box import Box, Boxes
+from reference_rt.shapes.box import Box as Box
 from reference_rt.shapes.curved import quadrics, sphere, torus
-from reference_rt.shapes.curved.quadric import Cone, Cylinder, Quadric
-from reference_rt.shapes.curved.quadrics import Quadrics
-from reference_rt.shapes.curved.sphere import Sphere, Spheres
-from reference_rt.shapes.curved.torus import Tori, Torus
+from reference_rt.shapes.curved.quadric import Cone as Cone
+from reference_rt.shapes.curved.quadric import Cylinder as Cylinder
+from reference_rt.shapes.curved.quadric import Quadric as Quadric
+from reference_rt.shapes.curved.sphere import Sphere as Sphere
+from reference_rt.shapes.curved.torus import Torus as Torus
 from reference_rt.shapes.flat import disk, plane, polygon, rectangle
-from reference_rt.shapes.flat.disk import Disk, Disks
-from reference_rt.shapes.flat.plane import Plane, Planes
-from reference_rt.shapes.flat.polygon import Polygon, Polygons
-from reference_rt.shapes.flat.rectangle import Rectangle, Rectangles
+from reference_rt.shapes.flat.disk import Disk as Disk
+from reference_rt.shapes.flat.plane import Plane as Plane
+from reference_rt.shapes.flat.polygon import Polygon as Polygon
+from reference_rt.shapes.flat.rectangle import Rectangle as Rectangle
 from reference_rt.shapes.meshes import triangle
-from reference_rt.shapes.meshes.mesh import Mesh
-from reference_rt.shapes.meshes.triangle import Triangle, Triangles
-
-# Codes of `Hit.kind`: the table of which a primitive is a row.
-SPHERE, RECTANGLE, BOX, TRIANGLE, DISK, PLANE, POLYGON, QUADRIC, TORUS = range(9)
+from reference_rt.shapes.meshes.mesh import Mesh as Mesh
+from reference_rt.shapes.meshes.triangle import Triangle as Triangle
 
 Primitive = (
     Sphere
@@ -49,30 +48,25 @@ Primitive = (
 class Shapes(NamedTuple):
     """Every primitive of a scene, one table per type; None for a type that the scene lacks."""
 
-    spheres: Spheres | None
-    rectangles: Rectangles | None
-    boxes: Boxes | None
-    triangles: Triangles | None
-    disks: Disks | None
-    planes: Planes | None
-    polygons: Polygons | None
-    quadrics: Quadrics | None
-    tori: Tori | None
+    spheres: Annotated[sphere.Spheres | None, sphere]
+    rectangles: Annotated[rectangle.Rectangles | None, rectangle]
+    boxes: Annotated[box.Boxes | None, box]
+    triangles: Annotated[triangle.Triangles | None, triangle]
+    disks: Annotated[disk.Disks | None, disk]
+    planes: Annotated[plane.Planes | None, plane]
+    polygons: Annotated[polygon.Polygons | None, polygon]
+    quadrics: Annotated[quadrics.Quadrics | None, quadrics]
+    tori: Annotated[torus.Tori | None, torus]
 
 
-TABLES: tuple[tuple[int, str, type, Any], ...] = (
-    (SPHERE, "spheres", Spheres, sphere),
-    (RECTANGLE, "rectangles", Rectangles, rectangle),
-    (BOX, "boxes", Boxes, box),
-    (TRIANGLE, "triangles", Triangles, triangle),
-    (DISK, "disks", Disks, disk),
-    (PLANE, "planes", Planes, plane),
-    (POLYGON, "polygons", Polygons, polygon),
-    (QUADRIC, "quadrics", Quadrics, quadrics),
-    (TORUS, "tori", Tori, torus),
-)
-"""(code, field of Shapes, table, module with its kernels), in the order of the codes."""
+TABLES: tuple[Table, ...] = tables_of(Shapes)
+"""In the order of the codes, `Hit.kind`."""
 
+CODES = {module: code for code, _, _, module in TABLES}
+"""The code of a shape, by the module with its kernels."""
+
+SPHERE, RECTANGLE, BOX = CODES[sphere], CODES[rectangle], CODES[box]
+TRIANGLE, DISK, QUADRIC = CODES[triangle], CODES[disk], CODES[quadrics]
 
 declare(Shapes, LINK)
 

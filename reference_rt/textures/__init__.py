@@ -5,65 +5,20 @@ A texture gives a linear sRGB colour, or through its luminance a number, for sur
 the table, a NamedTuple; `greatest(table)`, the largest value in it, by which parameters check their
 range; and, where it depends on (u, v), `lookup(table, row, u, v)`, after the texture's uv map.
 
-To add a texture: its module; a code in `texture.py`; in `lookup.py` a field of `Textures` and a
-branch; below, `AnyTexture` and a line in `TABLES`; a translator function in
-`comparisons.translator`; a scene; a row in the tests' tuple.
+To add a texture: its module, and its lines in `tables.py`.
 """
 
-from typing import Annotated, Any
-
-from pydantic import Field
-
-from reference_rt.textures import bitmap, checker, product, vertex_colours
-from reference_rt.textures.bitmap import Bitmap
-from reference_rt.textures.checker import Checker
-from reference_rt.textures.lookup import At, Textures
-from reference_rt.textures.parameter import (
-    NO_TEXTURES,
-    ColourParameter,
-    Colours,
-    Numbers,
-    Palette,
-    ReflectanceParameter,
-    TextureName,
-    UnitParameter,
-    colour_at,
-    number_at,
-    texture_names,
-)
-from reference_rt.textures.product import Product
-from reference_rt.textures.texture import BITMAP, CHECKER, PRODUCT, VERTEX_COLOURS, Texture
-from reference_rt.textures.vertex_colours import VertexColours
-
-AnyTexture = Annotated[Checker | Bitmap | VertexColours | Product, Field(discriminator="type")]
-
-TABLES: tuple[tuple[int, str, type[Texture], Any], ...] = (
-    (CHECKER, "checkers", Checker, checker),
-    (BITMAP, "bitmaps", Bitmap, bitmap),
-    (VERTEX_COLOURS, "vertex_colours", VertexColours, vertex_colours),
-    (PRODUCT, "products", Product, product),
-)
-"""(code, field of Textures, description, module)."""
-
-__all__ = [
-    "NO_TEXTURES",
-    "TABLES",
-    "AnyTexture",
-    "At",
-    "Bitmap",
-    "Checker",
-    "ColourParameter",
-    "Colours",
-    "Numbers",
-    "Palette",
-    "Product",
-    "ReflectanceParameter",
-    "Texture",
-    "TextureName",
-    "Textures",
-    "UnitParameter",
-    "VertexColours",
-    "colour_at",
-    "number_at",
-    "texture_names",
-]
+from reference_rt.textures.lookup import At as At
+from reference_rt.textures.parameter import NO_TEXTURES as NO_TEXTURES
+from reference_rt.textures.parameter import ColourParameter as ColourParameter
+from reference_rt.textures.parameter import Colours as Colours
+from reference_rt.textures.parameter import Numbers as Numbers
+from reference_rt.textures.parameter import Palette as Palette
+from reference_rt.textures.parameter import ReflectanceParameter as ReflectanceParameter
+from reference_rt.textures.parameter import TextureName as TextureName
+from reference_rt.textures.parameter import UnitParameter as UnitParameter
+from reference_rt.textures.parameter import colour_at as colour_at
+from reference_rt.textures.parameter import number_at as number_at
+from reference_rt.textures.parameter import texture_names as texture_names
+from reference_rt.textures.tables import *
+from reference_rt.textures.texture import Texture as Texture

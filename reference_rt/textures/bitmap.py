@@ -4,14 +4,14 @@ import math
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import BeforeValidator
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.model import Positive
+from reference_rt.core.model import Examples, Positive
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.jit.kernel import kernel
 from reference_rt.textures.image_file import (
@@ -44,6 +44,12 @@ Wraps = Annotated[
 class Bitmap(Texture):
     """An image: (u, v) = (0, 0) is its lower left corner, (1, 1) its upper right one."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {"file": "image.npy"},
+        {"file": "image.npy", "encoding": "raw", "filter": "nearest", "wrap": "mirror"},
+        {"file": "image.npy", "channel": "green", "scale": 0.5},
+        {"file": "image.npy", "cutoff": 0.4, "wrap": ("clamp", "repeat")},
+    )
     type: Literal["bitmap"] = "bitmap"
     file: str
     """The image, relative to the scene file: .exr, .hdr, .pfm, .npy, .png, .jpg, .tif, .webp, .bmp,

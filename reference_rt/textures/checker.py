@@ -2,12 +2,12 @@
 
 import math
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Colour
+from reference_rt.core.model import Colour, Examples
 from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.textures.texture import Texture
@@ -17,6 +17,15 @@ class Checker(Texture):
     """Two colours in squares: `first` where u and v lie in the same half of their unit intervals,
     `second` elsewhere."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {},
+        {
+            "first": (0.8, 0.7, 0.2),
+            "second": 0.3,
+            "uv": {"scale": (6.0, 4.0), "rotate": 20.0, "offset": (0.2, 0.1)},
+        },
+        {"uv": {"matrix": ((4.0, 1.0, 0.0), (0.5, 3.0, 0.1))}},
+    )
     type: Literal["checker"] = "checker"
     first: Colour = (0.4, 0.4, 0.4)
     """Colour where u and v are in the same half of their unit intervals: linear sRGB of at least 0.

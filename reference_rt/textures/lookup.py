@@ -2,30 +2,13 @@
 
 from typing import Any, NamedTuple
 
-from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.arrays import FloatArray
 from reference_rt.core.vec3 import Vec3, row
-from reference_rt.jit.by_code import ByCode
-from reference_rt.jit.kernel import ByClass, kernel
+from reference_rt.jit.kernel import by_class, kernel
 from reference_rt.jit.links import LINK, Link, Linkable, declare, type_of
-from reference_rt.textures import bitmap, checker, vertex_colours
-from reference_rt.textures.bitmap import Bitmaps
-from reference_rt.textures.checker import Checkers
 from reference_rt.textures.product import Products
-from reference_rt.textures.texture import BITMAP, CHECKER, PRODUCT, VERTEX_COLOURS, map_uv
-from reference_rt.textures.vertex_colours import VertexColourTable
-
-
-class Textures(NamedTuple):
-    """kind (n,), row (n,): the table and row of each texture;  uv (n, 6): its map, see `UvMap`;  a
-    table for each type, None for types that the scene lacks."""
-
-    kind: IntArray
-    row: IntArray
-    uv: FloatArray
-    checkers: Checkers | None
-    bitmaps: Bitmaps | None
-    vertex_colours: VertexColourTable | None
-    products: Products | None = None
+from reference_rt.textures.tables import BITMAP, PRODUCT, Textures, by_code
+from reference_rt.textures.texture import map_uv
 
 
 class CachedLookups(NamedTuple):
@@ -39,8 +22,8 @@ class CachedLookups(NamedTuple):
 declare(Textures | None, LINK)
 declare(Textures | CachedLookups | None, type_of(CachedLookups))
 
-_textures = Linkable()
-textures_operations = _textures.operations
+lookups = Linkable()
+"""The operations on textures, or on a link to them."""
 
 
 class At(NamedTuple):
@@ -56,23 +39,14 @@ class At(NamedTuple):
     colour: Vec3
 
 
-_by_code = ByCode(
-    [
-        (CHECKER, "checkers", checker),
-        (BITMAP, "bitmaps", bitmap),
-        (VERTEX_COLOURS, "vertex_colours", vertex_colours),
-    ]
-)
-
-
-@_by_code("lookup")
+@by_code("lookup")
 def _lookup_in_table(
     textures: Textures, kind: int, i: int, u: float, v: float, colour: Vec3
 ) -> Vec3:
     return Vec3(0.0, 0.0, 0.0)
 
 
-@_by_code("gradient")
+@by_code("gradient")
 def _gradient_in_table(
     textures: Textures, kind: int, i: int, u: float, v: float
 ) -> tuple[float, float]:
@@ -97,7 +71,7 @@ def _looked(looked: CachedLookups, k: int, at: At) -> Vec3:
     return Vec3(values[3 * k], values[3 * k + 1], values[3 * k + 2])
 
 
-@_textures.operation
+@lookups.operation
 def evaluate(textures: Textures, k: int, u: float, v: float, colour: Vec3) -> Vec3:
     """The colour of texture k at surface coordinates u, v."""
     return _evaluate(textures.products, textures, k, u, v, colour)
@@ -132,12 +106,9 @@ def _ask(textures: Any, k: int, at: At) -> Vec3:
     return evaluate(textures, k, at.u, at.v, at.colour)
 
 
-_choice = ByClass("lookup")
-_choice.register(type(None), _no_colour)
-_choice.register(CachedLookups, _looked)
-_choice.register(Textures, _ask)
-_choice.register(Link, _ask)
-_lookup = _choice.function
+_lookup = by_class(
+    "lookup", {type(None): _no_colour, CachedLookups: _looked, Textures: _ask, Link: _ask}
+)
 
 
 @kernel
@@ -153,7 +124,7 @@ def _flat(textures: None, k: int, at: At) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-@_textures.operation
+@lookups.operation
 def gradient(textures: Textures, k: int, u: float, v: float) -> tuple[float, float]:
     """The derivatives of texture k's luminance by u and v."""
     kind, i = textures.kind[k], textures.row[k]
@@ -170,8 +141,4 @@ def _gradient(textures: Any, k: int, at: At) -> tuple[float, float]:
     return gradient(textures, k, at.u, at.v)
 
 
-_by_class = ByClass("lookup_gradient")
-_by_class.register(type(None), _flat)
-_by_class.register(Textures, _gradient)
-_by_class.register(Link, _gradient)
-_slopes = _by_class.function
+_slopes = by_class("lookup_gradient", {type(None): _flat, Textures: _gradient, Link: _gradient})

@@ -1,13 +1,13 @@
 """Product texture: the colours of other textures, multiplied."""
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.model import Colour
+from reference_rt.core.model import Colour, Examples
 from reference_rt.textures.texture import MayBeTexture, Texture
 
 
@@ -15,6 +15,10 @@ class Product(Texture):
     """The product of textures and a colour, such as an image times vertex colours; its own `uv` map
     is ignored."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {"of": ("texture",)},
+        {"of": ("texture", "small"), "factor": (0.9, 0.5, 0.7)},
+    )
     type: Literal["product"] = "product"
     of: Annotated[tuple[str, ...], MayBeTexture(), Field(strict=False, min_length=1)]
     """Names of the textures that are multiplied: of any type but `product`."""

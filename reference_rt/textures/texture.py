@@ -1,4 +1,4 @@
-"""What all textures share: the base description, the codes of their tables, and the uv map."""
+"""What all textures share: the base description, and the uv map."""
 
 import math
 from typing import Annotated, Any, Self
@@ -9,9 +9,6 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Description
 from reference_rt.jit.kernel import kernel
-
-# Codes of `Textures.kind`.
-CHECKER, BITMAP, VERTEX_COLOURS, PRODUCT = 0, 1, 2, 3
 
 
 def _pair(value: Any) -> Any:

@@ -1,12 +1,12 @@
 """Vertex colour texture: the colours of a mesh's vertices, interpolated."""
 
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Colour, Positive
+from reference_rt.core.model import Colour, Examples, Positive
 from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.textures.texture import Texture
@@ -15,6 +15,7 @@ from reference_rt.textures.texture import Texture
 class VertexColours(Texture):
     """The colours of a mesh's vertices, interpolated; the `uv` map is ignored."""
 
+    EXAMPLES: ClassVar[Examples] = ({}, {"without": (0.2, 0.4, 0.6), "scale": 0.5})
     type: Literal["vertex_colours"] = "vertex_colours"
     without: Colour = (0.5, 0.5, 0.5)
     """The colour of shapes without vertex colours: linear sRGB of at least 0."""

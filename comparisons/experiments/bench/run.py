@@ -1,5 +1,4 @@
-"""Measures the groups of rows one after another on this machine, or reads them if stored; and the
-rows for people: tables for a terminal and as Markdown, and progress on standard error.
+"""Measures the groups of rows one after another on this machine, or reads them if stored.
 
 To add a row: its name and the function that measures it in `GROUPS`; the function in a file of its
 own.
@@ -9,7 +8,7 @@ import hashlib
 import importlib.metadata
 import os
 import platform
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -18,117 +17,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from llvmlite import binding
-from rich.console import Console, RenderableType
-from rich.console import Group as Tables
-from rich.progress import TimeElapsedColumn
 
 from comparisons.experiments.bench import mesh_rays, program, scenes
-from comparisons.experiments.bench.row import LIMIT, Row, Setting, row_from
-from comparisons.report.terminal import fitted
+from comparisons.experiments.bench.outputs import Display, markdown
+from comparisons.experiments.bench.row import Row, Setting, row_from
 from comparisons.results.files import write_json
 from comparisons.runs import engine
 from comparisons.runs.provenance import code_fingerprint, ours
-from reference_rt.util.console import Bar
 from reference_rt.util.errors import ReferenceUnavailableError, UsageError
 from reference_rt.util.files import check_writable, replacing
-
-_COLUMNS = ("what", "ours", "against", "ratio", "quartiles", "goal", "met")
-
-
-def terminal_table(rows: Sequence[Row], width: int) -> RenderableType:
-    """The tables for a terminal of so many columns."""
-    others = [row for row in rows if not scenes.is_of_scene(row)]
-    styles = [None if row.met else "yellow" for row in others]
-    table = fitted(width, _COLUMNS, [_cells(row) for row in others], styles=styles)
-    lines = scenes.lines(rows)
-    return Tables(fitted(width, scenes.COLUMNS, lines), table) if lines else table
-
-
-def markdown_table(
-    rows: Sequence[Row], machine: Mapping[str, Any], not_measured: Mapping[str, str]
-) -> str:
-    """The table with its date and machine."""
-    others = [_cells(row) for row in rows if not scenes.is_of_scene(row)]
-    lines = [described(machine), "", *_markdown(_COLUMNS, others)]
-    if each := scenes.lines(rows):
-        lines += ["", *_markdown(scenes.COLUMNS, each)]
-    if not_measured:
-        lines += ["", "Not measured: " + "; ".join(f"{k} ({v})" for k, v in not_measured.items())]
-    return "\n".join(lines) + "\n"
-
-
-def _markdown(columns: Sequence[str], lines: Sequence[Sequence[str]]) -> list[str]:
-    rows = [columns, ["---"] * len(columns), *lines]
-    return ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
-
-
-def described(machine: Mapping[str, Any]) -> str:
-    """The machine in a sentence."""
-    parts = [
-        f"{machine['date'][:10]}",
-        f"{machine['machine']}",
-        f"{machine['cores']} cores",
-        f"{machine['vector_bits']}-bit vectors",
-        f"{machine['memory_gib']} GiB",
-        f"{machine['system']}",
-        f"Python {machine['python']}",
-        f"Numba {machine['numba']}",
-        f"Mitsuba {machine['mitsuba']}",
-    ]
-    return "Measured: " + ", ".join(p for p in parts if "None" not in p) + "."
-
-
-def _cells(row: Row) -> list[str]:
-    around = row.spread.get("ratio")
-    sign = "≤" if row.better == "lower" else "≥"
-    return [
-        row.title,
-        amount(row.ours, row.unit),
-        f"{amount(row.peer, row.unit)} ({row.peer_name})",
-        f"{row.ratio:.2f}",
-        "" if around is None or row.peer_name == LIMIT else f"{around[0]:.2f} to {around[1]:.2f}",
-        f"{sign} {row.goal:g}",
-        "yes" if row.met else "no",
-    ]
-
-
-def amount(value: float, unit: str) -> str:
-    """A number with three significant digits, and its unit."""
-    return f"{value:.0f} {unit}" if value >= 1000.0 else f"{value:.3g} {unit}"
-
-
-# ---- progress -----------------------------------------------------------------------------------
-
-
-class Display(Bar):
-    """Shows on standard error what is being measured, and the rows."""
-
-    def __init__(self, console: Console | None = None) -> None:
-        super().__init__(TimeElapsedColumn(), console=console)
-        self._task = self._bar.add_task("", total=1.0)
-        self._group = ""
-        self._shown: set[str] = set()
-
-    def begin(self, group: str) -> None:
-        """A group of rows begins."""
-        self._group, self._shown = group, set()
-        self._bar.reset(self._task, description=group)
-        if not self._console.is_terminal:
-            self.line(f"{group} ...")
-
-    def say(self, what: str, fraction: float) -> None:
-        """Show what is being measured, and the fraction of the group that is done."""
-        self._bar.update(self._task, description=f"{self._group}: {what}", completed=fraction)
-        if not self._console.is_terminal and what not in self._shown:
-            self._shown.add(what)
-            self.line(f"  {what}")
-
-    def done(self, rows: list[Row], note: str = "") -> None:
-        """Print measured rows."""
-        for row in rows:
-            goal = f"goal {row.goal:g}{'' if row.met else ', not met'}"
-            found = f"{row.name}: {amount(row.ours, row.unit)}, ratio {row.ratio:.3g} ({goal})"
-            self.line(found + (f", {note}" if note else ""))
 
 
 class Group(NamedTuple):
@@ -322,5 +219,5 @@ def _write(out: Path, outcome: Outcome, key: str, setting: Setting) -> None:
     }
     write_json(out / "results.json", document)
     with replacing(out / "bench.md") as temporary:
-        text = markdown_table(outcome.rows, outcome.machine, outcome.not_measured)
+        text = markdown(outcome.rows, outcome.machine, outcome.not_measured)
         temporary.write_text(text, encoding="utf-8")

@@ -299,50 +299,13 @@ def of_kind(rows: Sequence[Row], kind: str) -> list[Row]:
 
 
 def scene_of(row: Row) -> str:
-    """The scene of its row."""
+    """The scene of its row; "" of a row that is no scene's."""
     return row.name.rpartition(".")[0]
 
 
 def is_other(row: Row) -> bool:
     """Whether Mitsuba's expectation is further from ours than its pictures are from it."""
     return bool(row.details["difference_default"] > row.details["relmse_default"])
-
-
-def is_of_scene(row: Row) -> bool:
-    """Whether a row is of one scene, and has its place in a line of `lines`."""
-    return bool(scene_of(row))
-
-
-COLUMNS = (
-    "scene",
-    "pixels",
-    "ours",
-    "Mitsuba llvm",
-    "ratio",
-    "quartiles",
-    "relMSE x time / default",
-    "/ best",
-    "sampler",
-)
-
-
-def lines(rows: Sequence[Row]) -> list[list[str]]:
-    """A line of a table for each scene, the worst beside Mitsuba's best sampler first."""
-    ratios = {row.name: row.ratio for row in rows}
-    found = []
-    for row in of_kind(rows, "samples"):
-        scene, facts = scene_of(row), row.details
-        default, best = (ratios[f"{scene}.{peer}"] for peer in ("default", "best"))
-        low, high = row.spread["ratio"]
-        line = [
-            scene,
-            f"{facts['width']}x{facts['height']}",
-            f"{row.ours:.3g} s",
-            f"{row.peer:.3g} s",
-        ]
-        line += [f"{row.ratio:.2f}", f"{low:.2f} to {high:.2f}", f"{default:.2f}", f"{best:.2f}"]
-        found.append((best, [*line, facts["sampler"] + (", another picture" * is_other(row))]))
-    return [line for _, line in sorted(found, key=lambda one: -one[0])]
 
 
 # ---- the Cornell box: variants of Mitsuba, and a second thread ---------------------------------

@@ -1,18 +1,17 @@
 """`results.json` and `results.csv` of `reference-rt converge`, and its lines on a terminal."""
 
-import csv
-import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from comparisons.experiments.convergence.estimates import Line
 from comparisons.experiments.convergence.findings import Curves, Findings, Ratio, Target
 from comparisons.experiments.convergence.store import Settings
-from comparisons.report.values import percent
-from comparisons.results.files import csv_file, plain, write_json
+from comparisons.report.table import Column, Table
+from comparisons.report.values import percent, shown
+from comparisons.results.files import plain, write_json
 
 # ---- for a terminal -----------------------------------------------------------------------------
 
@@ -95,13 +94,67 @@ SCHEMA = 1
 
 KIND = "convergence"
 
-COLUMNS = (
-    "scene", "width", "height", "contestant", "sampler", "asked_spp", "spp", "replicates",
-    "seconds", "seconds_min", "seconds_max", "mse", "mse_low", "mse_high",
-    "relmse", "relmse_low", "relmse_high", "relative_variance", "efficiency",
-)  # fmt: skip
-"""Of results.csv: one row for each method and rung.  A grid of a deterministic scene is a rung
-of ours with one replicate and neither bands nor variance."""
+
+class Rung(NamedTuple):
+    """A method at a number of samples.  A grid of a deterministic scene is a rung of ours with one
+    replicate and neither bands nor variance."""
+
+    scene: str
+    size: tuple[int, int]
+    name: str
+    title: str
+    sampler: str
+    asked: int
+    spp: int
+    replicates: int
+    seconds: Sequence[float | None]
+    mse: Sequence[float | None]
+    relmse: Sequence[float | None]
+    variance: float | None
+    efficiency: float | None
+
+
+def rungs_of(one: Curves) -> Iterator[Rung]:
+    """Of a scene."""
+    for name, found in one.findings.items():
+        method = one.methods[name]
+        for s in found.steps:
+            counts = s.asked, s.spp, s.replicates
+            who = one.scene, one.size, name, method.title, method.sampler
+            yield Rung(*who, *counts, s.seconds, s.mse, s.relmse, s.variance, s.efficiency)
+    for g in one.grids.steps if one.grids is not None else ():
+        seconds, mse, relmse = ((value, None, None) for value in (g.seconds, g.mse, g.relmse))
+        who = one.scene, one.size, "ours", "ours", "grid"
+        yield Rung(*who, g.spp, g.spp, 1, seconds, mse, relmse, None, None)
+
+
+def _timed(seconds: float) -> str:
+    return shown(seconds) if seconds > 0.0 else "disturbed"
+
+
+RUNGS = (
+    Column[Rung](None, lambda rung: rung.scene, key="scene"),
+    Column[Rung](None, lambda rung: rung.size[0], key="width"),
+    Column[Rung](None, lambda rung: rung.size[1], key="height"),
+    Column[Rung]("Method", lambda rung: rung.title),
+    Column[Rung](None, lambda rung: rung.name, key="contestant"),
+    Column[Rung](None, lambda rung: rung.sampler, key="sampler"),
+    Column[Rung](None, lambda rung: rung.asked, key="asked_spp"),
+    Column[Rung]("samples", lambda rung: rung.spp, shown, key="spp"),
+    Column[Rung](None, lambda rung: rung.replicates, key="replicates"),
+    Column[Rung]("seconds", lambda rung: rung.seconds[0], _timed, key="seconds"),
+    Column[Rung]("least", lambda rung: rung.seconds[1], _timed, key="seconds_min"),
+    Column[Rung]("most", lambda rung: rung.seconds[2], _timed, key="seconds_max"),
+    Column[Rung]("MSE", lambda rung: rung.mse[0], shown, key="mse"),
+    Column[Rung](None, lambda rung: rung.mse[1], key="mse_low"),
+    Column[Rung](None, lambda rung: rung.mse[2], key="mse_high"),
+    Column[Rung]("relMSE", lambda rung: rung.relmse[0], shown, key="relmse"),
+    Column[Rung]("from", lambda rung: rung.relmse[1], shown, key="relmse_low"),
+    Column[Rung]("to", lambda rung: rung.relmse[2], shown, key="relmse_high"),
+    Column[Rung]("relative variance", lambda rung: rung.variance, shown, key="relative_variance"),
+    Column[Rung]("efficiency", lambda rung: rung.efficiency, shown, key="efficiency"),
+)
+"""Of results.csv, and on the page those of methods with chance."""
 
 
 def write_results(
@@ -148,12 +201,8 @@ def write_results(
 
 
 def write_table(path: Path, curves: Sequence[Curves]) -> None:
-    """Write `results.csv`, of COLUMNS, at once or not at all; what is undefined is empty."""
-    with csv_file(path) as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for one in curves:
-            writer.writerows([_cell(value) for value in row] for row in _rows(one))
+    """Write `results.csv`, at once or not at all; what is undefined is empty."""
+    Table(RUNGS, [rung for one in curves for rung in rungs_of(one)]).write_csv(path)
 
 
 def _scene(one: Curves) -> dict[str, Any]:
@@ -258,23 +307,3 @@ def _ratios(one: Curves) -> dict[str, Any]:
         ]
         for name, ratios in one.ratios().items()
     }
-
-
-def _rows(one: Curves) -> Iterator[list[Any]]:
-    for name, found in one.findings.items():
-        for step in found.steps:
-            yield [
-                one.scene, *one.size, name, one.methods[name].sampler, step.asked, step.spp,
-                step.replicates, *step.seconds, *step.mse, *step.relmse, step.variance,
-                step.efficiency,
-            ]  # fmt: skip
-    if one.grids is not None:
-        for grid in one.grids.steps:
-            yield [
-                one.scene, *one.size, "ours", "grid", grid.spp, grid.spp, 1, grid.seconds, None,
-                None, grid.mse, None, None, grid.relmse, None, None, None, None,
-            ]  # fmt: skip
-
-
-def _cell(value: Any) -> Any:
-    return "" if isinstance(value, float) and not math.isfinite(value) else plain(value)

@@ -3,15 +3,17 @@
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
 from comparisons.experiments.convergence.estimates import Bias, Line
 from comparisons.experiments.convergence.findings import Crops, Curves, Ratio, Target
+from comparisons.experiments.convergence.outputs import RUNGS, rungs_of
 from comparisons.experiments.convergence.store import Settings
 from comparisons.report.plots import Curve, log_log, source_of
+from comparisons.report.table import Cell, Column, Table, table_of
 from comparisons.report.templates import template, write
 from comparisons.report.thumbnails import png_url
 from comparisons.report.values import percent, shown
@@ -23,14 +25,6 @@ SAMPLES = "samples per pixel"
 
 LOWEST = 1e-3
 """Points below this fraction of a curve's lowest point are not drawn, to leave it room."""
-
-
-class Cell(NamedTuple):
-    """A table cell: its text, text in small type, and a CSS class."""
-
-    text: str
-    small: str = ""
-    look: str = ""
 
 
 def plots_of(curves: Sequence[Curves]) -> dict[str, str]:
@@ -139,20 +133,9 @@ def _view(one: Curves, targets: Sequence[str]) -> dict[str, Any]:
         view["picture"] = _png(one.grids.picture, white_level(one.grids.picture))
         view["plots"] = [Markup(svg) for svg in grid_plots(one)]
     view["tables"] = _tables(one, targets)
-    steps = [
-        (one.methods[name].title, s) for name, found in one.findings.items() for s in found.steps
-    ]
-    columns = ("samples", "seconds", "least", "most", "MSE", "relMSE", "from", "to")
-    rungs: list[list[str]] = [["Method", *columns, "relative variance", "efficiency"]]
-    for title, s in steps:
-        values = map(shown, (s.mse.value, *s.relmse, s.variance, s.efficiency))
-        rungs.append([title, shown(s.spp), *map(_timed, s.seconds), *values])
-    view["rungs"] = rungs if steps else []
+    view["rungs"] = Table(RUNGS, [*rungs_of(one)]) if one.findings else None
     return view
 
-
-Table = tuple[str, list[str], list[list[Any]], str]
-"""Title, head, rows of texts and `Cell`s, and a hint below."""
 
 _EXTRAPOLATED = (
     "Extrapolated: beyond the last rung, the relMSE is modelled as a / n + c / n^1.5 for n samples "
@@ -168,12 +151,9 @@ _SLOPES = (
 )
 
 
-def _timed(seconds: float) -> str:
-    return shown(seconds) if seconds > 0.0 else "disturbed"
-
-
-def _tables(one: Curves, targets: Sequence[str]) -> list[Table]:
-    tables: list[Table] = []
+def _tables(one: Curves, targets: Sequence[str]) -> list[tuple[str, Table[Any], str]]:
+    """Titles, tables, and hints below."""
+    tables: list[tuple[str, Table[Any], str]] = []
     ratios = one.ratios()
     if one.findings:
         head = ["Method", *targets, *(f"ratio at {target}" for target in targets if ratios)]
@@ -189,28 +169,24 @@ def _tables(one: Curves, targets: Sequence[str]) -> list[Table]:
             efficiency = shown(found.steps[-1].efficiency)
             laws.append([title, *map(_slope, slopes), _bias(found.relative_bias), efficiency])
         against = ", and the ratio ours / theirs" if ratios else ""
-        tables.append((f"Time to a relative error{against}", head, times, _EXTRAPOLATED))
+        tables.append((f"Time to a relative error{against}", table_of(head, times), _EXTRAPOLATED))
         of = [f"{of} over {over}" for of in ("relMSE", "MSE") for over in ("samples", "time")]
         columns = [*(f"slope of {what}" for what in of), "bias, relative to ours"]
         head = ["Method", *columns, "1 / (relative variance × s)"]
-        tables.append(("Slopes, bias, efficiency", head, laws, _SLOPES))
+        tables.append(("Slopes, bias, efficiency", table_of(head, laws), _SLOPES))
     if one.grids is not None:
         finest = f"ours, {one.grids.finest} samples"
         some: list[tuple[str, Any, str]] = [("ours", step, finest) for step in one.grids.steps]
         some += [(f"Mitsuba {p.variant}", p, f"ours, {p.spp} samples") for p in one.grids.points]
-        rows: list[list[Any]] = [
-            [
-                who,
-                shown(p.spp),
-                _seconds(p.seconds),
-                shown(p.mse),
-                shown(p.relmse),
-                f"ours, {exact} samples",
-            ]
-            for who, p, exact in some
+        grid: list[Column[tuple[str, Any, str]]] = [
+            Column("Renderer", lambda row: row[0]),
+            Column("samples per pixel", lambda row: row[1].spp, shown),
+            Column("seconds", lambda row: row[1].seconds, _seconds),
+            Column("MSE", lambda row: row[1].mse, shown),
+            Column("relMSE", lambda row: row[1].relmse, shown),
+            Column("against", lambda row: row[2]),
         ]
-        head = ["Renderer", "samples per pixel", "seconds", "MSE", "relMSE", "against"]
-        tables.append(("Grids", head, rows, ""))
+        tables.append(("Grids", Table(grid, some), ""))
     return tables
 
 
@@ -368,8 +344,9 @@ def markdown(curves: Sequence[Curves], provenance: Mapping[str, Any]) -> str:
             lines.append(one.problem or "no method has two rungs of samples")
             continue
         errors = [percent(target.error) for target in next(iter(one.findings.values())).targets]
-        lines += [f"| renderer, sampler | {' | '.join(errors)} |", "|---" * (len(errors) + 1) + "|"]
-        for name, found in one.findings.items():
-            cells = [one.methods[name].title, *(_reached(target).text for target in found.targets)]
-            lines.append(f"| {' | '.join(cells)} |")
+        rows: list[list[Any]] = [
+            [one.methods[name].title, *map(_reached, found.targets)]
+            for name, found in one.findings.items()
+        ]
+        lines += table_of(["renderer, sampler", *errors], rows).markdown()
     return "\n".join(lines) + "\n"

@@ -29,11 +29,11 @@ from comparisons.experiments.fuzz.identities import IDENTITIES, Original
 from comparisons.experiments.fuzz.reduce import renamed, without_unused
 from comparisons.geometry.flatten import copies_of
 from comparisons.materials.translate import is_textured
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.results.case import Case, RungResult
 from comparisons.results.rungs import OF_LIGHT
 from comparisons.rungs.limited import limited
 from comparisons.shapes.stand_ins import coarser
-from comparisons.textures.translate import TranslationContext
 from reference_rt.materials import (
     Blend,
     Bump,

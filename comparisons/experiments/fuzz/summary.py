@@ -13,6 +13,7 @@ from junitparser import Failure, JUnitXml, TestCase, TestSuite
 from comparisons.experiments.fuzz.fields import all_types, possible_pairs
 from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced, text_of
 from comparisons.experiments.fuzz.run import Plan, Run
+from comparisons.report.table import Column, Table, table_of
 from comparisons.report.templates import template, write
 from comparisons.report.values import label
 from comparisons.results.files import write_json
@@ -71,18 +72,14 @@ def coverage(scenes: Iterable[Iterable[str]]) -> Coverage:
     return Coverage(count, dict(types), len(possible) - len(missing), len(possible), missing)
 
 
-def table(found: Coverage) -> str:
-    """Markdown: a row for each type."""
-    lines = [
-        f"{found.scenes:,} scenes have {sum(n > 0 for n in found.types.values())} of "
-        f"{len(found.types)} types and {found.pairs:,} of {found.possible:,} pairs of types "
-        f"({found.share:.1%})",
-        "",
-        "| type | scenes | of its pairs |",
-        "|---|---|---|",
-    ]
-    lines += [f"| {name} | {count:,} | {share:.0%} |" for name, count, share in found.rows()]
-    return "\n".join(lines) + "\n"
+TYPES = (
+    Column[tuple[str, int, float]]("type", lambda row: label(row[0].replace(":", ": "))),
+    Column[tuple[str, int, float]]("scenes", lambda row: row[1]),
+    Column[tuple[str, int, float]](
+        "share of its pairs with other types", lambda row: f"{100 * row[2]:.0f} %"
+    ),
+)
+"""Of `Coverage.rows`."""
 
 
 # ---- progress -----------------------------------------------------------------------------------
@@ -266,14 +263,14 @@ def write_page(path: Path, plan: Plan, run: Run, provenance: Mapping[str, Any]) 
     page = template("fuzz.html.jinja", "experiments/fuzz").render(
         lines=words(run),
         findings=findings,
-        rungs=[
-            (name, ", ".join(f"{count} {status}" for status, count in counts.most_common()))
-            for name, counts in rungs.items()
-        ],
-        types=[
-            (label(name.replace(":", ": ")), f"{count}", f"{100 * share:.0f} %")
-            for name, count, share in coverage(c.types for c in run.scenes.values()).rows()
-        ],
+        rungs=table_of(
+            ("rung", "scenes by status"),
+            [
+                (name, ", ".join(f"{count} {status}" for status, count in counts.most_common()))
+                for name, counts in rungs.items()
+            ],
+        ),
+        types=Table(TYPES, coverage(c.types for c in run.scenes.values()).rows()),
         provenance={**provenance, "seed": plan.seed},
     )
     write(path, page)

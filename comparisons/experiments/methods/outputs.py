@@ -1,7 +1,6 @@
 """The times for people and machines: tables in a terminal, a page, `results.json` and
 `results.csv`, which hold the same columns."""
 
-import csv
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,10 +12,10 @@ from rich.console import RenderableType
 
 from comparisons.experiments.methods.run import SERIES, Effort, Row, methods
 from comparisons.report.plots import Curve, log_log
+from comparisons.report.table import Cell, Column, Table
 from comparisons.report.templates import template
 from comparisons.report.templates import write as write_text
-from comparisons.report.terminal import fitted
-from comparisons.results.files import csv_file, write_json
+from comparisons.results.files import write_json
 from reference_rt.textbook import box, csg, polygon, sphere, triangle
 
 SCHEMA = 2
@@ -32,22 +31,23 @@ MEANING = {
 }
 
 
-def columns(row: Row) -> dict[str, Any]:
-    """One row, flat: what both files hold."""
-    time = row.time
-    return {
-        "family": row.family,
-        "series": row.series,
-        "x": row.x if row.axis else None,
-        "axis": row.axis,
-        "method": row.method,
-        "ns": time.median,
-        "ns_low": time.low,
-        "ns_high": time.high,
-        "runs": time.runs,
-        "timed": time.rays,
-        "build_seconds": row.build,
-    }
+COLUMNS = tuple(
+    Column[Row](None, of, key=key)
+    for key, of in (
+        ("family", lambda row: row.family),
+        ("series", lambda row: row.series),
+        ("x", lambda row: row.x if row.axis else None),
+        ("axis", lambda row: row.axis),
+        ("method", lambda row: row.method),
+        ("ns", lambda row: row.time.median),
+        ("ns_low", lambda row: row.time.low),
+        ("ns_high", lambda row: row.time.high),
+        ("runs", lambda row: row.time.runs),
+        ("timed", lambda row: row.time.rays),
+        ("build_seconds", lambda row: row.build),
+    )
+)
+"""Of both files."""
 
 
 def write(
@@ -58,43 +58,40 @@ def write(
     {"schema": 2, "provenance": {...}, "seed", "effort": {"rays", "runs"},
      "meaning": {column: what it is}, "rows": [{column: value}]}
     """
-    flat = [columns(row) for row in rows]
+    table = Table(COLUMNS, rows)
     document = {
         "schema": SCHEMA,
         "provenance": dict(provenance),
         "seed": seed,
         "effort": effort._asdict(),
         "meaning": MEANING,
-        "rows": flat,
+        "rows": table.records(),
     }
     write_json(folder / "results.json", document)
-    with csv_file(folder / "results.csv") as file:
-        writer = csv.DictWriter(file, list(flat[0]) if flat else [], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(flat)
+    table.write_csv(folder / "results.csv")
 
 
 # ---- tables -------------------------------------------------------------------------------------
 
 
-def table(rows: Sequence[Row], width: int) -> RenderableType:
-    """Of one family, for a terminal of so many columns: a line for each method, a column for each
-    setting, in nanoseconds per ray."""
-    settings = _settings(rows)
-    lines = [[short(name), *cells] for name, cells in _cells(rows, settings).items()]
-    names = [f"{series}\n{x:g} {axis}" if axis else series for series, axis, x in settings]
-    title = f"{rows[0].family}: ns per ray"
-    return fitted(width, ["method", *names], lines, right=names, title=title)
+def terminal(rows: Sequence[Row], width: int) -> RenderableType:
+    """Of one family, for a terminal of so many columns."""
+    name = Column[str]("method", short)
+    return _table(rows, name, between="\n").terminal(width, f"{rows[0].family}: ns per ray")
 
 
-def _settings(rows: Sequence[Row]) -> list[tuple[str, str, float]]:
-    return list(dict.fromkeys((row.series, row.axis, row.x) for row in rows))
+def _table(rows: Sequence[Row], *first: Column[str], between: str) -> Table[str]:
+    """Of one family: a row for each method, and below its columns those of the settings, in
+    nanoseconds per ray;  between: what stands between a setting's series and its x."""
+    times = {(row.method, row.series, row.x): row.time.median for row in rows}
 
+    def setting(series: str, axis: str, x: float) -> Column[str]:
+        name = f"{series}{between}{x:g} {axis}" if axis else series
+        return Column(name, lambda method: times[method, series, x], nanoseconds, right=True)
 
-def _cells(rows: Sequence[Row], settings: Sequence[tuple[str, str, float]]) -> dict[str, list[str]]:
-    found = {(row.method, row.series, row.axis, row.x): row.time.median for row in rows}
-    names = dict.fromkeys(row.method for row in rows)
-    return {name: [nanoseconds(found[name, *setting]) for setting in settings] for name in names}
+    settings = dict.fromkeys((row.series, row.axis, row.x) for row in rows)
+    columns = (*first, *(setting(*each) for each in settings))
+    return Table(columns, list(dict.fromkeys(row.method for row in rows)))
 
 
 def nanoseconds(value: float) -> str:
@@ -163,24 +160,22 @@ def write_page(
 
 
 def _family(name: str, rows: Sequence[Row]) -> dict[str, Any]:
-    known, settings = methods(name), _settings(rows)
-    cells = _cells(rows, settings)
+    known = methods(name)
+
+    def described(method: str) -> Cell:
+        return Cell(short(method), f"{known[method].summary}. {known[method].source}")
+
+    method = Column[str]("method", described)
+    operations = Column[str](
+        "operations", lambda name: stated(name).get("cost", "–"), look="text more"
+    )
+    table = _table(rows, method, operations, between=", ")
+    fails = {short(each): stated(each).get("fails") for each in table.rows}
     return {
         "name": name,
-        "settings": [f"{series}, {x:g} {axis}" if axis else series for series, axis, x in settings],
         "about": [f"{one.name}: {one.about}" for one in SERIES if one.family == name],
-        "methods": [
-            {
-                "name": short(method),
-                "summary": known[method].summary,
-                "source": known[method].source,
-                "cost": "",
-                "fails": "",
-                "cells": times,
-                **stated(method),
-            }
-            for method, times in cells.items()
-        ],
+        "table": table,
+        "fails": {each: how for each, how in fails.items() if how},
         "plots": [Markup(svg) for svg in _plots(rows)],  # our own, not from outside
     }
 

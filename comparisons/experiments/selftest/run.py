@@ -17,6 +17,7 @@ from comparisons.experiments.selftest.sensitivity import (
     sensitivity,
 )
 from comparisons.experiments.selftest.specificity import Alarms, specificity
+from comparisons.report.table import Column, Table
 from comparisons.results.files import write_json
 from comparisons.runs.provenance import provenance
 from comparisons.suites.suite import load_suite, plan
@@ -118,46 +119,65 @@ def _write(out: Path, outcome: Outcome) -> None:
         temporary.write_text(markdown(outcome), encoding="utf-8")
 
 
+FAULTS = (
+    Column[dict[str, Finding]]("fault", lambda of: _any(of).fault),
+    Column[dict[str, Finding]]("planted in", lambda of: _any(of).kind),
+    Column[dict[str, Finding]]("scene", lambda of: _any(of).scene),
+    Column[dict[str, Finding]]("standard: rung, strength", lambda of: _strength(of, "standard")),
+    Column[dict[str, Finding]]("smoke: rung, strength", lambda of: _strength(of, "smoke")),
+)
+"""Of the findings of each suite."""
+
+POWER = (
+    Column[Curve]("fault", lambda curve: curve.fault),
+    Column[Curve]("caught by a run of `smoke`, by size", lambda curve: curve.by_size),
+)
+
+CALIBRATION = (
+    Column[Calibration]("scene", lambda one: one.scene),
+    Column[Calibration]("stated bias", lambda one: f"{one.stated:.2%}"),
+    Column[Calibration]("caught", lambda one: f"{one.caught:.1%}"),
+    Column[Calibration]("half of it caught", lambda one: f"{one.half_caught:.1%}"),
+)
+
+ALARMS = (
+    Column[Alarms]("right renderers", lambda alarms: alarms.kind),
+    Column[Alarms]("case", lambda alarms: alarms.name),
+    Column[Alarms]("pictures", lambda alarms: "rendered" if alarms.rendered else "drawn"),
+    Column[Alarms]("runs", lambda alarms: f"{alarms.runs:,}"),
+    Column[Alarms]("false alarms", lambda alarms: alarms.false_alarms),
+    Column[Alarms]("at most (95 %)", lambda alarms: f"{alarms.upper:.2%}"),
+)
+
+
 def markdown(outcome: Outcome) -> str:
     """The tables of docs/results/selftest.md."""
-    lines = ["| fault | planted in | scene | standard: rung, strength | smoke: rung, strength |"]
-    lines.append("|---|---|---|---|---|")
     by_name: dict[str, dict[str, Finding]] = {}
     for found in outcome.findings:
         by_name.setdefault(found.fault, {})[found.suite] = found
-    for name, of in by_name.items():
-        one = next(iter(of.values()))
-        cells = [_cell(of.get(suite)) for suite in SUITES]
-        if cells[1] == cells[0]:
-            cells[1] = "the same"
-        lines.append(f"| {name} | {one.kind} | {one.scene} | {cells[0]} | {cells[1]} |")
-    if outcome.curves:
-        lines += ["", "| fault | caught by a run of `smoke`, by size |", "|---|---|"]
-        for curve in outcome.curves:
-            sizes = ", ".join(
-                f"{size:g}: {caught:.0%}"
-                for size, caught in zip(curve.sizes, curve.caught, strict=True)
-            )
-            lines.append(f"| {curve.fault} | {sizes} |")
-    if outcome.calibrations:
-        lines += ["", "| scene | stated bias | caught | half of it caught |", "|---|---|---|---|"]
-        for c in outcome.calibrations:
-            lines.append(f"| {c.scene} | {c.stated:.2%} | {c.caught:.1%} | {c.half_caught:.1%} |")
-    if outcome.alarms:
-        lines += [
-            "",
-            "| right renderers | case | pictures | runs | false alarms | at most (95 %) |",
-        ]
-        lines.append("|---|---|---|---|---|---|")
-        for a in outcome.alarms:
-            how = "rendered" if a.rendered else "drawn"
-            counts = f"{a.runs:,} | {a.false_alarms} | {a.upper:.2%}"
-            lines.append(f"| {a.kind} | {a.name} | {how} | {counts} |")
+    others: list[Table[Any]] = [
+        Table(POWER, outcome.curves),
+        Table(CALIBRATION, outcome.calibrations),
+        Table(ALARMS, outcome.alarms),
+    ]
+    lines = Table(FAULTS, list(by_name.values())).markdown()
+    for table in others:
+        lines += ["", *table.markdown()] if table.rows else []
     return "\n".join(lines) + "\n"
 
 
-def _cell(found: Finding | None) -> str:
+def _any(of: dict[str, Finding]) -> Finding:
+    """What all suites say alike."""
+    return next(iter(of.values()))
+
+
+def _strength(of: dict[str, Finding], suite: str) -> str:
+    """What broke, and how clearly; in short where the first suite says the same."""
+    words = _words(of.get(suite))
+    return "the same" if suite != SUITES[0] and words == _words(of.get(SUITES[0])) else words
+
+
+def _words(found: Finding | None) -> str:
     if found is None:
         return ""
-    strength = found.strength.replace("|", "\\|")
-    return f"{found.rung}: {strength}" if found.caught else "**missed**"
+    return f"{found.rung}: {found.strength}" if found.caught else "**missed**"

@@ -148,6 +148,12 @@ class Curve:
     caught: tuple[float, ...]
     runs: int
 
+    @property
+    def by_size(self) -> str:
+        """Such as "0.1: 20%, 0.2: 90%"."""
+        pairs = zip(self.sizes, self.caught, strict=True)
+        return ", ".join(f"{size:g}: {caught:.0%}" for size, caught in pairs)
+
     def as_json(self) -> dict[str, Any]:
         return asdict(self)
 
@@ -165,7 +171,7 @@ def power_curves(budget: Budget, scenes: Path, say: Say) -> list[Curve]:
             for size in sizes
         ]
         curves.append(Curve(name, sizes, tuple(caught), RUNS))
-        say(f"{name}: {', '.join(f'{s:g}: {c:.0%}' for s, c in zip(sizes, caught, strict=True))}")
+        say(f"{name}: {curves[-1].by_size}")
     return curves
 
 

@@ -64,8 +64,8 @@ class PlainScene:
         emitter = si.emitter(self.mi_scene, active)
         if emitter is None:  # scalar variants
             return self.mi.Color3f(0.0)
-        found = emitter.eval(si, active)
-        return found & active if is_wide(self.mi) else found
+        radiance = emitter.eval(si, active)
+        return radiance & active if is_wide(self.mi) else radiance
 
     def emitters(self) -> list[Any]:
         """The lights that Mitsuba samples."""

@@ -149,8 +149,8 @@ class Maths(NamedTuple):
 
     def turns(self, y: Any, x: Any) -> Any:
         """The angle of (x, y), from 0 to 1."""
-        found = self.atan2(y, x) / FULL
-        return self.select(found < 0.0, found + 1.0, found)
+        share = self.atan2(y, x) / FULL
+        return self.select(share < 0.0, share + 1.0, share)
 
 
 NUMPY = Maths(np.sqrt, np.arctan2, np.where)

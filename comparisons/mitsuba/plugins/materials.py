@@ -164,13 +164,13 @@ def _mixtures(mi: Any) -> None:
     import drjit as dr
 
     def share(value: Any) -> base.Parameter:
-        found = base.number(mi, value)
-        return lambda si, active: dr.clip(found(si, active), 0.0, 1.0)
+        at = base.number(mi, value)
+        return lambda si, active: dr.clip(at(si, active), 0.0, 1.0)
 
     def one_of(context: Any, component: int) -> Any:
-        found = mi.BSDFContext(context.mode)
-        found.type_mask, found.component = context.type_mask, component
-        return found
+        chosen = mi.BSDFContext(context.mode)
+        chosen.type_mask, chosen.component = context.type_mask, component
+        return chosen
 
     class MixtureBlend(base_class(mi)):  # type: ignore[misc]
         """(1 - weight) first + weight second, the two nested materials."""
@@ -223,8 +223,8 @@ def _mixtures(mi: Any) -> None:
                 all_pdf > 0.0, all_value / dr.maximum(all_pdf, 1e-30), mi.Color3f(0.0)
             )
             drawn.pdf = dr.select(perfect, drawn.pdf * dr.select(take, weight, rest), all_pdf)
-            found = dr.any(value != 0.0)
-            return drawn, dr.select(perfect, value, dr.select(found, smooth, mi.Color3f(0.0)))
+            scatters = dr.any(value != 0.0)
+            return drawn, dr.select(perfect, value, dr.select(scatters, smooth, mi.Color3f(0.0)))
 
         def eval(self, context: Any, si: Any, wo: Any, active: Any = True) -> Any:
             shares = self.shares(si, active)
@@ -311,16 +311,16 @@ def _mixtures(mi: Any) -> None:
             self.follow_v = bool(properties["follow_v"])
 
         def eval(self, si: Any, active: Any = True) -> Any:
-            found = self.factor
+            value = self.factor
             for part in self.of:
-                found = found * part.eval(si, active)
+                value = value * part.eval(si, active)
             if self.follow_v:
                 mirrored = dr.dot(dr.cross(si.dp_du, si.dp_dv), si.sh_frame.n) < 0.0
-                green = dr.select(mirrored, 1.0 - found.y, found.y)
-                return mi.Color3f(found.x, green, found.z)
+                green = dr.select(mirrored, 1.0 - value.y, value.y)
+                return mi.Color3f(value.x, green, value.z)
             if self.cutoff > 0.0:
-                return dr.select(found >= self.cutoff, mi.Color3f(1.0), mi.Color3f(0.0))
-            return found
+                return dr.select(value >= self.cutoff, mi.Color3f(1.0), mi.Color3f(0.0))
+            return value
 
         def eval_3(self, si: Any, active: Any = True) -> Any:
             return self.eval(si, active)

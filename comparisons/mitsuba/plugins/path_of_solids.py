@@ -71,10 +71,10 @@ def register(mi: Any) -> None:
                 si, of_solid = lit.trace(ray, active)
                 # Density 0: the ray is the camera's or of a delta lobe, and has no competitor.
                 light_pdf = mi.Float(0.0)
-                found = mi.DirectionSample3f(scene, si, before)
+                sampled = mi.DirectionSample3f(scene, si, before)
                 if depth > 0 and self.samples_lights:
                     competes = active & (bsdf_pdf > 0.0) & (of_solid ^ True)
-                    light_pdf = scene.pdf_emitter_direction(before, found, competes)
+                    light_pdf = scene.pdf_emitter_direction(before, sampled, competes)
                     light_pdf = dr.select(competes, light_pdf, 0.0)
                 share = dr.select(bsdf_pdf > 0.0, weight(bsdf_pdf, light_pdf), 1.0)
                 if depth > 0 or not self.hides:

@@ -108,12 +108,12 @@ def light_points(
 ) -> list[LightPoint]:
     """The points of all area lights of a scene, except shapes whose id is in `unlit`;  boxes: the
     ids of boxes and rectangles, which may be meshes: see `translate.shapes.primitives`."""
-    found: list[LightPoint] = []
+    points: list[LightPoint] = []
     for emitter in scene.emitters():
         shape = emitter.get_shape()
         if shape is not None and shape.id() not in unlit:
-            found += _points_of(mi, shape, shape.id() in boxes)
-    return found
+            points += _points_of(mi, shape, shape.id() in boxes)
+    return points
 
 
 _FLAT = {"Rectangle": 4.0, "Disk": math.pi}
@@ -219,12 +219,12 @@ def clearance(mi: Any, si: Any, reach: float, cylinders: list[Any]) -> Any:
     return dr.select(rough, own, dr.minimum(own, _ROUNDINGS * reach))
 
 
-def is_shape(mi: Any, found: Any, shape: Any) -> Any:
+def is_shape(mi: Any, si: Any, shape: Any) -> Any:
     """Whether the surface interaction `found` is on this very shape: another emitter may lie within
     the tolerance in front of a light."""
     if base.is_wide(mi):
-        return found.shape == mi.ShapePtr(shape)
-    return found.shape is shape
+        return si.shape == mi.ShapePtr(shape)
+    return si.shape is shape
 
 
 def leave(mi: Any, si: Any, d: Any, height: Any) -> Any:
@@ -345,10 +345,10 @@ def register(mi: Any) -> None:
             """The ambient light that Phong materials reflect: see `materials`."""
             context, up = mi.BSDFContext(), mi.Vector3f(0.0, 0.0, 1.0)
             context.type_mask = materials.AMBIENT
-            found = si.bsdf().eval(context, si, up, active)
+            reflected = si.bsdf().eval(context, si, up, active)
             context.type_mask = materials.BLANK
             rest = si.bsdf().eval(context, si, up, active)
-            return dr.select(active, (found - rest) * mi.Color3f(self.ambient), 0.0)
+            return dr.select(active, (reflected - rest) * mi.Color3f(self.ambient), 0.0)
 
         def branch(
             self, si: Any, weight: Any, active: Any, component: int, depth: int
@@ -398,15 +398,15 @@ def register(mi: Any) -> None:
                 value = bsdf.eval(context, si, si.to_local(ray.d), active)
                 if self.scalar and dr.all(value * solid_angle == 0.0):
                     continue  # a mesh may have hundreds of lights, of which half face away
-                found = scene.ray_intersect(ray, active)
+                met = scene.ray_intersect(ray, active)
                 # The ray sees the light if it hits it at the right distance.  The ray starts off
                 # its line, so the tolerance is taken along the light's normal.  Another triangle of
                 # a mesh may hide this one within Mitsuba's shadow epsilon.
                 slack = 0.0 if light.of_mesh else mi.math.ShadowEpsilon
-                missing = dr.dot(target - ray.o, ray.d) * (1.0 - slack) - found.t
-                near = missing * dr.abs(dr.dot(ray.d, found.n)) <= 2.0 * height
-                visible = active & found.is_valid() & near & is_shape(mi, found, light.shape)
-                radiance = scene.emitted(found, visible)
+                missing = dr.dot(target - ray.o, ray.d) * (1.0 - slack) - met.t
+                near = missing * dr.abs(dr.dot(ray.d, met.n)) <= 2.0 * height
+                visible = active & met.is_valid() & near & is_shape(mi, met, light.shape)
+                radiance = scene.emitted(met, visible)
                 total += dr.select(visible, value * radiance * solid_angle, 0.0)
                 dr.eval(total)
             return total

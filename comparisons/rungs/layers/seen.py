@@ -9,6 +9,7 @@ import numpy as np
 from comparisons.cameras.translate import translate_filter
 from comparisons.geometry.sizes import LeafSizes, ShapeSizes
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.hits import MitsubaHits, rows_of
 from comparisons.mitsuba.scene import for_rays
@@ -17,7 +18,8 @@ from comparisons.rungs.rays.camera import camera_rays, ends
 from comparisons.rungs.rays.comparer import KINDS, Comparer
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.rays.resolution import slide
-from comparisons.textures.translate import TranslationContext, translate_texture
+from comparisons.textures.texture import Use
+from comparisons.textures.translate import translate_texture
 from reference_rt.cameras.film import Filter
 from reference_rt.core.arrays import FloatArray, IdArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
@@ -156,7 +158,7 @@ class Seen:
 
         mi = mitsuba()
         if name not in self._textures:
-            described = translate_texture(self._scene.textures[name], name, self._context, False)
+            described = translate_texture(self._scene.textures[name], name, self._context, Use())
             self._textures[name] = mi.load_dict(described)
         texture = self._textures[name]
 

@@ -8,12 +8,13 @@ import numpy as np
 
 from comparisons.geometry.frame import UNIT_ROUNDOFF
 from comparisons.geometry.sizes import ShapeSizes
+from comparisons.materials.coat import PASSED
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.hits import MitsubaHits, rows_of
 from comparisons.rungs.rays.coincidence import is_steep, moved, slopes, turned
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.rays.resolution import slide
-from comparisons.translator.accuracy import PASSED, accuracy, coat_error, is_tilted
+from comparisons.translator.accuracy import accuracy, coat_error, is_tilted
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.lights import (

@@ -79,7 +79,7 @@ def _texture_coordinates(
 
 
 @kernel
-def pdf(areas: Areas, i: int, shapes: Shapes, p: Vec3, q: SurfacePoint) -> float:
+def density(areas: Areas, i: int, shapes: Shapes, p: Vec3, q: SurfacePoint) -> float:
     """The density per solid angle with which `sample` picks, from `p`, the point `q` on light i."""
     return any_shape.pdf(shapes, areas.kind[i], areas.row[i], areas.area[i], p, q)
 

@@ -3,12 +3,12 @@ I_a of Whitted's integrator, from none.
 """
 
 import math
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Colour, Description
+from reference_rt.core.model import Colour, Description, Examples
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.jit.kernel import kernel
 from reference_rt.lights.light import LightSample
@@ -19,6 +19,7 @@ class Ambient(Description):
     """The textbook's ambient light: a `phong` material adds k_a I_a under `whitted`.  No other
     material or integrator uses it."""
 
+    EXAMPLES: ClassVar[Examples] = ({"radiance": (0.1, 0.2, 0.3)},)
     type: Literal["ambient"] = "ambient"
     radiance: Colour
     """The ambient radiance I_a: W sr^-1 m^-2, linear sRGB."""
@@ -31,6 +32,7 @@ PDF = 0.25 / math.pi
 class Constant(Description):
     """The same radiance from every direction, infinitely far away."""
 
+    EXAMPLES: ClassVar[Examples] = ({"radiance": (0.2, 0.3, 0.4)},)
     type: Literal["constant"] = "constant"
     radiance: Colour
     """Radiance from every direction: W sr^-1 m^-2, linear sRGB."""

@@ -1,12 +1,12 @@
 """Directional light: parallel light from infinitely far away, as the sun's."""
 
 import math
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Colour, Description, Direction
+from reference_rt.core.model import Colour, Description, Direction, Examples
 from reference_rt.core.vec3 import Vec3, luminance, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.lights.light import LightSample
@@ -16,6 +16,9 @@ from reference_rt.textures import NO_TEXTURES, Palette
 class Directional(Description):
     """Parallel light from infinitely far away, such as the sun's without its size."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {"direction": (1.0, -2.0, -1.0), "irradiance": (0.3, 0.4, 0.5)},
+    )
     type: Literal["directional"] = "directional"
     direction: Direction
     """The direction in which light travels, away from its source: world coordinates, of any length

@@ -2,12 +2,12 @@
 
 import math
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IdArray
-from reference_rt.core.model import Description, Positive
+from reference_rt.core.model import Description, Examples, Positive
 from reference_rt.core.ray import BLOCK, put_vector, vector_of
 from reference_rt.core.transform import Transform, affine
 from reference_rt.core.vec3 import Vec3, dot, luminance, triple
@@ -35,6 +35,14 @@ class EnvironmentMap(Description):
     Its top row is +y, its middle +z; right of the middle is -x.
     """
 
+    EXAMPLES: ClassVar[Examples] = (
+        {"file": "image.npy"},
+        {
+            "file": "image.npy",
+            "scale": 0.5,
+            "transform": ({"rotate": {"axis": (1.0, 2.0, 3.0), "degrees": 40.0}},),
+        },
+    )
     type: Literal["environment_map"] = "environment_map"
     file: str
     """The image, relative to the scene file: .exr, .hdr, .pfm, .npy (linear radiance), or .png,

@@ -3,16 +3,17 @@ that lights at a point project: a colour for each direction in front of the ligh
 """
 
 import math
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Description, Direction, Positive, Vector
+from reference_rt.core.model import Description, Direction, Examples, Positive, Vector
 from reference_rt.core.vec3 import Vec3, dot, length, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.lights.light import LightSample, from_position
+from reference_rt.lights.selection.bounds import LightBounds, of_points
 from reference_rt.textures import (
     NO_TEXTURES,
     At,
@@ -87,10 +88,17 @@ def colour_in(
     return colour_at(images.colour, i, at)
 
 
+_PLACE = {"origin": (0.0, 4.0, 0.5), "target": (0.0, 0.0, 0.0)}
+
+
 class Projector(Description):
     """A point at `origin` that projects an image towards `target`, as a slide projector: the
     reverse of a perspective camera.  A white image lights a plane across the axis evenly."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {**_PLACE, "irradiance": (3.0, 2.0, 1.0)},
+        {**_PLACE, "irradiance": "texture", "scale": 5.0, "fov": 70.0, "aspect": 2.0},
+    )
     type: Literal["projector"] = "projector"
     origin: Vector
     """Where it is: [x, y, z] in world coordinates, in scene units."""
@@ -177,3 +185,8 @@ def intensity(projectors: Projectors) -> FloatArray:
 def reach(projectors: Projectors) -> FloatArray:
     """(n,): the angle from the axis to the image's corners, in radians."""
     return np.asarray(np.arctan(np.hypot(projectors.image.wide, projectors.image.tall)))
+
+
+def bounds(projectors: Projectors) -> LightBounds:
+    found = projectors
+    return of_points(found.position, found.axis, reach(found), intensity(found))

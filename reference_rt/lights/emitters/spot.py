@@ -1,13 +1,13 @@
 """Spot light: a point that emits into a cone, with a falloff towards its rim."""
 
 import math
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Colour, Description, Direction, Vector
+from reference_rt.core.model import Colour, Description, Direction, Examples, Vector
 from reference_rt.core.vec3 import Vec3, cross, dot, length, luminance, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.lights.emitters.projector import (
@@ -18,13 +18,21 @@ from reference_rt.lights.emitters.projector import (
     placed,
 )
 from reference_rt.lights.light import LightSample, from_position
+from reference_rt.lights.selection.bounds import LightBounds, of_points
 from reference_rt.textures import NO_TEXTURES, Palette, TextureName, Textures
+
+_PLACE = {"origin": (0.0, 4.0, 0.5), "target": (0.0, 0.0, 0.0)}
 
 
 class Spot(Description):
     """A point that emits into a cone: full intensity within `beam_width`, none beyond
     `cutoff_angle`, linear in the angle between the two."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {**_PLACE, "intensity": 9.0},
+        {**_PLACE, "intensity": (3.0, 2.0, 1.0), "cutoff_angle": 50.0, "beam_width": 10.0},
+        {**_PLACE, "intensity": 9.0, "texture": "texture", "up": (0.0, 0.3, 1.0)},
+    )
     type: Literal["spot"] = "spot"
     origin: Vector
     """Where it is: [x, y, z] in world coordinates, in scene units."""
@@ -144,3 +152,8 @@ def power(spots: Spots, scene_radius: float) -> FloatArray:
     integral += np.cos(middle) * (1.0 - np.sinc(half_width / math.pi))
     intensity = luminance(Vec3(*spots.intensity.T)) * spots.brightest
     return np.asarray(2.0 * math.pi * integral * intensity)
+
+
+def bounds(spots: Spots) -> LightBounds:
+    intensity = np.asarray(luminance(Vec3(*spots.intensity.T)) * spots.brightest)
+    return of_points(spots.position, spots.axis, spots.cutoff, intensity)

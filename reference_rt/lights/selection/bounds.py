@@ -11,14 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.vec3 import Vec3, cross, dot, length, luminance, normalize
+from reference_rt.core.vec3 import Vec3, cross, dot, length, normalize
 from reference_rt.jit.kernel import kernel
-from reference_rt.lights.emitters import projector
-from reference_rt.lights.emitters.point import Points
-from reference_rt.lights.emitters.projector import Projectors
-from reference_rt.lights.emitters.spot import Spots
-from reference_rt.shapes import DISK, RECTANGLE, TABLES, TRIANGLE, Shapes
-from reference_rt.shapes.meshes.triangle_table import geometric_normals
+from reference_rt.shapes import TABLES, Shapes
 
 
 class LightBounds(NamedTuple):
@@ -48,41 +43,20 @@ def of_areas(shapes: Shapes, kind: IntArray, row: IntArray, intensity: FloatArra
         table = getattr(shapes, field)
         low, high = module.bounds(table)
         lower[mine], upper[mine] = low[row[mine]], high[row[mine]]
-        if code in (RECTANGLE, DISK):
-            axis[mine], spread[mine] = table.normal[row[mine]], 0.0
-        elif code == TRIANGLE:
-            normals = geometric_normals(table.vertices[row[mine]])
-            axis[mine] = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-            spread[mine] = 0.0
+        if hasattr(module, "unit_normals"):
+            axis[mine], spread[mine] = module.unit_normals(table)[row[mine]], 0.0
     return LightBounds(
         lower, upper, axis, spread, np.full(n, 0.5 * math.pi), intensity, np.zeros(n)
     )
 
 
-def of_points(points: Points) -> LightBounds:
-    n = len(points.position)
-    axis = np.tile([0.0, 0.0, 1.0], (n, 1))
-    intensity = np.asarray(luminance(Vec3(*points.intensity.T)))
-    all_sides, none = np.full(n, math.pi), np.zeros(n)
-    return LightBounds(
-        points.position, points.position, axis, all_sides, np.zeros(n), none, intensity
-    )
-
-
-def of_spots(spots: Spots) -> LightBounds:
-    none = np.zeros(len(spots.position))
-    intensity = np.asarray(luminance(Vec3(*spots.intensity.T)) * spots.brightest)
-    return LightBounds(
-        spots.position, spots.position, spots.axis, none, spots.cutoff, none, intensity
-    )
-
-
-def of_projectors(found: Projectors) -> LightBounds:
-    none = np.zeros(len(found.position))
-    return LightBounds(
-        *(found.position, found.position, found.axis),
-        *(none, projector.reach(found), none, projector.intensity(found)),
-    )
+def of_points(
+    position: FloatArray, axis: FloatArray, reach: FloatArray, intensity: FloatArray
+) -> LightBounds:
+    """Lights at points: position (n, 3), unit axis (n, 3), the angle from it up to which they shine
+    (n,), and the largest luminance of their radiant intensity (n,)."""
+    none = np.zeros(len(position))
+    return LightBounds(position, position, axis, none, reach, none, intensity)
 
 
 class Bound(NamedTuple):

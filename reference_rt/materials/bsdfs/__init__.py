@@ -1,4 +1,4 @@
-"""BSDFs, one file each, and `tables.py`, which chooses among them by an integer code.
+"""BSDFs, one file each; their register, `tables.py`; `dispatch.py`, which chooses among them.
 
 A file has a description (a `Material`), its table (a NamedTuple of arrays, a row for each material
 of this type), and kernels that take the table, a row i, texture coordinates `at`, and directions as
@@ -15,7 +15,7 @@ Kernels are IEEE arithmetic in the order written and return the same bits as pla
 that they return is NaN or infinite for unit directions.  A material that does not say that it
 `transmits` is black behind.
 
-To add one: its file; in `tables.py` a code, a field of `Leaves` and a line in `TABLES`.  What
-several files share is in the simplest of them, such as `Metal` in `conductor.py`; the lobes of both
-principled materials are in `principled_lobes.py`.
+To add one: its file, and its lines in `tables.py`.  What several files share is in the simplest of
+them, such as `Metal` in `conductor.py`; the lobes of both principled materials are in
+`principled_lobes.py`.
 """

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import AfterValidator
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Colour
+from reference_rt.core.model import Colour, Examples
 from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.material import NO_BRANCHES, Branches, Material, reflection
@@ -30,6 +30,11 @@ Index = Annotated[Colour, AfterValidator(_above_zero)]
 class Metal(Material):
     """The boundary of a metal; its back is black."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {"eta": 0.2, "k": 3.0},
+        {"eta": (0.14, 0.37, 1.44), "k": (3.98, 2.39, 1.6), "reflectance": (0.9, 0.8, 0.7)},
+        {"eta": 1.5, "k": 0.0, "reflectance": "texture"},
+    )
     type: str  # first, so that `to_json` writes it first
     eta: Index
     """Real part of the index of refraction for red, green and blue, relative to the medium outside;

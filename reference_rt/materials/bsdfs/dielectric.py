@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Positive
+from reference_rt.core.model import Examples, Positive
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.material import Branches, Material
@@ -18,6 +18,16 @@ from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, co
 class Transparent(Material):
     """A boundary of two transparent media."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {},
+        {
+            "interior_ior": 1.0,
+            "exterior_ior": 1.3,
+            "reflectance": (0.9, 0.8, 0.7),
+            "transmittance": (0.5, 0.6, 0.7),
+        },
+        {"reflectance": "texture", "transmittance": "texture"},
+    )
     type: str  # first, so that `to_json` writes it first
     interior_ior: Positive = 1.5
     """Index of refraction of the interior, behind the normal."""

@@ -2,6 +2,7 @@
 
 from typing import ClassVar, Literal, NamedTuple
 
+from reference_rt.core.model import Examples
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.material import INV_PI, NO_SAMPLE, BsdfSample, Material, Scattered
@@ -12,6 +13,11 @@ from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, co
 class Diffuse(Material):
     """An ideally matte surface: radiance is the same in all directions; black from behind."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {},
+        {"reflectance": (0.7, 0.4, 0.1)},
+        {"reflectance": "texture"},
+    )
     smooth: ClassVar[bool] = True
     uses_u_lobe: ClassVar[bool] = False
     type: Literal["diffuse"] = "diffuse"

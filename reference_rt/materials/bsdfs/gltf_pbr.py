@@ -24,6 +24,7 @@ import numpy as np
 from pydantic import Field
 
 from reference_rt.core.arrays import FloatArray
+from reference_rt.core.model import Examples
 from reference_rt.core.vec3 import Vec3, max_component, reflect
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.bsdfs.principled_lobes import schlick_weight
@@ -57,6 +58,14 @@ but all at grazing angles."""
 class GltfPbr(Material):
     """glTF's metallic-roughness material; black from behind, unless it is in a `two_sided`."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {},
+        {"base_color": (0.7, 0.4, 0.1), "metallic": 0.3, "roughness": 0.4, "ior": 1.8},
+        {"metallic": 0.0, "specular": 0.6, "specular_color": (0.9, 0.6, 0.3)},
+        dict.fromkeys(
+            ("base_color", "metallic", "roughness", "specular", "specular_color"), "texture"
+        ),
+    )
     smooth: ClassVar[bool] = True
     type: Literal["gltf_pbr"] = "gltf_pbr"
     base_color: ReflectanceParameter = (1.0, 1.0, 1.0)

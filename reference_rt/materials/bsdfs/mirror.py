@@ -2,6 +2,7 @@
 
 from typing import ClassVar, Literal, NamedTuple
 
+from reference_rt.core.model import Examples
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.material import NO_BRANCHES, Branches, Material, reflection
@@ -11,6 +12,11 @@ from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, co
 class Mirror(Material):
     """A perfect mirror with a colour; black from behind."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {},
+        {"reflectance": (0.9, 0.7, 0.5)},
+        {"reflectance": "texture"},
+    )
     delta: ClassVar[bool] = True
     type: Literal["mirror"] = "mirror"
     reflectance: ReflectanceParameter = (1.0, 1.0, 1.0)

@@ -15,7 +15,7 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.model import Positive
+from reference_rt.core.model import Examples, Positive
 from reference_rt.core.vec3 import (
     Vec3,
     dot,
@@ -44,6 +44,12 @@ class Phong(Material):
     """The textbook's local shading, without 1/π: ambient, diffuse and specular terms, and a mirror;
     black from behind."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {"diffuse": 0.1},
+        {"diffuse": (0.1, 0.2, 0.3), "specular": 0.4, "exponent": 9.0, "ambient": 0.2},
+        {"diffuse": 0.1, "specular": 0.4, "half_vector": True, "mirror": (0.1, 0.2, 0.1)},
+        {"diffuse": "small", "specular": "small", "mirror": "small", "ambient": "texture"},
+    )
     smooth: ClassVar[bool] = True
     delta: ClassVar[bool] = True
     type: Literal["phong"] = "phong"

@@ -18,7 +18,7 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.core.model import Positive
+from reference_rt.core.model import Examples, Positive
 from reference_rt.core.vec3 import Vec3, max_component
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.material import (
@@ -39,6 +39,12 @@ from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, co
 class Coated(Material):
     """A diffuse base under a clear coat; its back is black."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {},
+        {"reflectance": (0.7, 0.4, 0.1), "specular": (0.5, 0.6, 0.7), "nonlinear": True},
+        {"interior_ior": 1.9, "exterior_ior": 1.2},
+        {"reflectance": "texture", "specular": "texture"},
+    )
     smooth: ClassVar[bool] = True
     type: str  # first, so that `to_json` writes it first
     reflectance: ReflectanceParameter = (0.5, 0.5, 0.5)

@@ -19,7 +19,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Positive
+from reference_rt.core.model import Examples, Positive
 from reference_rt.core.vec3 import Vec3, dot, max_component, reflect
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.bsdfs.principled_lobes import (
@@ -68,6 +68,20 @@ all."""
 class Principled(Material):
     """Burley's principled material, from plaster to metal and glass, in Mitsuba's form."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {},
+        {"roughness": 0.3, "metallic": 0.7, "anisotropic": 0.6, "spec_tint": 0.4},
+        {"base_colour": (0.7, 0.4, 0.1), "sheen": 0.8, "sheen_tint": 0.5, "flatness": 0.4},
+        {"clearcoat": 0.9, "clearcoat_gloss": 0.6, "specular": 0.3},
+        {"spec_trans": 0.8, "eta": 1.4, "roughness": 0.4},
+        dict.fromkeys(
+            (
+                *("base_colour", "roughness", "metallic", "spec_tint", "anisotropic", "sheen"),
+                *("sheen_tint", "clearcoat", "clearcoat_gloss", "spec_trans", "flatness"),
+            ),
+            "texture",
+        ),
+    )
     smooth: ClassVar[bool] = True
     type: Literal["principled"] = "principled"
     base_colour: ReflectanceParameter = (0.5, 0.5, 0.5)

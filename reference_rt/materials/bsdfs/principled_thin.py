@@ -11,7 +11,7 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Positive
+from reference_rt.core.model import Examples, Positive
 from reference_rt.core.vec3 import Vec3, dot, max_component, reflect
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.bsdfs.principled_lobes import (
@@ -54,6 +54,19 @@ _LEAST = 0.05
 class PrincipledThin(Material):
     """The principled material of thin sheets, such as leaves and panes; the same on both sides."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {},
+        {"roughness": 0.3, "spec_trans": 0.6, "eta": 1.7, "anisotropic": 0.6, "spec_tint": 0.4},
+        {"base_colour": (0.7, 0.4, 0.1), "sheen": 0.8, "sheen_tint": 0.5, "flatness": 0.4},
+        {"diff_trans": 1.2},
+        dict.fromkeys(
+            (
+                *("base_colour", "roughness", "anisotropic", "spec_trans", "spec_tint", "sheen"),
+                *("sheen_tint", "flatness", "diff_trans"),
+            ),
+            "texture",
+        ),
+    )
     smooth: ClassVar[bool] = True
     type: Literal["principled_thin"] = "principled_thin"
     base_colour: ReflectanceParameter = (0.5, 0.5, 0.5)

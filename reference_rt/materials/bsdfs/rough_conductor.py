@@ -8,6 +8,7 @@ log 2 = 69 % at 1.
 from typing import ClassVar, Literal, NamedTuple
 
 from reference_rt.core.arrays import FloatArray
+from reference_rt.core.model import Examples
 from reference_rt.core.vec3 import Vec3, dot, reflect, row
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.bsdfs.conductor import Metal
@@ -46,6 +47,12 @@ class Rough(Material):
 class RoughConductor(Rough, Metal):
     """A rough metal, by microfacets; black from behind."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        *Metal.EXAMPLES,
+        {"eta": 0.2, "k": 3.0, "alpha": (0.1, 0.4)},
+        {"eta": 0.2, "k": 3.0, "distribution": "beckmann", "alpha": 0.3},
+        {"eta": 0.2, "k": 3.0, "alpha": "texture"},
+    )
     uses_u_lobe: ClassVar[bool] = False
     type: Literal["rough_conductor"] = "rough_conductor"
 

@@ -12,11 +12,12 @@ inside 1 %, 10 % and 58 %.
 """
 
 import math
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 from pydantic import model_validator
 
 from reference_rt.core.arrays import FloatArray
+from reference_rt.core.model import Examples
 from reference_rt.core.vec3 import Vec3, dot, max_component, reflect
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.bsdfs.dielectric import Transparent
@@ -43,6 +44,12 @@ from reference_rt.textures import At, Colours, Palette, colour_at
 class RoughDielectric(Rough, Transparent):
     """A rough boundary of transparent media, by microfacets; the normal points to the exterior."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        *Transparent.EXAMPLES,
+        {"alpha": (0.1, 0.4)},
+        {"distribution": "beckmann", "alpha": 0.3},
+        {"alpha": (0.2, "texture")},
+    )
     type: Literal["rough_dielectric"] = "rough_dielectric"
 
     @model_validator(mode="after")

@@ -19,12 +19,13 @@ darker (measured at eta = 1.5, alpha = 0.05 and 0.3).
 
 import math
 from functools import lru_cache
-from typing import Any, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.model import Examples
 from reference_rt.core.vec3 import Vec3, dot, max_component, reflect
 from reference_rt.jit.kernel import entry_kernel, kernel
 from reference_rt.materials.bsdfs.plastic import Coated, base_albedo
@@ -58,6 +59,7 @@ _LEAST_MIRRORED = 1e-3
 class RoughPlastic(Coated):
     """A diffuse base under a rough clear coat, by microfacets; black from behind."""
 
+    EXAMPLES: ClassVar[Examples] = (*Coated.EXAMPLES, {"distribution": "beckmann", "alpha": 0.3})
     type: Literal["rough_plastic"] = "rough_plastic"
     distribution: Distribution = "ggx"
     """The distribution of the coat's microfacet normals: GGX (Trowbridge-Reitz) or Beckmann."""

@@ -13,7 +13,7 @@ from reference_rt.core.arrays import IntArray
 from reference_rt.core.vec3 import Frame, Vec3, to_local, to_world
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.links import Linkable, is_absent
-from reference_rt.materials.bsdfs import tables as bsdf
+from reference_rt.materials.bsdfs import dispatch as bsdf
 from reference_rt.materials.bsdfs.tables import Leaves
 from reference_rt.materials.material import (
     NO_SAMPLE,

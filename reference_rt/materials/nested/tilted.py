@@ -11,11 +11,12 @@ receives ends at a hard line.  Both have options, off by default; Mitsuba has bo
 """
 
 import math
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.model import Examples
 from reference_rt.core.vec3 import Frame, Vec3, cross, dot, max_abs, normalize, to_world
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.material import frame_along
@@ -66,6 +67,16 @@ class Bump(Wrapper):
     The texture is a bitmap with the filter `bilinear`: others have no slope.
     """
 
+    EXAMPLES: ClassVar[Examples] = (
+        {"base": "base", "height": "texture", "scale": 0.1},
+        {
+            "base": "other",
+            "height": "texture",
+            "scale": 0.3,
+            "flip_invalid_normals": True,
+            "use_shadowing_function": True,
+        },
+    )
     type: Literal["bump"] = "bump"
     base: str
     """Name of the material whose normals are tilted."""
@@ -145,6 +156,16 @@ class NormalMap(Wrapper):
     Red is along dp/du, blue along the surface's own shading normal.
     """
 
+    EXAMPLES: ClassVar[Examples] = (
+        {"base": "base", "normals": "texture", "scale": 0.5},
+        {
+            "base": "base",
+            "normals": "texture",
+            "follow_v": True,
+            "flip_invalid_normals": True,
+            "use_shadowing_function": True,
+        },
+    )
     type: Literal["normal_map"] = "normal_map"
     base: str
     """Name of the material whose normals are replaced."""

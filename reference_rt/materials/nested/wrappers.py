@@ -2,6 +2,7 @@
 
 from typing import Any, ClassVar, Literal
 
+from reference_rt.core.model import Examples
 from reference_rt.materials.material import Material
 from reference_rt.textures import Palette, UnitParameter
 
@@ -24,6 +25,11 @@ class Mask(Wrapper):
     light of surfaces and environments does, by scattered rays.
     """
 
+    EXAMPLES: ClassVar[Examples] = (
+        {"base": "base"},
+        {"base": "base", "opacity": 0.3},
+        {"base": "base", "opacity": "texture"},
+    )
     type: Literal["mask"] = "mask"
     base: str
     """Name of the material where the mask is opaque."""
@@ -35,6 +41,7 @@ class Mask(Wrapper):
 class TwoSided(Wrapper):
     """A material for both sides: `base` in front, `back` behind."""
 
+    EXAMPLES: ClassVar[Examples] = ({"base": "base"}, {"base": "base", "back": "other"})
     bases: ClassVar[tuple[str, ...]] = ("base", "back")
     type: Literal["two_sided"] = "two_sided"
     base: str
@@ -46,6 +53,11 @@ class TwoSided(Wrapper):
 class Blend(Wrapper):
     """A mixture of two materials: (1 - weight) first + weight second."""
 
+    EXAMPLES: ClassVar[Examples] = (
+        {"first": "base", "second": "other"},
+        {"first": "other", "second": "base", "weight": 0.3},
+        {"first": "base", "second": "base", "weight": "texture"},
+    )
     bases: ClassVar[tuple[str, ...]] = ("first", "second")
     type: Literal["blend"] = "blend"
     first: str

@@ -15,7 +15,7 @@ from reference_rt.jit.kernel import entry_kernel, kernel, local_floats
 from reference_rt.jit.links import Linker
 from reference_rt.materials import Materials, Shading, scratch_floats
 from reference_rt.materials.textured import evaluate_textures, lookup_cache_size
-from reference_rt.rendering.linking import linked_materials, linked_textures
+from reference_rt.rendering.linking import calls_of, linked_materials, linked_textures
 from reference_rt.rendering.query.hits import BoolArray
 from reference_rt.rendering.query.rays import (
     broadcast,
@@ -140,9 +140,9 @@ class Bsdf(metaclass=Brief):
         materials, textures = self._tables.materials, self._tables.textures
 
         def link(linker: Linker) -> Any:
-            of_materials = linked_materials(linker, materials, "path", textures is not None)
-            is_oriented = materials.oriented is not None
-            return of_materials, linked_textures(linker, textures, is_oriented)
+            calls = calls_of(scatter_kernel)
+            of_materials = linked_materials(linker, materials, calls, textures is not None)
+            return of_materials, linked_textures(linker, textures, calls)
 
         return linked(self._tables, "bsdf", link, (materials, textures))
 

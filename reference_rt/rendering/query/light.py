@@ -21,7 +21,7 @@ from reference_rt.jit.kernel import entry_kernel, local_floats
 from reference_rt.jit.links import Linker
 from reference_rt.lights import TABLES, Constant, EnvironmentMap, Lights
 from reference_rt.materials import scratch_floats
-from reference_rt.rendering.linking import linked_lights, linked_shapes, linked_textures
+from reference_rt.rendering.linking import calls_of, linked_lights, linked_shapes, linked_textures
 from reference_rt.rendering.query.hits import BoolArray
 from reference_rt.rendering.query.rays import (
     broadcast,
@@ -195,11 +195,11 @@ def _linked_lights(scene: SceneTables) -> Linked:
     lights, shapes, textures = scene.lights, scene.geometry.shapes, scene.textures
 
     def link(linker: Linker) -> Any:
-        wanted = {"sample", "pdf", "uv", "colour"} if lights.areas is not None else set()
+        calls = calls_of(sample_kernel) | calls_of(pdf_kernel)
         return (
-            linked_lights(linker, lights, "path"),
-            linked_shapes(linker, shapes, wanted, lights.areas),
-            linked_textures(linker, textures, is_oriented=False),
+            linked_lights(linker, lights, calls),
+            linked_shapes(linker, shapes, calls, lights.areas),
+            linked_textures(linker, textures, calls),
         )
 
     return linked(scene, "lights", link, (lights, shapes, textures))
@@ -286,7 +286,7 @@ def direct_light(
     if choice is None or choice.probability[light] == 0.0:
         raise ValueError(f"light {light} cannot be sampled; expected one that can be picked")
     # As Whitted's integrator, it traces rays one by one.
-    out, found = np.zeros((len(o), 7)), link_to_scene(scene, "whitted")
+    out, found = np.zeros((len(o), 7)), link_to_scene(scene, direct_kernel)
     with np.errstate(all="ignore"):
         direct_kernel(found.tables, o, d, light, u[0], u[1], out)
     return DirectLight(target=out[:, 0:3], pdf=out[:, 3], contribution=out[:, 4:7])

@@ -124,7 +124,7 @@ def _unit(rays: Rays) -> _UnitRays:
 def _colours(tables: SceneTables, rays: Rays, threads: int | None) -> FloatArray:
     o, d, valid = _unit(rays)
     out = np.empty_like(o)
-    found = link_to_scene(tables, "ray_cast")
+    found = link_to_scene(tables, cast_kernel)
 
     def trace(k: slice) -> None:
         cast_kernel(found.tables, o[k], d[k], out[k])

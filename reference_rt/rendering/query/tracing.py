@@ -5,7 +5,7 @@ They take a geometry, or a link to one with the operations that are named here."
 import math
 import os
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numba
@@ -40,9 +40,9 @@ from reference_rt.core.ray import (
 from reference_rt.core.vec3 import row
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel, kernel, local_floats, local_integers
-from reference_rt.jit.links import Link, Linker
+from reference_rt.jit.links import Linker
 from reference_rt.jit.parallel_compile import precompile_all
-from reference_rt.rendering.linking import linked_geometry, linked_scene, linked_shapes
+from reference_rt.rendering.linking import calls_of, geometry_of, linked_scene
 
 # ---- a scene's tables behind links, as the kernels of queries take them (see `jit/links.py`) -----
 #
@@ -99,43 +99,9 @@ def link_to_geometry(scene: SceneTables, *operations: str) -> Linked:
     return linked(scene, operations, lambda made: geometry_of(made, geometry, operations), geometry)
 
 
-def geometry_of(linker: Linker, geometry: Geometry, operations: Sequence[str]) -> Link:
-    """A geometry behind a link that has these operations, and what they call."""
-    shapes = linked_shapes(linker, geometry.shapes, _of_shapes(geometry, operations))
-    return linked_geometry(linker, geometry, shapes, operations)
-
-
-def link_to_scene(scene: SceneTables, integrator: str) -> Linked:
-    """The scene as the kernels of an integrator take it: see `linking.linked_scene`."""
-    return linked(scene, integrator, lambda made: linked_scene(made, scene, integrator), scene)
-
-
-_ONE_RAY, _MANY_RAYS = {"closest_hit", "occluded"}, {"closest_hits", "any_hits"}
-_CROSSINGS = {"next_crossing", "crossings_of_solid"}
-
-
-def _of_shapes(geometry: Geometry, operations: Iterable[str]) -> set[str]:
-    """The operations on shapes that operations on a geometry call."""
-    wanted, asked = set(), set(operations)
-    if asked & (_ONE_RAY | _MANY_RAYS) and geometry.bvh is not None:
-        wanted |= {"intersect", "owner", "face"}
-    elif asked & _MANY_RAYS:
-        wanted |= {"nearest_of_block", "complete_block"}
-    elif asked & _ONE_RAY:
-        wanted |= {"nearest_of_type"}
-    if asked & _CROSSINGS:
-        wanted |= {"intersect", "spans", "_of_quadric", "primitive_count", "owner", "face"}
-    if "surface" in asked:
-        wanted |= {"surface"}
-    if "owner" in asked:
-        wanted |= {"owner", "face"}
-    if "coordinates" in asked:
-        wanted |= {"uv", "colour"}
-    if geometry.parts is not None:
-        wanted |= {"owner"}
-    if geometry.solids is not None:
-        wanted |= {"intersect", "surface", "spans", "enters", "owner", "face"}
-    return wanted
+def link_to_scene(scene: SceneTables, kernel: Any) -> Linked:
+    """The scene as a kernel takes it."""
+    return linked(scene, kernel, lambda made: linked_scene(made, scene, calls_of(kernel)), scene)
 
 
 class HitArrays(NamedTuple):

@@ -7,12 +7,12 @@ those of `fit`.
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import combinations
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Field, Strict, WithJsonSchema, model_validator
 
-from reference_rt.core.model import Positive, Vector
+from reference_rt.core.model import Examples, Positive, Vector
 from reference_rt.core.transform import Affine
 from reference_rt.shapes.curved.quadrics import Quadrics
 from reference_rt.shapes.placement import columns
@@ -172,6 +172,15 @@ class Quadric(Shape):
     otherwise.
     """
 
+    EXAMPLES: ClassVar[Examples] = tuple(
+        {
+            "coefficients": (1.0, 1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.1),
+            "lower": (-0.9, -0.8, -0.7),
+            "upper": (0.8, 0.9, 1.0),
+            "capped": capped,
+        }
+        for capped in (False, True)
+    )
     type: Literal["quadric"] = "quadric"
     coefficients: Coefficients
     """The ten coefficients [A, B, C, D, E, F, G, H, I, J] of f, before the transform."""
@@ -266,6 +275,10 @@ class Cylinder(Shape):
     over the square around it.  Faces: 0 is the side, 3 the bottom, 6 the top.
     """
 
+    EXAMPLES: ClassVar[Examples] = (
+        {},
+        {"radius": 0.5, "z_min": -0.3, "z_max": 0.7, "capped": False},
+    )
     type: Literal["cylinder"] = "cylinder"
     radius: Positive = 1.0
     """Radius about the z axis, before the transform, in scene units."""
@@ -301,6 +314,12 @@ class Cone(Shape):
     the square around the wider one.  Faces: 0 is the side, 3 the bottom, 6 the top.
     """
 
+    EXAMPLES: ClassVar[Examples] = (
+        {},
+        {"radius": 0.6, "height": 1.3, "capped": False},
+        {"radius": 0.5, "top_radius": 0.3},
+        {"radius": 0.3, "top_radius": 0.7, "capped": False},
+    )
     type: Literal["cone"] = "cone"
     radius: Positive = 1.0
     """Radius at z = 0, before the transform, in scene units."""

@@ -1,13 +1,13 @@
 """Sphere: |p - c| = r."""
 
 import math
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from reference_rt.core import transform
 from reference_rt.core.arrays import Bounds, FloatArray, IntArray
-from reference_rt.core.model import Positive, Vector
+from reference_rt.core.model import Examples, Positive, Vector
 from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, at, surface_error
 from reference_rt.core.vec3 import Vec3, dot, frame_from_normal, length, normalize, row, to_world
 from reference_rt.jit.kernel import kernel
@@ -37,6 +37,7 @@ from reference_rt.shapes.shape import (
 class Sphere(Shape):
     """A sphere; its outward normal is the front.  A transform may make it an ellipsoid."""
 
+    EXAMPLES: ClassVar[Examples] = ({}, {"center": (0.3, -0.2, 0.7), "radius": 0.8})
     type: Literal["sphere"] = "sphere"
     center: Vector = (0.0, 0.0, 0.0)
     """The centre [x, y, z], before the transform, in scene units."""
@@ -138,6 +139,9 @@ def arguments(spheres: Spheres, i: int) -> tuple[Vec3, float]:
 def spans(spheres: Spheres, i: int, ray: Ray) -> Spans:
     meets, near, far = roots(ray, row(spheres.center, i), spheres.radius[i])
     return one_span(near, 0.0, far, 0.0) if meets else no_spans()
+
+
+crossings = spans
 
 
 @kernel

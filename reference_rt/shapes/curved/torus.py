@@ -1,12 +1,12 @@
 """Torus: the points at distance r from a circle of radius R."""
 
 import math
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from reference_rt.core.arrays import Bounds, FloatArray, IntArray
-from reference_rt.core.model import Positive
+from reference_rt.core.model import Examples, Positive
 from reference_rt.core.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, SurfacePoint, at
 from reference_rt.core.vec3 import Vec3, dot, length, row
 from reference_rt.jit.kernel import kernel, local_floats
@@ -27,6 +27,7 @@ from reference_rt.shapes.shape import Shape, Spans, TabulationContext, Tangents
 class Torus(Shape):
     """A ring about the z axis; outward normals."""
 
+    EXAMPLES: ClassVar[Examples] = ({}, {"major_radius": 0.7, "minor_radius": 0.3})
     type: Literal["torus"] = "torus"
     major_radius: Positive = 1.0
     """R, from the axis to the middle of the tube, before the transform, in scene units."""
@@ -206,6 +207,9 @@ def spans(tori: Tori, i: int, ray: Ray) -> Spans:
     for k in range(_crossings(tori, i, ray, t), 4):
         t[k] = math.inf
     return Spans(t[0], 0.0, t[1], 0.0, t[2], 0.0, t[3], 0.0)
+
+
+crossings = spans
 
 
 @kernel

@@ -95,6 +95,12 @@ def check_area(what: str, area: float) -> None:
         raise ValueError(f"the {what}'s area is not a float64; expected an ordinary size")
 
 
+def unit_normals(table: Any) -> FloatArray:
+    """The unit normals (n, 3)."""
+    found: FloatArray = table.normal
+    return found
+
+
 @kernel
 def signed_distance(table: Any, i: int, p: Vec3) -> float:
     """The distance of `p` from plane i: positive on the normal's side."""

@@ -74,7 +74,7 @@ def intersect(disks: Disks, i: int, ray: Ray) -> Crossing:
     return miss()
 
 
-surface = base.surface
+surface, unit_normals = base.surface, base.unit_normals
 
 
 @kernel

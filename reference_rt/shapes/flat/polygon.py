@@ -9,14 +9,14 @@ corner belongs to exactly one of them.
 import math
 from collections import Counter
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError, WithJsonSchema, WrapValidator
 
 from reference_rt.core import transform
 from reference_rt.core.arrays import Bounds, FloatArray, IntArray
-from reference_rt.core.model import Vector
+from reference_rt.core.model import Examples, Vector
 from reference_rt.core.ray import UNIT_ROUNDOFF, Crossing, Hit, Ray, miss
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import kernel
@@ -61,6 +61,9 @@ RingPoint = Annotated[Vector, WrapValidator(_point), WithJsonSchema(_NUMBERS)]
 Ring = Annotated[tuple[RingPoint, ...], Field(strict=False), BeforeValidator(_ring)]
 
 
+_STAR = ((0.0, 1.0), (0.6, -0.8), (-1.0, 0.3), (1.0, 0.3), (-0.6, -0.8))
+
+
 class Polygon(Shape):
     """A flat area with any outline: concave, with holes, or self-intersecting.  All points lie in
     one plane; points of two numbers lie at z = 0.
@@ -70,6 +73,10 @@ class Polygon(Shape):
     Under a transform that mirrors space the front stays the front.
     """
 
+    EXAMPLES: ClassVar[Examples] = (
+        {"rings": (((0, 0, 0), (1, 0, 1), (0, 1, 1)),)},
+        *({"rings": (_STAR,), "fill": fill} for fill in ("even_odd", "nonzero")),
+    )
     type: Literal["polygon"] = "polygon"
     rings: Annotated[tuple[Ring, ...], Field(strict=False), BeforeValidator(_rings)]
     """Rings of points [x, y] or [x, y, z], closed by themselves: the first point is not repeated.

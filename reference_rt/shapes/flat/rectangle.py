@@ -233,7 +233,7 @@ def lane_distance(
     return distance(ray, *lane_vectors(packets, k, lane))
 
 
-surface = base.surface
+surface, unit_normals = base.surface, base.unit_normals
 
 
 @kernel

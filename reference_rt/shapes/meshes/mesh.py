@@ -1,7 +1,7 @@
 """Mesh: triangles from a file, or from arrays."""
 
 from pathlib import Path
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -9,7 +9,7 @@ from pydantic import model_validator
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.diagnosis import FieldError
-from reference_rt.core.model import AS_DIGEST, Floats2, Floats3, Integers3
+from reference_rt.core.model import AS_DIGEST, Examples, Floats2, Floats3, Integers3
 from reference_rt.core.transform import IDENTITY, Affine
 from reference_rt.shapes.meshes.files import MeshData, read_mesh
 from reference_rt.shapes.meshes.files.data import RawMesh, checked
@@ -24,6 +24,12 @@ _LONGEST = 60
 """Characters of a name in a warning: a damaged file may have any names."""
 
 
+_TETRAHEDRON: dict[str, Any] = {
+    "vertices": ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    "faces": ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)),
+}
+
+
 class Mesh(Shape):
     """Triangles of a file, or of arrays, with optional vertex normals, texture coordinates and
     colours.
@@ -32,6 +38,17 @@ class Mesh(Shape):
     front stays the front, so that closed meshes do not turn inside out.
     """
 
+    EXAMPLES: ClassVar[Examples] = (
+        _TETRAHEDRON,
+        {**_TETRAHEDRON, "smooth": True},
+        {
+            **_TETRAHEDRON,
+            "normals": ((-1, -1, -1), (1, 0, 0), (0, 1, 0), (0, 0, 1)),
+            "uv": ((0, 0), (1, 0), (0, 1), (1, 1)),
+            "colours": ((1, 1, 1), (1, 0, 0), (0, 1, 0), (0, 0, 1)),
+        },
+        {**_TETRAHEDRON, "normals": ((-1, -1, -1), *np.eye(3)), "face_normals": True},
+    )
     array_fields: ClassVar[frozenset[str]] = frozenset(
         ("vertices", "faces", "normals", "uv", "colours")
     )

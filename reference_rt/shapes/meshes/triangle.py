@@ -1,13 +1,13 @@
 """Triangle: three vertices, watertight along shared edges."""
 
 import math
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray
-from reference_rt.core.model import Vector
+from reference_rt.core.model import Examples, Vector
 from reference_rt.core.ray import (
     UNIT_ROUNDOFF,
     Crossing,
@@ -27,6 +27,7 @@ from reference_rt.shapes.meshes.triangle_table import (
     bounds,
     facing,
     table_of,
+    unit_normals,
 )
 from reference_rt.shapes.meshes.watertight import (
     Projection,
@@ -51,6 +52,7 @@ class Triangle(Shape):
     """A triangle; its normal is (v1 - v0) x (v2 - v0).  Under a transform that mirrors space its
     front stays its front."""
 
+    EXAMPLES: ClassVar[Examples] = ({"v0": (0, 0, 0), "v1": (1, 0, 0), "v2": (0, 1, 0)},)
     type: Literal["triangle"] = "triangle"
     v0: Vector
     """The first vertex [x, y, z], before the transform, in scene units."""
@@ -302,5 +304,6 @@ __all__ = [
     "shading_normal",
     "surface",
     "tangents",
+    "unit_normals",
     "uv",
 ]

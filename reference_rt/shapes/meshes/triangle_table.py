@@ -143,6 +143,12 @@ def geometric_normals(vertices: FloatArray) -> FloatArray:
     return np.asarray(np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]))
 
 
+def unit_normals(triangles: Triangles) -> FloatArray:
+    """The unit normals (n, 3)."""
+    found = geometric_normals(triangles.vertices)
+    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+
+
 def have_area(points: FloatArray, corners: IntArray) -> npt.NDArray[np.bool_]:
     """Which triangles, see `Triangles`, have an area that float64 can hold: (n,)."""
     found = np.empty(len(corners), bool)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from comparisons.compare.budget import Budget
-from comparisons.compare.compare import Subject, budgeted, compare_scene, single_lights
+from comparisons.compare.compare import Subject, budgeted, compare_scene
+from comparisons.compare.single_lights import single_lights
 from reference_rt.integrators import Direct, RayCast
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.lights import Point

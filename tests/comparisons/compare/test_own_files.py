@@ -11,12 +11,12 @@ from PIL import Image
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, compare_scene
 from comparisons.mitsuba.backend import backend, mitsuba
+from comparisons.mitsuba.context import UntranslatableError
 from comparisons.mitsuba.scene import for_rays, picture
 from comparisons.results.case import Case
 from comparisons.rungs.rays.camera import camera_rays
 from comparisons.suites.keys import case_key
 from comparisons.suites.suite import Changes
-from comparisons.textures.translate import UntranslatableError
 from comparisons.translator.reading import read_file
 from comparisons.translator.reference import file_of, own_scene
 from reference_rt.rendering.scene import Scene

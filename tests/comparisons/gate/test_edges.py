@@ -12,7 +12,7 @@ from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import of_scene
 from comparisons.results.case import RungResult
-from comparisons.results.headline import numbers_rows
+from comparisons.report.biases import biases_of
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.image import srgb
 from reference_rt.rendering.render import render
@@ -284,7 +284,7 @@ def test_a_scene_through_the_gate() -> None:
         numbers = next(r.numbers for r in case.rungs if r.name == "statistics")
         assert numbers["inside"] + numbers["edge"] == (30 - 2 * rim) * (40 - 2 * rim)
         assert numbers["edge"] > 50
-        head = [title.partition(" ")[2] for title in numbers_rows(case)[0]]
+        head = [title.partition(" ")[2] for title in biases_of(case).head]
         assert head[1:3] == ["pixels inside surfaces", "pixels on edges"]
         assert gated(0.5, rim).verdict == "differ"
 

@@ -10,9 +10,9 @@ import reference_rt as rt
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.materials.translate import translate_material
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.plugins.exact_coat import approximate_g1, exact_g1, smooth_reflectance
 from comparisons.rungs.rays import arbiter
-from comparisons.textures.translate import TranslationContext
 from comparisons.translator import accuracy
 from comparisons.translator.accuracy import both_sides, clearcoat_error, directions, table_error
 from reference_rt.core.arrays import FloatArray

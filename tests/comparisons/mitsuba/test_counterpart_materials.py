@@ -10,9 +10,9 @@ from counterparts import every_material
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF, round32
 from comparisons.materials.translate import translate_material
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.scene import for_rays
 from comparisons.rungs.rays import arbiter
-from comparisons.textures.translate import TranslationContext
 from comparisons.translator.accuracy import accuracy
 from reference_rt import Scene
 from reference_rt.core.arrays import FloatArray

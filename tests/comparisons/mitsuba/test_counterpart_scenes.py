@@ -11,8 +11,8 @@ from PIL import Image
 
 from comparisons.compare.pictures import whitted as whitted_pictures
 from comparisons.mitsuba.backend import mitsuba, scalar
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.rungs import direct, geometry, whitted
-from comparisons.textures.translate import TranslationContext
 from comparisons.translator import UntranslatableError, load, to_mitsuba
 from comparisons.translator.notes import notes_of
 from reference_rt.rendering.scene import Scene

@@ -10,12 +10,9 @@ import pytest
 from comparisons.lights.translate import translate_light
 from comparisons.materials.translate import translate_material
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.context import TranslationContext, UntranslatableError
 from comparisons.mitsuba.scene import for_rays
-from comparisons.textures.translate import (
-    TranslationContext,
-    UntranslatableError,
-    translate_texture,
-)
+from comparisons.textures.translate import translate_texture
 from comparisons.translator import load
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.lights import EnvironmentMap

@@ -12,8 +12,8 @@ import pytest
 from comparisons import translator
 from comparisons.materials.translate import translate_material
 from comparisons.mitsuba.backend import mitsuba, scalar
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.scene import for_rays, picture
-from comparisons.textures.translate import TranslationContext
 from comparisons.translator import load
 from comparisons.translator.notes import COSINES, base_error, notes_of
 from reference_rt.materials import Plastic, RoughPlastic

@@ -18,7 +18,8 @@ from typer.testing import CliRunner, Result
 from comparisons.commands.compare import convert
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.files import write_scene
-from comparisons.translator.reading import meshes, read_file
+from comparisons.shapes import reading_meshes
+from comparisons.translator.reading import read_file
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ImageError, SceneError, SceneWarning, UsageError
@@ -277,19 +278,19 @@ def test_serialized_meshes_are_those_of_mitsuba(tmp_path, version, index, flat):
 
 def test_damaged_serialized_meshes_are_refused():
     whole = packed(4, (CORNERS, TRIANGLES, None, False), (CORNERS, TRIANGLES, UPWARDS, True))
-    meshes.read(whole, 1)
+    reading_meshes.read(whole, 1)
     for cut in range(0, len(whole) - 1, 7):
         with pytest.raises(ValueError, match=r"."):
-            meshes.read(whole[:cut], 1)
+            reading_meshes.read(whole[:cut], 1)
     for index in (-1, 2, 10**9):
         with pytest.raises(ValueError, match="has 2 meshes"):
-            meshes.read(whole, index)
+            reading_meshes.read(whole, index)
     rng = np.random.default_rng(0)
     for _ in range(300):
         damaged = bytearray(whole)
         damaged[rng.integers(len(whole))] = rng.integers(256)
         with suppress(ValueError):  # and nothing else
-            meshes.read(bytes(damaged), 1)
+            reading_meshes.read(bytes(damaged), 1)
 
 
 def test_serialized_meshes_that_unpack_to_much_are_refused():
@@ -300,7 +301,7 @@ def test_serialized_meshes_that_unpack_to_much_are_refused():
         stream = struct.pack("<I", 0) + name + struct.pack("<QQ", count, 0) + bytes(length)
         content = head + zlib.compress(stream) + struct.pack("<QI", 0, 1)
         with pytest.raises(ValueError, match=r"unpacks from|a name without an end"):
-            meshes.read(content, 0)
+            reading_meshes.read(content, 0)
 
 
 def test_a_scene_of_mitsuba_loads_by_its_suffix(folder):

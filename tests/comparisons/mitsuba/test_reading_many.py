@@ -30,7 +30,7 @@ class Counted(dict[str, Any]):
 
 
 def test_names_of_many_materials_are_found_at_once() -> None:
-    taken, names = Counted(diffuse_7=1), Reading(parsed=None)  # type: ignore[arg-type]
+    taken, names = Counted(diffuse_7=1), Reading(parsed=None, material_name=None)  # type: ignore[arg-type]
     for _ in range(1000):
         taken[names.unused("", "diffuse", taken)] = 1
     assert len(taken) == 1001  # each was new

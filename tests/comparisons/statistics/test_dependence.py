@@ -11,7 +11,7 @@ from scipy import stats
 from comparisons.results.case import FloatArray
 from comparisons.rungs.input import input_rung
 from comparisons.statistics import compare
-from comparisons.statistics.ranks import ORDER_LEVEL, successive
+from comparisons.statistics.order import ORDER_LEVEL, successive
 
 Law = Callable[[np.random.Generator, int, int], FloatArray]
 

@@ -14,7 +14,8 @@ from comparisons.results.case import FloatArray
 from comparisons.rungs.images import images_rung
 from comparisons.rungs.input import input_rung
 from comparisons.statistics.metrics import image_metrics
-from comparisons.statistics.shared_noise import correlated_pair, odd_replicate
+from comparisons.statistics.odd_replicate import odd_replicate
+from comparisons.statistics.shared_noise import correlated_pair
 
 UNSEEN = ("1 point light",)
 """All light of a picture comes from one random point: a region that it lights seldom may be dark in

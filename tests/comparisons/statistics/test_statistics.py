@@ -21,8 +21,8 @@ from planted import (
 )
 
 from comparisons.statistics import Known, Margins, compare, standard_error, worst_regions
+from comparisons.statistics.advice import wanted
 from comparisons.statistics.decide import _decide, findings
-from comparisons.statistics.wording import wanted
 
 # The decision: specificity and equivalence
 

@@ -11,8 +11,9 @@ from comparisons.rungs.images import images_rung
 from comparisons.statistics import Known, compare
 from comparisons.statistics.decide import findings
 from comparisons.statistics.metrics import image_metrics
-from comparisons.statistics.rare import around, share_unmet, unseen, worse
+from comparisons.statistics.rare import around, share_unmet
 from comparisons.statistics.sides import met_once, side_of
+from comparisons.statistics.unseen import unseen, worse
 
 SIDE = 48
 BASE = 0.1

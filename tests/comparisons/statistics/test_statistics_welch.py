@@ -8,6 +8,7 @@ from planted import HEIGHT, LAMP, MARGINS, NONE, WIDTH, replicates, scene
 from scipy import stats
 
 from comparisons.statistics import Known, compare
+from comparisons.statistics.advice import _known
 from comparisons.statistics.ranks import uniformity
 from comparisons.statistics.scales import IMAGE_LEVEL
 from comparisons.statistics.sides import known_side, side_of
@@ -24,7 +25,6 @@ from comparisons.statistics.welch import (
     tile_test,
     welch_errors,
 )
-from comparisons.statistics.wording import _known
 
 # ---- Welch's test itself -------------------------------------------------------------------------
 

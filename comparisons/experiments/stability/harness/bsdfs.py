@@ -20,8 +20,8 @@ from comparisons.experiments.stability.harness.series import Draw, Sweep
 from comparisons.geometry.exact.crossings import IntArray
 from comparisons.materials.translate import translate_material
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.scene import for_rays
-from comparisons.textures.translate import TranslationContext
 from reference_rt.core.vec3 import Vec3, row
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.materials import (
@@ -38,7 +38,7 @@ from reference_rt.materials import (
     RoughPlastic,
     ThinDielectric,
 )
-from reference_rt.materials.bsdfs import tables
+from reference_rt.materials.bsdfs import dispatch
 from reference_rt.materials.bsdfs.tables import TABLES, Leaves
 from reference_rt.textures import NO_TEXTURES, At
 
@@ -67,7 +67,7 @@ def _evaluate(table: Any, kind: int, wo: Any, wi: Any, values: Any, densities: A
     at = At(None, 0.0, 0.0, Vec3(-1.0, -1.0, -1.0))
     for i in range(len(wo)):
         a, b = row(wo, i), row(wi, i)
-        scattered = tables.eval_pdf(table, kind, 0, at, a, b)
+        scattered = dispatch.eval_pdf(table, kind, 0, at, a, b)
         values[i, 0], values[i, 1], values[i, 2] = scattered.value
         densities[i] = scattered.density
 
@@ -76,7 +76,7 @@ def _evaluate(table: Any, kind: int, wo: Any, wi: Any, values: Any, densities: A
 def _sample(table: Any, kind: int, wo: Any, u: Any, out: Any) -> None:
     at = At(None, 0.0, 0.0, Vec3(-1.0, -1.0, -1.0))
     for i in range(len(wo)):
-        found = tables.sample(table, kind, 0, at, row(wo, i), u[i, 0], u[i, 1], u[i, 2])
+        found = dispatch.sample(table, kind, 0, at, row(wo, i), u[i, 0], u[i, 1], u[i, 2])
         out[i, 0], out[i, 1], out[i, 2] = found.wi
         out[i, 3], out[i, 4], out[i, 5] = found.weight
         out[i, 6], out[i, 7], out[i, 8] = found.pdf, found.eta, found.is_delta

@@ -1,14 +1,12 @@
 """What a run shows: progress, the table of all series, JSON, CSV, and the page."""
 
-import base64
-import csv
 import math
 import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from markupsafe import Markup
 from rich.console import RenderableType
 
 from comparisons.experiments.stability.harness.outcomes import MITSUBA, OURS, Outcome
@@ -23,39 +21,67 @@ from comparisons.experiments.stability.harness.points import (
     summarise,
     total,
 )
-from comparisons.experiments.stability.harness.run import Picture
 from comparisons.experiments.stability.harness.series import Effort, family
-from comparisons.report.plots import Curve, log_log
-from comparisons.report.templates import template, write
-from comparisons.report.terminal import fitted
-from comparisons.report.values import label, power_of_ten, typeset
-from comparisons.results.files import csv_file, plain, write_json
+from comparisons.report.table import Column, Table
+from comparisons.report.values import label, power_of_ten, shown, typeset
+from comparisons.results.files import plain, write_json
 from comparisons.runs.engine import Count
 
 # ---- the table of all series, for a terminal and as Markdown -------------------------------------
 
 
-COLUMNS = ("family", "series", "to", "cases", "failures", "worst", "ours", "Mitsuba", "others")
+class Line(NamedTuple):
+    """A series of a family, which has this id."""
+
+    family: str
+    one: SeriesSummary
+
+    @property
+    def cases(self) -> str:
+        """Of ours."""
+        ours = total(self.one.found, OURS)
+        return "–" if ours is None else f"{ours.cases:,}"
+
+    @property
+    def failures(self) -> str:
+        """Of ours."""
+        ours = total(self.one.found, OURS)
+        return "not measured" if ours is None else f"{ours.failures:,}"
+
+    @property
+    def last(self) -> str:
+        """Its most extreme x."""
+        axis = self.one.series.axis
+        return f"{axis} {number(self.one.last)}" if axis else ""
+
+    @property
+    def others(self) -> str:
+        """Where each contestant besides ours and Mitsuba starts to fail."""
+        names: dict[str, list[str]] = {}
+        for c in contestants(self.one.found):
+            if c not in (OURS, MITSUBA):
+                names.setdefault(where(self.one, c), []).append(named(c))
+        return "; ".join(f"{', '.join(some)}: {place}" for place, some in names.items())
 
 
-def cells(name: str, one: SeriesSummary) -> list[str]:
-    """Of one series, as text."""
-    ours = total(one.found, OURS)
-    others = [c for c in contestants(one.found) if c not in (OURS, MITSUBA)]
-    shown: dict[str, list[str]] = {}
-    for c in others:
-        shown.setdefault(where(one, c), []).append(named(c))
-    return [
-        f"{name} {family(name).name}",
-        label(one.series.name),
-        f"{one.series.axis} {number(one.last)}" if one.series.axis else "",
-        f"{ours.cases:,}" if ours else "–",
-        f"{ours.failures:,}" if ours else "not measured",
-        worst(one, OURS),
-        where(one, OURS),
-        where(one, MITSUBA),
-        "; ".join(f"{', '.join(names)}: {found}" for found, names in shown.items()),
-    ]
+_FAMILY = Column[Line]("family", lambda line: f"{line.family} {family(line.family).name}")
+_SERIES = Column[Line]("series", lambda line: label(line.one.series.name))
+_TO = Column[Line]("to", lambda line: line.last, look="more")
+_CASES = Column[Line]("cases", lambda line: line.cases, right=True, look="count more")
+_FAILURES = Column[Line]("failures", lambda line: line.failures, look="count more")
+_PLACES = (
+    Column[Line]("worst", lambda line: worst(line.one, OURS), look="more"),
+    Column[Line]("ours", lambda line: where(line.one, OURS)),
+    Column[Line]("Mitsuba", lambda line: where(line.one, MITSUBA)),
+    Column[Line]("others", lambda line: line.others),
+)
+COLUMNS = (_SERIES, _TO, _CASES, _FAILURES, *_PLACES)
+"""Of a family's series.  The look "more" is left out on small screens."""
+
+
+def series_table(columns: Sequence[Column[Line]], found: Sequence[Found]) -> Table[Line]:
+    lines = [Line(name, one) for name, series in summaries(found).items() for one in series]
+    return Table(columns, lines, lambda line: "" if line.one.holds else "failed")
 
 
 def where(one: SeriesSummary, contestant: str) -> str:
@@ -92,14 +118,9 @@ def number(value: float) -> str:
 
 def terminal(found: Sequence[Found], width: int) -> RenderableType:
     """For people at a terminal of so many columns."""
-    names = [name for name in COLUMNS if name != "failures"]  # the others say where each fails
-    rows, styles = [], []
-    for name, series in summaries(found).items():
-        for one in series:
-            _, series_name, to, cases, _, *rest = cells(name, one)
-            rows.append((f"{name} {series_name}", to, cases, *rest))
-            styles.append(None if one.holds else "bold red")
-    return fitted(width, names[1:], rows, styles=styles, right=("cases",))
+    series = replace(_SERIES, of=lambda line: f"{line.family} {label(line.one.series.name)}")
+    # Without failures: the others say where each fails.
+    return series_table((series, _TO, _CASES, *_PLACES), found).terminal(width)
 
 
 def markdown(
@@ -115,12 +136,7 @@ def markdown(
         f"{sum(f.seconds for f in found) / 60.0:.0f} minutes of one process",
     ]
     lines = ["Measured: " + ", ".join(shown) + ".", ""]
-    lines += ["| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
-    for name, series in summaries(found).items():
-        for one in series:
-            row = [cell.replace("|", "\\|") for cell in cells(name, one)]
-            lines.append("| " + " | ".join(row) + " |")
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *series_table((_FAMILY, *COLUMNS), found).markdown()]) + "\n"
 
 
 # ---- for machines: `results.json` and `results.csv` ----------------------------------------------
@@ -129,8 +145,45 @@ def markdown(
 SCHEMA = 1
 """Raised whenever a reader of the former layout would misread the new one."""
 
-CSV = ("family", "series", "x", "contestant", "cases", "failures", "worst", "open")
-"""Of `results.csv`."""
+
+class Row(NamedTuple):
+    """A contestant at one setting;  is_first: of the contestants there."""
+
+    found: Found
+    contestant: str
+    is_first: bool
+
+    @property
+    def outcome(self) -> Outcome:
+        return self.found.outcomes[self.contestant]
+
+    @property
+    def worst(self) -> float | str | None:
+        """The outcome's; "inf" for infinity, which JSON has no number for."""
+        return plain(self.outcome.worst, str)  # type: ignore[no-any-return]
+
+
+def rows_of(found: Sequence[Found], axis: str = "", unit: str = "") -> Table[Row]:
+    """Of `results.csv`, and of the page, where a series has an axis and a unit."""
+    unit = f", {typeset(unit)}" if unit else ""
+    columns = (
+        Column[Row](None, lambda row: row.found.family, key="family"),
+        Column[Row](None, lambda row: row.found.series, key="series"),
+        Column[Row](typeset(axis) or None, lambda row: row.found.x, number, key="x"),
+        Column[Row]("method", lambda row: row.contestant, named, key="contestant"),
+        Column[Row]("cases", lambda row: row.outcome.cases, shown, key="cases"),
+        Column[Row]("failures", lambda row: row.outcome.failures, shown, key="failures"),
+        Column[Row](f"worst error{unit}", lambda row: row.worst, _worst, key="worst"),
+        Column[Row]("undecidable", lambda row: row.outcome.open, shown, key="open"),
+        Column[Row]("seconds", lambda row: f"{row.found.seconds:.1f}" if row.is_first else ""),
+    )
+    rows = [Row(f, name, k == 0) for f in found for k, name in enumerate(contestants([f]))]
+    return Table(columns, rows, lambda row: "first" if row.is_first else "")
+
+
+def _worst(error: float | str | None) -> str:
+    return "–" if error is None else number(float(error))
+
 
 MEANING = {
     "cases": "put to a contestant and decided",
@@ -172,13 +225,7 @@ def write_results(
         ],
     }
     write_json(folder / "results.json", document)
-    with csv_file(folder / "results.csv") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(CSV)
-        for f in found:
-            for name, some in f.outcomes.items():
-                row = _flat(some)
-                writer.writerow((f.family, f.series, repr(f.x), name, *row.values()))
+    rows_of(found).write_csv(folder / "results.csv")
 
 
 def _family(name: str, found: Sequence[Found], effort: Effort, seed: int) -> dict[str, Any]:
@@ -246,138 +293,6 @@ def _flat(some: Outcome) -> dict[str, Any]:
         "worst": plain(some.worst, str),
         "open": some.open,
     }
-
-
-# ---- the page: a single file that needs no network and runs no script ----------------------------
-
-
-SIZE = (4.8, 3.7)
-"""Inches."""
-
-LEAST, MOST = 1e-2, 1e30
-"""Limits of the axis of worst errors, in the series' unit: a logarithmic axis has no zero, and
-where a textbook's 1 - R gives 1e-16 in place of 0, the error is some 1e297."""
-
-
-def of_series(one: SeriesSummary) -> list[str]:
-    """SVG plots; none where there is one point alone, or no failure and no error."""
-    if not one.series.axis or len(one.found) < 2:
-        return []
-    names = contestants(one.found)
-    ends = {}
-    if not math.isinf(one.series.holds_to):
-        ends["float64 ends"] = one.series.holds_to
-    plots = []
-    axis = typeset(one.series.axis)
-    if _any_fails(one):
-        seen = _least(one)
-        curves = [_rates(one, name, k) for k, name in enumerate(names)]
-        level = {"none seen": seen}
-        plots.append(log_log(curves, axis, "share of cases", "Failures", level, SIZE, ends))
-    if any(some.worst is not None for f in one.found for some in f.outcomes.values()):
-        curves = [_errors(one, name, k) for k, name in enumerate(names)]
-        plots.append(log_log(curves, axis, _error(one), "Worst error", None, SIZE, ends))
-    return plots
-
-
-def failures(found: Sequence[Found]) -> dict[str, str]:
-    """The plots of failures of all series that somebody fails, by name."""
-    return {
-        f"{name}-{one.series.name}": plots[0]
-        for name, series in summaries(found).items()
-        for one in series
-        if _any_fails(one) and (plots := of_series(one))
-    }
-
-
-def _any_fails(one: SeriesSummary) -> bool:
-    return any(some.failures for f in one.found for some in f.outcomes.values())
-
-
-def _error(one: SeriesSummary) -> str:
-    """What the axis of errors shows: "error / the law's bound"."""
-    unit = typeset(one.series.unit) or "error"
-    return f"error / {unit.removeprefix('of ')}" if unit.startswith("of ") else unit
-
-
-def _rates(one: SeriesSummary, name: str, colour: int) -> Curve:
-    some = [(f.x, f.outcomes[name]) for f in one.found if name in f.outcomes]
-    y = [max(o.failures / max(o.cases, 1), _least(one)) for _, o in some]
-    return Curve(named(name), [x for x, _ in some], y, colour=colour)
-
-
-def _least(one: SeriesSummary) -> float:
-    """The rate at which no failure is drawn: half a case of the most cases of any point."""
-    return 0.5 / max(1, *(some.cases for f in one.found for some in f.outcomes.values()))
-
-
-def _errors(one: SeriesSummary, name: str, colour: int) -> Curve:
-    some = [(f.x, f.outcomes[name].worst) for f in one.found if name in f.outcomes]
-    known = [(x, worst) for x, worst in some if worst is not None and math.isfinite(worst)]
-    shown = [min(max(worst, LEAST), MOST) for _, worst in known]
-    return Curve(named(name), [x for x, _ in known], shown, colour=colour)
-
-
-_LOOKS = ("", "more", "count more", "count more", "more", "", "", "")
-"""CSS classes of the table's columns after the family: "more" is left out on small screens."""
-
-
-def write_page(
-    path: Path,
-    found: Sequence[Found],
-    pictures: Sequence[Picture],
-    effort: Effort,
-    seed: int,
-    provenance: Mapping[str, Any],
-) -> None:
-    """Write the page, at once or not at all; all text is escaped."""
-    folder = "experiments/stability"
-    series = [one for some in summaries(found).values() for one in some]
-    held = f"in {sum(one.holds for one in series)} of {len(series)}" if series else "in no"
-    page = template("stability.html.jinja", folder, number=number, named=named).render(
-        provenance={**provenance, "effort": effort, "seed": seed},
-        verdict=f"Ours holds as far as it must {held} series",
-        columns=list(zip(COLUMNS[1:], _LOOKS, strict=True)),
-        families=[
-            {
-                "definition": family(name),
-                "series": [_series(name, one, pictures, effort, seed) for one in series],
-            }
-            for name, series in summaries(found).items()
-        ],
-    )
-    write(path, page)
-
-
-def _series(
-    name: str, one: SeriesSummary, pictures: Sequence[Picture], effort: Effort, seed: int
-) -> dict[str, Any]:
-    return {
-        "summary": one,
-        "cells": cells(name, one)[1:],
-        "definition": one.series,
-        "plots": [Markup(svg) for svg in of_series(one)],  # our own, not from outside
-        "pictures": [
-            (p.contestant, p.x, _url(p.path), p.caption)
-            for p in pictures
-            if (p.family, p.series) == (name, one.series.name)
-        ],
-        "rows": [
-            (f, contestant, f.outcomes[contestant], k == 0)
-            for f in one.found
-            for k, contestant in enumerate(contestants([f]))
-        ],
-        "failures": [
-            (f, contestant, f.outcomes[contestant].examples, again(f, effort, seed))
-            for f in one.found
-            for contestant in contestants([f])
-            if f.outcomes[contestant].examples
-        ],
-    }
-
-
-def _url(path: Path) -> str:
-    return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
 
 
 # ---- progress ------------------------------------------------------------------------------------

@@ -278,8 +278,8 @@ def judged_of_mitsuba(scenes: Sequence[Path]) -> Outcome:
 
 def _mitsubas(path: Path, _: str | None, clock: Any) -> dict[str, Any]:
     from comparisons import translator
+    from comparisons.mitsuba.context import UntranslatableError
     from comparisons.mitsuba.scene import picture
-    from comparisons.textures.translate import UntranslatableError
     from reference_rt.cli.options import adjusted
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.errors import ReferenceRtError

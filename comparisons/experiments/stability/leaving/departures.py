@@ -18,11 +18,11 @@ from reference_rt.core.ray import Hit, Ray, SurfacePoint
 from reference_rt.core.vec3 import Vec3, dot, frame_from_normal, row, to_world
 from reference_rt.jit.kernel import entry_kernel, kernel
 from reference_rt.jit.links import Linker
-from reference_rt.rendering.linking import linked_shapes
-from reference_rt.rendering.query.tracing import Linked, geometry_of, linked
+from reference_rt.rendering.linking import geometry_of, linked_shapes
+from reference_rt.rendering.query.tracing import Linked, linked
 from reference_rt.shapes import Shapes
 from reference_rt.shapes.meshes.watertight import shear_of
-from reference_rt.shapes.tables import TABLES
+from reference_rt.shapes.tables import TABLES, by_code
 
 
 class Ways(NamedTuple):
@@ -141,12 +141,15 @@ class Subject(NamedTuple):
         return getattr(self.geometry.shapes, self.field)
 
 
+_INTERSECT = frozenset((by_code.operations["intersect"],))
+
+
 def _geometry(scene: rt.Scene) -> tuple[Geometry, Linked]:
     tables = rt.build_tables(scene)
     geometry = tables.geometry
 
     def link(linker: Linker) -> tuple[Any, Any]:
-        shapes = linked_shapes(linker, geometry.shapes, ("intersect",))
+        shapes = linked_shapes(linker, geometry.shapes, _INTERSECT)
         return geometry_of(linker, geometry, ("closest_hit", "surface")), shapes
 
     return geometry, linked(tables, "leaving", link, (geometry, geometry.shapes))

@@ -1,0 +1,50 @@
+"""Pictures of a scene under each light alone, to recognise a lost or doubled light."""
+
+from collections.abc import Mapping
+
+from reference_rt.core.arrays import FloatArray
+from reference_rt.lights import Ambient
+from reference_rt.materials import AnyMaterial, Emissive
+from reference_rt.rendering.render import render
+from reference_rt.rendering.scene import Scene
+
+MOST = 8
+"""Number of lights above which a missing one is hard to recognise."""
+
+SAMPLES = 64
+"""Samples per pixel: enough to recognise a light in a difference."""
+
+DARK = (0.0, 0.0, 0.0)
+
+
+def single_lights(
+    scene: Scene, spp: int = SAMPLES, threads: int | None = None
+) -> Mapping[str, FloatArray]:
+    """Our picture (height, width, 3) under each light or emissive material alone, by its name;
+    empty if there are fewer than two, or more than MOST."""
+    shining = [name for name, m in scene.materials.items() if isinstance(m, Emissive)]
+    lights = [k for k, light in enumerate(scene.lights) if not isinstance(light, Ambient)]
+    if not 2 <= len(shining) + len(lights) <= MOST:
+        return {}
+    sampler = scene.resolved_sampler
+    if hasattr(sampler, "seed"):
+        sampler = sampler.model_copy(update={"spp": spp})
+    found = {}
+    for name in shining:
+        one = scene.changed(lights=(), materials=_only(scene, name), sampler=sampler)
+        found[f"the material '{name}'"] = render(one, threads=threads).colour
+    for k in lights:
+        light = scene.lights[k]
+        one = scene.changed(lights=(light,), materials=_only(scene, None), sampler=sampler)
+        found[f"lights[{k}] ({light.type})"] = render(one, threads=threads).colour
+    return found
+
+
+def _only(scene: Scene, name: str | None) -> dict[str, AnyMaterial]:
+    """The scene's materials; all emissive ones but `name` are dark."""
+    return {
+        other: material.model_copy(update={"radiance": DARK})
+        if isinstance(material, Emissive) and other != name
+        else material
+        for other, material in scene.materials.items()
+    }

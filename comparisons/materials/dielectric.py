@@ -1,0 +1,26 @@
+"""Smooth glass."""
+
+from comparisons.materials.glass import GLASS, look_of_glass, pbrt_glass, relative_index
+from comparisons.materials.material import Gltf, MaterialType
+from comparisons.mitsuba.plugin_table import PluginTable
+from comparisons.renderers.vocabulary import CyclesWriter, Data, only
+from reference_rt.materials import Dielectric
+
+TABLE = PluginTable("dielectric", Dielectric, GLASS)
+
+
+def _to_cycles(material: Dielectric, writing: CyclesWriter) -> Data:
+    only(material, reflectance=1.0, transmittance=1.0)
+    return {"type": "glass", "ior": relative_index(material), "roughness": 0.0}
+
+
+DIELECTRIC = MaterialType(
+    description=Dielectric,
+    to_mitsuba=TABLE.write,
+    from_mitsuba={"dielectric": TABLE.make},
+    note=None,
+    errors=None,
+    to_cycles=_to_cycles,
+    to_gltf=Gltf(look_of_glass, nearly="KHR_materials_transmission"),
+    to_pbrt=lambda material, writing, both_sides: pbrt_glass("dielectric", material),
+)

@@ -1,0 +1,19 @@
+"""Panes of glass."""
+
+from comparisons.materials.glass import GLASS, look_of_glass, pbrt_glass
+from comparisons.materials.material import Gltf, MaterialType
+from comparisons.mitsuba.plugin_table import PluginTable
+from reference_rt.materials import ThinDielectric
+
+TABLE = PluginTable("thindielectric", ThinDielectric, GLASS)
+
+THIN_DIELECTRIC = MaterialType(
+    description=ThinDielectric,
+    to_mitsuba=TABLE.write,
+    from_mitsuba={"thindielectric": TABLE.make},
+    note=None,
+    errors=None,
+    to_cycles=None,
+    to_gltf=Gltf(look_of_glass, nearly="KHR_materials_transmission"),
+    to_pbrt=lambda material, writing, both_sides: pbrt_glass("thindielectric", material),
+)

@@ -1,0 +1,108 @@
+"""Checkers: Mitsuba's checkerboard, or an image of four texels where its colours are too bright."""
+
+from typing import Any
+
+import numpy as np
+
+from comparisons.geometry import affine
+from comparisons.mitsuba.colours import SPECTRA, colour
+from comparisons.mitsuba.colours import luminance as luminance_of
+from comparisons.mitsuba.context import TranslationContext, rgb
+from comparisons.mitsuba.node import Node, Reading
+from comparisons.renderers.vocabulary import (
+    NEAREST,
+    WRAPS,
+    CyclesWriter,
+    Data,
+    GltfImage,
+    GltfWriter,
+    Params,
+    PbrtWriter,
+    plain_rgb,
+)
+from comparisons.textures.bitmap import in_memory_or_file, lookup, pbrt_uv
+from comparisons.textures.texture import TextureType, Use, to_uv, uv_of
+from reference_rt.core.vec3 import Vec3, luminance
+from reference_rt.textures import Checker
+
+FIELDS = {"color0": 0.4, "color1": 0.2}
+"""The fields of a checkerboard, and Mitsuba's defaults."""
+
+
+def _to_mitsuba(
+    texture: Checker, name: str, context: TranslationContext, use: Use
+) -> dict[str, Any]:
+    first, second = texture.first, texture.second
+    if max(*first, *second) > 1.0:
+        # Mitsuba's checkerboard limits its colours to reflectances; an image of four texels is the
+        # same texture.
+        four = in_memory_or_file(_texels(texture), "checker", context, use.as_number)
+        return lookup(four, "nearest", "repeat", to_uv(texture.uv, context, use, is_image=True))
+    places: tuple[Any, Any] = (rgb(first), rgb(second))
+    if use.as_number:
+        # Mitsuba's `eval_1` swaps the two colours of its `eval` (3.9.1).
+        places = (rgb(second), rgb(first))
+        if context.files is None:
+            places = (float(luminance(Vec3(*second))), float(luminance(Vec3(*first))))
+    fields = dict(zip(FIELDS, places, strict=True))
+    return {"type": "checkerboard", **fields, **to_uv(texture.uv, context, use, is_image=False)}
+
+
+def _texels(texture: Checker) -> Any:
+    first, second = texture.first, texture.second
+    return np.array([[second, first], [first, second]])
+
+
+def _from_mitsuba(reading: Reading, node: Node, use: Use) -> Checker:
+    first, second = (colour(node, key, default) for key, default in FIELDS.items())
+    if use.as_number:
+        # Mitsuba's `eval_1` exchanges the two colours of its `eval` (src/textures/checkerboard.cpp,
+        # 3.9.1).
+        first, second = (luminance_of(second),) * 3, (luminance_of(first),) * 3
+    return Checker(first=first, second=second, uv=uv_of(node, use, is_image=False))
+
+
+def is_checker_of_textures(node: Node) -> bool:
+    return node.plugin == "checkerboard" and any(
+        child.plugin not in SPECTRA for child in node.clone().children("Texture")
+    )
+
+
+def fields_of(node: Node) -> Checker:
+    """0 in the fields `color0` of a checkerboard, 1 in the others."""
+    node.ignore(*FIELDS)
+    uv = uv_of(node, Use(), is_image=False)
+    node.finish()
+    return Checker(first=(0.0, 0.0, 0.0), second=(1.0, 1.0, 1.0), uv=uv)
+
+
+def _to_cycles(texture: Checker, writing: CyclesWriter) -> Data:
+    uv = affine.of_uv(texture.uv)[:2].tolist()
+    colours = {"first": plain_rgb(texture.first), "second": plain_rgb(texture.second)}
+    return {"type": "checker", "uv": uv, **colours}
+
+
+def _to_gltf(texture: Checker, name: str, writing: GltfWriter) -> GltfImage:
+    texels = _texels(texture)
+    sampler = {"magFilter": NEAREST, "minFilter": NEAREST}
+    sampler |= {"wrapS": WRAPS["repeat"], "wrapT": WRAPS["repeat"]}
+    return GltfImage(texels, float(texels.max()) or 1.0, affine.of_uv(texture.uv), sampler)
+
+
+def _to_pbrt(texture: Checker, name: str, kind: str, writing: PbrtWriter) -> tuple[str, Params]:
+    """pbrt's fields have side 1, ours 1/2."""
+    pair: tuple[Any, ...] = (texture.first, texture.second)
+    if kind == "float":
+        pair = tuple(float(luminance(Vec3(*one))) for one in pair)
+    colours = {f"{kind} tex{k}": value for k, value in enumerate(pair, 1)}
+    return "checkerboard", {**pbrt_uv(texture, 2.0), **colours}
+
+
+CHECKER = TextureType(
+    description=Checker,
+    to_mitsuba=_to_mitsuba,
+    from_mitsuba={"checkerboard": _from_mitsuba},
+    to_cycles=_to_cycles,
+    to_gltf=_to_gltf,
+    to_pbrt=_to_pbrt,
+)

@@ -1,0 +1,34 @@
+"""Examples of every type of a scene's parts, from the types' own files, and what they name."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from reference_rt.core.model import types_of
+from reference_rt.core.transform import Scale
+from reference_rt.materials import Diffuse, Mirror
+from reference_rt.shapes import Box, Sphere
+from reference_rt.textures import Bitmap
+
+NAMED: dict[str, dict[str, Any]] = {
+    "textures": {
+        "texture": Bitmap(file="image.npy", encoding="raw"),
+        "small": Bitmap(file="image.npy", encoding="raw", scale=0.25),
+    },
+    "materials": {"base": Diffuse(), "other": Mirror()},
+    "groups": {"group": (Sphere(radius=0.8), Box(transform=(Scale(scale=0.5),)))},
+}
+"""Fields of a scene with all that examples name but files."""
+
+
+def write_files(folder: Path) -> None:
+    """The files that examples name: an image, and the maps of two copies."""
+    np.save(folder / "image.npy", np.linspace(0.1, 0.9, 12 * 3).reshape(3, 4, 3))
+    np.save(folder / "copies.npy", np.stack([np.eye(4)[:3], 0.5 * np.eye(4)[:3]]))
+
+
+def examples(kind: Any) -> list[Any]:
+    """All examples of a type, or of the types of a union such as `AnyShape`, in its order."""
+    types: Any = [kind] if isinstance(kind, type) else types_of(kind)
+    return [of(**fields) for of in types for fields in of.EXAMPLES]

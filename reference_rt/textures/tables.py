@@ -1,0 +1,44 @@
+"""The register of textures: their descriptions, and the tables that hold them.
+
+A new texture has a line in `AnyTexture` and one in `Textures`; all else follows from these two.
+Its import as itself makes it a name of `reference_rt.textures`.
+"""
+
+from typing import Annotated, Any, NamedTuple, get_args
+
+from pydantic import Field
+
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.jit.by_code import ByCode, described_in, tables_of
+from reference_rt.textures import bitmap, checker, product, vertex_colours
+from reference_rt.textures.bitmap import Bitmap as Bitmap
+from reference_rt.textures.checker import Checker as Checker
+from reference_rt.textures.product import Product as Product
+from reference_rt.textures.vertex_colours import VertexColours as VertexColours
+
+AnyTexture = Annotated[Checker | Bitmap | VertexColours | Product, Field(discriminator="type")]
+
+
+class Textures(NamedTuple):
+    """kind (n,), row (n,): the table and row of each texture;  uv (n, 6): its map, see `UvMap`;  a
+    table for each type, None for types that the scene lacks."""
+
+    kind: IntArray
+    row: IntArray
+    uv: FloatArray
+    checkers: Annotated[checker.Checkers | None, checker]
+    bitmaps: Annotated[bitmap.Bitmaps | None, bitmap]
+    vertex_colours: Annotated[vertex_colours.VertexColourTable | None, vertex_colours]
+    products: Annotated[product.Products | None, product] = None
+
+
+TABLES: tuple[tuple[int, str, Any, Any], ...] = tuple(
+    (code, field, described_in(module, get_args(AnyTexture)[0]), module)
+    for code, field, _, module in tables_of(Textures)
+)
+"""(code, field of Textures, description, module), in the order of the codes, `Textures.kind`."""
+
+_CODES = {module: code for code, _, _, module in TABLES}
+CHECKER, BITMAP, PRODUCT = _CODES[checker], _CODES[bitmap], _CODES[product]
+
+by_code = ByCode((code, field, module) for code, field, _, module in TABLES)
