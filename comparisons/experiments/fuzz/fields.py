@@ -1,18 +1,18 @@
 """Random values for the fields of a description, from its JSON Schema."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from itertools import combinations
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 from comparisons.experiments.fuzz.finding import Data, shapes_of
 from reference_rt.cameras import AnyCamera
 from reference_rt.cameras.film import AnyFilter
-from reference_rt.core.model import Description
+from reference_rt.core.model import Description, types_of
 from reference_rt.core.transform import Step
 from reference_rt.integrators import AnyIntegrator
 from reference_rt.lights import AnyLight
@@ -55,15 +55,6 @@ GROUPS: dict[str, tuple[str, ...]] = {
 """Names for several types, which `--features` takes beside the names of types."""
 
 
-def _classes(annotation: Any) -> Iterator[type[Description]]:
-    if isinstance(annotation, type):
-        yield annotation
-        return
-    for part in get_args(annotation):
-        if isinstance(part, type) or get_args(part):
-            yield from _classes(part)
-
-
 def name_of(cls: type[Description]) -> str:
     """The word for a type in scene files: its `type`, or the only key of a transform step."""
     fields = cls.model_fields
@@ -73,8 +64,9 @@ def name_of(cls: type[Description]) -> str:
 @cache
 def types(kind: str) -> dict[str, type[Description]]:
     """The types of a kind by name."""
-    found = (c for c in _classes(KINDS[kind]) if issubclass(c, Description))
-    return {name_of(c): c for c in found}
+    # Steps of transforms are tagged.
+    classes = (getattr(some, "__origin__", some) for some in types_of(KINDS[kind]))
+    return {name_of(c): c for c in classes}
 
 
 @cache
