@@ -2,7 +2,7 @@
 
 Law.
 - closed: in a room whose walls emit 1 and reflect a, 1 / (1 - a) arrives from everywhere: the mean
-  of 1024 pixels, to its noise (see `harness.worlds`) and to a tenth.  Both trace with Russian
+  of 1024 pixels, to its noise (see `harness.chance`) and to a tenth.  Both trace with Russian
   roulette from the fifth edge on.  Ours goes on with a chance of up to 0.999, Mitsuba of up to
   0.95: beyond an albedo of 0.975 the variance of its weights is infinite.
 - open: a surface under a white sky sends back, in power, no more than arrives: the mean of weights
@@ -25,7 +25,7 @@ import math
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness import worlds
+from comparisons.experiments.stability.harness import chance
 from comparisons.experiments.stability.harness.bsdfs import (
     ALPHA,
     LOSSLESS,
@@ -33,9 +33,9 @@ from comparisons.experiments.stability.harness.bsdfs import (
     Bsdf,
     contestants,
     index_of,
-    integral,
     towards,
 )
+from comparisons.experiments.stability.harness.half_vectors import integral
 from comparisons.experiments.stability.harness.outcomes import (
     MITSUBA,
     OURS,
@@ -149,7 +149,7 @@ def open_furnace(draw: Draw, x: float) -> Outcomes:
                 )
                 # Half vectors in floats move densities by a few u / (alpha cos).
                 rounding = 64.0 * unit_of(who) * (1.0 + 1.0 / (own * cosine))
-                allowed = worlds.bernstein(error, most, draw.cases) + rounding
+                allowed = chance.bernstein(error, most, draw.cases) + rounding
                 off = max(0.0, mean - 1.0 - allowed)
                 if not math.isnan(total):
                     off = max(

@@ -8,7 +8,7 @@ from stability_runs import measured
 
 import reference_rt as rt
 from comparisons.experiments.stability.far import curved, spheres
-from comparisons.experiments.stability.far.spheres import BAND, Truth, gaps, judge_by_moving
+from comparisons.experiments.stability.far.law import BAND, Truth, gaps, judge_by_moving
 from comparisons.experiments.stability.harness.outcomes import OURS, U
 from comparisons.experiments.stability.harness.rays import Rays
 from comparisons.experiments.stability.harness.series import family

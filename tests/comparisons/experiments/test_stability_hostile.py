@@ -11,8 +11,8 @@ from comparisons.experiments.fuzz.assets import files, write, write_files
 from comparisons.experiments.stability.harness.solids import Stretch, Truth
 from comparisons.experiments.stability.harness.solids import problem as list_problem
 from comparisons.experiments.stability.hostile import worker
+from comparisons.experiments.stability.hostile.bases import BASES
 from comparisons.experiments.stability.hostile.damage import (
-    BASES,
     as_text,
     damaged,
     deep,

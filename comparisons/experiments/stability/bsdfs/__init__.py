@@ -10,7 +10,7 @@ Law.
   g)) of a half vector h: what rounding a direction to floats changes D, the cosines and Fresnel's
   root by.
 - bounds: everything is finite; no sample of a metal or a glass weighs more than 1 in power.
-- densities: samples have the stated density (chi-square, at the level of `harness.worlds`), and it
+- densities: samples have the stated density (chi-square, at the level of `harness.chance`), and it
   integrates to at most 1, up to what two rules of quadrature differ by;
 - digits: Fresnel's R and T, the distribution D and the masking G1 are the exact
   formulae of the very floats, evaluated in 300 bits, to 64 u of their value, plus what moving the

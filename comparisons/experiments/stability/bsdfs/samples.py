@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from comparisons.experiments.stability.harness import worlds
+from comparisons.experiments.stability.harness import chance
 from comparisons.experiments.stability.harness.bsdfs import (
     ALPHA,
     EVEN,
@@ -12,10 +12,10 @@ from comparisons.experiments.stability.harness.bsdfs import (
     SMOOTH,
     Bsdf,
     contestants,
-    fit,
     index_of,
     towards,
 )
+from comparisons.experiments.stability.harness.half_vectors import fit
 from comparisons.experiments.stability.harness.outcomes import (
     FloatArray,
     Outcomes,
@@ -153,7 +153,7 @@ def densities(draw: Draw, x: float) -> Outcomes:
                 # A density that integrates to more than 1 is none.  Half vectors in float32 move it
                 # by a few u / alpha at this cosine.
                 over = f.integral - 1.0 - f.doubt - 16.0 * unit_of(who) * x / wo[2]
-                ok = f.p_value >= worlds.LEVEL and over <= 0.0
+                ok = f.p_value >= chance.LEVEL and over <= 0.0
                 shown = {"material": name, "wo": hexed(wo), "alpha": 1.0 / x}
                 shown |= {"p-value": f.p_value, "integral": f.integral}
                 part[who] = one_case(not ok, None, shown)

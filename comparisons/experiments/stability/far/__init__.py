@@ -30,7 +30,7 @@ from functools import partial
 import numpy as np
 
 from comparisons.experiments.stability.far import curved, spheres
-from comparisons.experiments.stability.far.curved import shoot
+from comparisons.experiments.stability.far.seen import shoot
 from comparisons.experiments.stability.harness.outcomes import FloatArray, Outcomes, together
 from comparisons.experiments.stability.harness.series import Draw, Family, Sweep, decades, series
 

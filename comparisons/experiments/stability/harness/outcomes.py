@@ -137,3 +137,20 @@ def together(parts: Iterable[Outcomes]) -> dict[str, Outcome]:
         for name, one in part.items():
             total[name] = total[name] + one if name in total else one
     return total
+
+
+def same_bits(expected: FloatArray, found: FloatArray) -> Outcome:
+    """A case a pixel; worst: the largest relative difference, inf for NaN, which always fails."""
+    other = (expected != found).any(axis=-1)
+    size = np.maximum(np.abs(expected), np.abs(found))
+    off = np.abs(expected - found) / np.where(size > 0.0, size, 1.0)
+    off = np.where(np.isnan(off), np.inf, off)
+    return of_pixels(other, {"expected": expected, "found": found}, float(off.max()))
+
+
+def of_pixels(wrong: BoolArray, pictures: Mapping[str, FloatArray], worst: float) -> Outcome:
+    """wrong (height, width): a case a pixel;  pictures: (height, width, c), of which the examples
+    show the pixels."""
+    y, x = (index.ravel() for index in np.indices(wrong.shape))
+    columns = {name: pixels.reshape(wrong.size, -1) for name, pixels in pictures.items()}
+    return outcome(wrong.ravel(), {"pixel": np.column_stack([x, y]), **columns}, worst=worst)

@@ -17,14 +17,14 @@ Passes.  No failure.
 
 How.  Scenes go to child processes (`worker`), which do as
 `reference-rt render` does (8 x 8 pixels, one sample), so that one that dies takes no other with it.
-Values change in a few fixed scenes (`damage`), whose compiled kernels stay the same; where they do
+Values change in a few fixed scenes (`bases`), whose compiled kernels stay the same; where they do
 not, and where the structure changes (`damage`), plain Python runs the same code
 (NUMBA_DISABLE_JIT=1), bit-identical and without seconds of compiling.
 
 To reproduce a failure: its scene is in the examples as text, or else the file's bytes in base 64;
 `reference-rt render scene.json -o out.exr --size 8x8 --spp 1`.
 
-`files` and `rays` have the cases, `damage` makes them."""
+`files` and `rays` have the cases; `damage` makes them of `bases`."""
 
 from comparisons.experiments.stability.harness.series import Family
 from comparisons.experiments.stability.hostile import files, rays

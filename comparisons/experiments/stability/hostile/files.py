@@ -18,9 +18,8 @@ from comparisons.experiments.stability.harness.outcomes import (
     Outcomes,
 )
 from comparisons.experiments.stability.harness.series import Draw, Sweep, series
+from comparisons.experiments.stability.hostile.bases import BASES, PLAIN
 from comparisons.experiments.stability.hostile.damage import (
-    BASES,
-    PLAIN,
     YAML_PIECES,
     as_text,
     as_yaml,

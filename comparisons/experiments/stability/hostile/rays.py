@@ -19,7 +19,8 @@ from comparisons.experiments.stability.harness.outcomes import (
     outcome,
 )
 from comparisons.experiments.stability.harness.series import Draw, Sweep, alone, series
-from comparisons.experiments.stability.hostile.damage import BASES, NUMBERS, as_text
+from comparisons.experiments.stability.hostile.bases import BASES
+from comparisons.experiments.stability.hostile.damage import NUMBERS, as_text
 from comparisons.geometry.exact.dyadic import BoolArray
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections

@@ -179,9 +179,6 @@ def depart(subject: Subject, rays: Rays, ways: Ways, epsilon: float = 0.0) -> De
     return Departures.of(out)
 
 
-# ---- Mitsuba's rays that leave a surface: `si.spawn_ray` -----------------------------------------
-
-
 MITSUBA_KINDS = ("sphere", "rectangle", "disk", "triangle", "box", "cylinder", "mesh", "instance")
 """Kinds that it has itself, without proxy geometry."""
 

@@ -37,8 +37,14 @@ import reference_rt as rt
 from comparisons.experiments import relations
 from comparisons.experiments.relations import Motion, moved
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.outcomes import OURS, FloatArray, Outcomes, together
-from comparisons.experiments.stability.harness.scenes import SIZE, same_bits
+from comparisons.experiments.stability.harness.outcomes import (
+    OURS,
+    FloatArray,
+    Outcomes,
+    same_bits,
+    together,
+)
+from comparisons.experiments.stability.harness.scenes import SIZE
 from comparisons.experiments.stability.harness.series import Draw, Family, Sweep, decades, series
 from comparisons.experiments.stability.harness.steps import matrix
 from comparisons.experiments.stability.metamorphic import light, rays

@@ -17,8 +17,9 @@ from comparisons.experiments.stability.harness.outcomes import (
     FloatArray,
     Outcome,
     Outcomes,
+    of_pixels,
 )
-from comparisons.experiments.stability.harness.scenes import SIZE, of_pixels
+from comparisons.experiments.stability.harness.scenes import SIZE
 from comparisons.experiments.stability.harness.series import Draw
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.frame import UNIT_ROUNDOFF as U32

@@ -10,7 +10,7 @@ Law, u = 2^-53 (Mitsuba: its own u = 2^-24, and numbers that float32 holds).
   of a sample, by Gauss's rule with 20² nodes, to 64 u times the condition of van Oosterom and
   Strackee's denominator, and what the rule leaves in doubt, up to 1 %;
 - lamps of areas 1e-12 to 1e12 light a floor, seen under one angle, as the closed form says, and so
-  do lamps of radiance 1e-30 to 1e30: within their noise (`harness.worlds`) and to a tenth, finite;
+  do lamps of radiance 1e-30 to 1e30: within their noise (`harness.chance`) and to a tenth, finite;
 - paths with roulette at every bounce gather (1 - a^n) / (1 - a) in n edges of a closed furnace, n
   to 1e3, within their noise and to a tenth.
 
