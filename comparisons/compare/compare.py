@@ -184,9 +184,7 @@ def _gather(
         seconds,
         tuple(notes),
         left_out,
-        lights=None
-        if scene.integrator.deterministic
-        else partial(single_lights, judged_by),
+        lights=None if scene.integrator.deterministic else partial(single_lights, judged_by),
         lengths=path_lengths(judged_by, threads),
         looks=looked,
         ray_starts=None

@@ -30,6 +30,7 @@ from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import UsageError
 
+
 @dataclass(frozen=True)
 class Request:
     """Candidates are compared with `references`, else a baseline, else our rendering of the scene.
@@ -217,7 +218,11 @@ class Judge:
         if curve is not None and lengths is not None:
             lengths = self._through(curve, lengths)
         # Pictures of single lights do not add up behind a curve.
-        lights = None if known is None or curve else partial(single_lights, known, threads=request.threads)
+        lights = (
+            None
+            if known is None or curve
+            else partial(single_lights, known, threads=request.threads)
+        )
         question = Question(
             request.limit, request.name, lights, lengths, edges, self._witness(), request.rim
         )

@@ -11,8 +11,8 @@ from comparisons.gate.edges import RULES, Edges, edges_rung, look_at
 from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import of_scene
-from comparisons.results.case import RungResult
 from comparisons.report.biases import biases_of
+from comparisons.results.case import RungResult
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.image import srgb
 from reference_rt.rendering.render import render

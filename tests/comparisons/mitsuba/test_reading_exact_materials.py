@@ -9,7 +9,8 @@ from mitsuba_dicts import theirs_along
 from PIL import Image
 
 from comparisons.mitsuba.backend import backend
-from comparisons.translator.reading import read_file, reference
+from comparisons.translator import reference
+from comparisons.translator.reading import read_file
 from comparisons.translator.reference import changes_to, own_scene
 from reference_rt.rendering.scene import Scene
 

@@ -14,9 +14,10 @@ from mitsuba_rows import bitmap, rgb
 from PIL import Image
 from test_reading_plugins import fast, filled
 
+from comparisons.mitsuba import included
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.included import PRIMAL
-from comparisons.translator.reading import included, read_file
+from comparisons.translator.reading import read_file
 from comparisons.translator.reference import changes_to, own_scene
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneError, SceneWarning
