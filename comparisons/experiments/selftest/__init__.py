@@ -5,8 +5,8 @@ source (`of_sources`, and `of_readers`: faults that both renderers would share),
 suite's budgets; a `fault.Finding` says whether a fault was caught, and at which rung.  `power`: the
 fraction of runs that catch a fault, by its size; `calibration`: how often the bias that a verdict
 states as detectable is detected.  `mutation`: random changes of the kernels (`mutants`), and what
-the rungs say to them.  `specificity`: right renderers of twelve kinds (`right`) are judged with many
-seeds, and false alarms are counted.
+the rungs say to them.  `specificity`: right renderers of twelve kinds (`right`) are judged with
+many seeds, and false alarms are counted.
 
 To add a fault of pictures: a function with `planted`, or a row of `FAULTS`, in `of_pictures`.  Of
 scenes and sources: a row of their tables, which says what is planted, where, and if one rung must
