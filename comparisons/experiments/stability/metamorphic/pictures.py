@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 import reference_rt as rt
-from comparisons.experiments.relations import Motion, moved
+from comparisons.experiments.relations import Motion, differ, moved
 from comparisons.experiments.stability.harness import scenes
 from comparisons.experiments.stability.harness.outcomes import OURS, FloatArray
 from comparisons.experiments.stability.harness.shots import Shot
@@ -53,7 +53,7 @@ def shoot_rays(motion: Callable[[float], Motion], contestant: str, x: float) -> 
             else:
                 answers.append(rays.mitsubas(other, o, d))
     first, found = answers
-    wrong = rays.differ(first, found)
+    wrong = differ(first.identities, found.identities)
     # A colour a face: the golden ratio spreads hues.
     face = first.identities @ (7, 5, 3, 1)
     hue = np.mod(face[:, None] * 0.618 + np.array([0.0, 0.33, 0.67]), 1.0)
