@@ -20,7 +20,6 @@ from comparisons.experiments.fuzz.planted import Planted, feature_of, source_fau
 from comparisons.experiments.fuzz.planted import summary as planted_summary
 from comparisons.experiments.fuzz.run import Plan, run
 from comparisons.experiments.fuzz.summary import write_page
-from comparisons.experiments.selftest.sensitivity import patched_text
 from reference_rt.scene.model import SceneModel
 from reference_rt.util.errors import UsageError
 from reference_rt.util.workers import Threads
@@ -135,10 +134,7 @@ def test_the_command_refuses_what_it_does_not_know(tmp_path):
         assert said in " ".join(result.output.split())
 
 
-def test_every_source_fault_can_be_planted():
-    assert len(source_faults()) >= 15
-    for fault in source_faults():
-        assert patched_text(fault)
+def test_planted_faults_name_the_type_that_scenes_must_have():
     features = {feature_of(fault) for fault in source_faults()}
     assert {"", "sphere", "dielectric", "environment_map"} <= features
     known(tuple(features - {""}))
