@@ -4,8 +4,9 @@ import math
 from typing import Any
 
 import numpy as np
-from flint import arb, ctx
+from flint import arb
 
+from comparisons.experiments.stability.harness.exactly import cross, dot, exactly
 from comparisons.experiments.stability.harness.outcomes import (
     MITSUBA,
     OURS,
@@ -65,20 +66,12 @@ def point_light(draw: Draw, x: float) -> Outcomes:
     found = {OURS: (np.array([s.radiance.x for s in sampled]), np.array([s.wi for s in sampled]))}
     if draw.mitsuba:
         found[MITSUBA] = _theirs({"type": "point", "position": [0, 0, 0], "intensity": 1.0}, p)
-    with ctx.workprec(200):
-        squares = [sum((arb(c) * arb(c) for c in at), arb(0)) for at in p.tolist()]
-        exact = np.array([float(1 / s) for s in squares])
-        towards = np.array(
-            [
-                [float(-arb(c) / s.sqrt()) for c in at]
-                for at, s in zip(p.tolist(), squares, strict=True)
-            ]
-        )
+    exact, *towards = exactly(_arriving, p).T
     outcomes = {}
     for who, (arriving, wi) in found.items():
         with np.errstate(invalid="ignore"):
             errors = np.maximum(
-                np.abs(arriving - exact) / exact, np.linalg.norm(wi - towards, axis=1)
+                np.abs(arriving - exact) / exact, np.linalg.norm(wi - np.transpose(towards), axis=1)
             )
         shown = {"light": "at the origin", "point": p, "irradiance": plain(exact)}
         outcomes[who] = of_errors(errors, 8.0 * unit_of(who), shown | {"found": plain(arriving)})
@@ -139,15 +132,17 @@ def spot_light(draw: Draw, x: float) -> Outcomes:
     return outcomes
 
 
+def _arriving(at: list[arb]) -> tuple[arb, ...]:
+    """1 / d², and the direction to the origin."""
+    square = dot(at, at)
+    return 1 / square, *(-c / square.sqrt() for c in at)
+
+
 def _falloffs(target: FloatArray, cutoff: float, p: FloatArray) -> FloatArray:
-    found = []
-    with ctx.workprec(200):
-        a = [arb(c) for c in target.tolist()]
-        end = arb(cutoff) * arb.pi() / 180
-        for at in p.tolist():
-            w = [arb(c) for c in at]
-            c = [a[k - 2] * w[k - 1] - a[k - 1] * w[k - 2] for k in range(3)]
-            sine = sum((v * v for v in c), arb(0)).sqrt()
-            angle = arb.atan2(sine, sum((v * u for v, u in zip(a, w, strict=True)), arb(0)))
-            found.append(min(1.0, max(0.0, float((end - angle) / (end / 4)))))
-    return np.array(found)
+    def formula(w: list[arb]) -> float:
+        a, end = [arb(c) for c in target.tolist()], arb(cutoff) * arb.pi() / 180
+        normal = cross(a, w)
+        angle = arb.atan2(dot(normal, normal).sqrt(), dot(a, w))
+        return min(1.0, max(0.0, float((end - angle) / (end / 4))))
+
+    return exactly(formula, p)

@@ -5,8 +5,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from flint import arb, ctx
+from flint import arb
 
+from comparisons.experiments.stability.harness.exactly import cross, dot, exactly
 from comparisons.experiments.stability.harness.meshes import mitsuba_mesh
 from comparisons.experiments.stability.harness.outcomes import (
     MITSUBA,
@@ -63,18 +64,18 @@ def theirs(shape: dict[str, Any] | Any, p: FloatArray, u: FloatArray) -> FloatAr
     return np.asarray(for_rays(density, points, numbers)[0].reshape(u.shape[:2]))
 
 
+def _cap(at: list[arb]) -> tuple[arb, arb]:
+    """The solid angle of the unit sphere, and the cosine of half its cone."""
+    d2 = dot(at, at)
+    cosine = (1 - 1 / d2).sqrt() if d2 > 1 else arb(0)
+    return 2 * arb.pi() * (1 / d2) / (1 + cosine), cosine
+
+
 def _sphere(draw: Draw, gap: FloatArray, shared: bool) -> Outcomes:
     """The unit sphere from 1 + gap."""
     p = np.ascontiguousarray(unit_vectors(draw.rng, len(gap)) * (1.0 + gap)[:, None])
     p = round32(p) if shared else p
-    exact, cosines = [], []
-    with ctx.workprec(300):
-        for at in p.tolist():
-            d2 = sum((arb(c) * arb(c) for c in at), arb(0))
-            cosine = (1 - 1 / d2).sqrt() if d2 > 1 else arb(0)
-            exact.append(float(2 * arb.pi() * (1 / d2) / (1 + cosine)))
-            cosines.append(float(cosine))
-    truth, cosine = np.array(exact), np.array(cosines)
+    truth, cosine = exactly(_cap, p).T
     out = np.empty((len(p), 1))
     u = draw.rng.uniform(0.0, 1.0, (len(p), 1, 2))
     _of_sphere(Sphere().tabulate(TabulationContext()), p, u, out)
@@ -162,13 +163,8 @@ def rule(n: int) -> tuple[FloatArray, FloatArray]:
     return both, product / math.fsum(product)
 
 
-def _triangle_angle(a: Any, b: Any, c: Any) -> tuple[arb, float]:
+def _triangle_angle(a: list[arb], b: list[arb], c: list[arb]) -> tuple[arb, float]:
     """The solid angle of a triangle seen from the origin, and the condition of its denominator."""
-
-    def dot(p: Any, q: Any) -> arb:
-        return sum((s * t for s, t in zip(p, q, strict=True)), arb(0))
-
-    n = [b[k - 2] * c[k - 1] - b[k - 1] * c[k - 2] for k in range(3)]
     lengths = [dot(v, v).sqrt() for v in (a, b, c)]
     terms = [
         lengths[0] * lengths[1] * lengths[2],
@@ -177,7 +173,7 @@ def _triangle_angle(a: Any, b: Any, c: Any) -> tuple[arb, float]:
         dot(c, a) * lengths[1],
     ]
     total = sum(terms, arb(0))
-    volume = abs(dot(a, n))
+    volume = abs(dot(a, cross(b, c)))
     size = float(sum((abs(t) for t in terms), arb(0)))
     # Of atan2: the larger of the two sides counts.
     return 2 * arb.atan2(volume, total), size / max(abs(float(total)), float(volume))
@@ -185,16 +181,17 @@ def _triangle_angle(a: Any, b: Any, c: Any) -> tuple[arb, float]:
 
 def _exact(corners: Any, p: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(n,) solid angles of a convex polygon, and their conditions."""
-    angles, conditions = [], []
-    with ctx.workprec(300):
-        for at in p.tolist():
-            seen = [[arb(c) - arb(o) for c, o in zip(v, at, strict=True)] for v in corners]
-            parts = [
-                _triangle_angle(seen[0], seen[k], seen[k + 1]) for k in range(1, len(seen) - 1)
-            ]
-            angles.append(float(sum((part[0] for part in parts), arb(0))))
-            conditions.append(max(part[1] for part in parts))
-    return np.array(angles), np.array(conditions)
+
+    def formula(at: list[arb]) -> tuple[arb, float]:
+        seen = [[arb(c) - o for c, o in zip(v, at, strict=True)] for v in corners]
+        angles, conditions = zip(
+            *(_triangle_angle(seen[0], *seen[k : k + 2]) for k in range(1, len(seen) - 1)),
+            strict=True,
+        )
+        return sum(angles, arb(0)), max(conditions)
+
+    angles, conditions = exactly(formula, p).T
+    return angles, conditions
 
 
 def _points(rng: np.random.Generator, n: int, x: float) -> FloatArray:
