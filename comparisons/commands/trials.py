@@ -295,9 +295,10 @@ def fuzz(
     """
     with compare_extra("fuzzing"):
         from comparisons.experiments.fuzz import summary
-        from comparisons.experiments.fuzz.fields import features as known
-        from comparisons.experiments.fuzz.finding import RUNGS, Effort, Grammar, remove
+        from comparisons.experiments.fuzz.finding import RUNGS, Effort, Grammar
+        from comparisons.experiments.fuzz.results import remove
         from comparisons.experiments.fuzz.run import Plan, run
+        from comparisons.experiments.fuzz.schema import features as known
         from comparisons.experiments.fuzz.summary import Display, write_page
         from comparisons.runs.provenance import provenance
     from reference_rt.cli.options import Where

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from comparisons.experiments.fuzz import assets, parts
-from comparisons.experiments.fuzz.fields import GROUPS, Draw, Names, kind_of, rounded, types, values
-from comparisons.experiments.fuzz.finding import Data, Grammar, text_of
+from comparisons.experiments.fuzz.data import Data, text_of
+from comparisons.experiments.fuzz.fields import Draw, Names, rounded, values
+from comparisons.experiments.fuzz.finding import Grammar
 from comparisons.experiments.fuzz.parts import REACH, RefusedError
+from comparisons.experiments.fuzz.schema import GROUPS, kind_of, types
 from reference_rt.integrators import RayCast
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene

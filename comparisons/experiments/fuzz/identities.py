@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.experiments import relations
-from comparisons.experiments.fuzz.finding import Data, Finding, named_in, shapes_of
+from comparisons.experiments.fuzz.data import Data, named_in, shapes_of
+from comparisons.experiments.fuzz.finding import Finding
 from comparisons.experiments.relations import HIERARCHIES, REACH, Motion, differ, identities_of
 from comparisons.geometry.frame import Frame
 from comparisons.geometry.sizes import ShapeSizes

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.fuzz.assets import mesh
-from comparisons.experiments.fuzz.fields import Draw, Names, rounded, types, values
-from comparisons.experiments.fuzz.finding import Data, text_of
+from comparisons.experiments.fuzz.data import Data, text_of
+from comparisons.experiments.fuzz.fields import Draw, Names, rounded, values
+from comparisons.experiments.fuzz.meshes import mesh
+from comparisons.experiments.fuzz.schema import types
 from reference_rt.core.model import Description
 from reference_rt.materials import Emissive, Wrapper
 from reference_rt.rendering.scene import Scene

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
 
-from comparisons.experiments.fuzz.fields import all_types
+from comparisons.experiments.fuzz.schema import all_types
 from comparisons.experiments.selftest import FAULTS
 from comparisons.experiments.selftest.fault import SourceFault, patched
 from comparisons.experiments.selftest.sensitivity import patched_text

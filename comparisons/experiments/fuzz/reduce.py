@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
-from comparisons.experiments.fuzz.finding import Data, copy_of, named_in, shapes_of, text_of
+from comparisons.experiments.fuzz.data import Data, copy_of, named_in, shapes_of, text_of
 
 # ---- structure: an edit may yield invalid scenes ------------------------------------------------
 

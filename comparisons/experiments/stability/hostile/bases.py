@@ -1,7 +1,7 @@
 """Sound scenes, out of which hostile ones are made."""
 
 from comparisons.experiments.fuzz.assets import COPIES
-from comparisons.experiments.fuzz.finding import Data
+from comparisons.experiments.fuzz.data import Data
 
 _TURN = {"rotate": {"axis": [1.0, 2.0, 3.0], "degrees": 33.0}}
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from comparisons.experiments.fuzz.assets import FILES, MESHES
+from comparisons.experiments.fuzz.data import named_in
 from comparisons.experiments.fuzz.fields import Draw
-from comparisons.experiments.fuzz.finding import named_in
 from comparisons.experiments.fuzz.generate import Assembly
 
 Way = tuple[str | int, ...]
