@@ -78,3 +78,25 @@ def copy_of(data: Any) -> Any:
     if isinstance(data, list | tuple):
         return [copy_of(value) for value in data]
     return data
+
+
+Way = tuple[str | int, ...]
+"""Keys and numbers that lead to a part of data."""
+
+
+def numbers_in(data: Any, way: Way = (), but: frozenset[str] = frozenset()) -> Iterator[Way]:
+    """The ways to all numbers but those at or below some keys."""
+    if isinstance(data, dict | list):
+        items: Any = data.items() if isinstance(data, dict) else enumerate(data)
+        for key, value in items:
+            if key not in but:
+                yield from numbers_in(value, (*way, key), but)
+    elif isinstance(data, int | float) and not isinstance(data, bool):
+        yield way
+
+
+def at(data: Any, way: Way) -> Any:
+    """What a way leads to."""
+    for key in way:
+        data = data[key]
+    return data

@@ -7,7 +7,7 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons import translator
-from comparisons.experiments.stability.harness.steps import matrix
+from comparisons.experiments.stability.harness.steps import matrix, turning
 from comparisons.geometry import frame
 from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.mitsuba.backend import scalar
@@ -77,11 +77,6 @@ def follow_in_mitsuba(scene: rt.Scene, o: FloatArray, d: FloatArray, steps: int)
     return out
 
 
-def _axes(rng: np.random.Generator) -> FloatArray:
-    q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-    return np.asarray(q * np.sign(np.linalg.det(q)))
-
-
 def rays_down(
     rng: np.random.Generator, n: int, steepest: float = 0.4
 ) -> tuple[FloatArray, FloatArray]:
@@ -94,7 +89,7 @@ def rays_down(
 
 def plates(rng: np.random.Generator, n: int, gap: float, distance: float = 0.0) -> Stack:
     """Parallel squares, tilted."""
-    axes, center = _axes(rng), _axes(rng)[0] * distance
+    axes, center = turning(rng), turning(rng)[0] * distance
     squares = tuple(
         rt.Rectangle(transform=matrix(axes, center - axes[:, 2] * (k * gap))) for k in range(COUNT)
     )
@@ -105,7 +100,7 @@ def plates(rng: np.random.Generator, n: int, gap: float, distance: float = 0.0) 
 
 def shells(rng: np.random.Generator, n: int, gap: float, distance: float = 0.0) -> Stack:
     """Spheres in spheres; rays pass near enough to the middle to meet all, twice."""
-    center = _axes(rng)[0] * distance
+    center = turning(rng)[0] * distance
     balls = tuple(
         rt.Sphere(center=tuple(center.tolist()), radius=1.0 - k * gap) for k in range(COUNT)
     )
@@ -118,7 +113,7 @@ def shells(rng: np.random.Generator, n: int, gap: float, distance: float = 0.0) 
 def slots(rng: np.random.Generator, n: int, gap: float, distance: float = 0.0) -> Stack:
     """A cube cut in two by a slot, and a square in the middle of that: in, out, the square, in,
     out."""
-    axes, center = _axes(rng), _axes(rng)[0] * distance
+    axes, center = turning(rng), turning(rng)[0] * distance
     cut = rt.Box(transform=matrix(np.diag([4.0, 4.0, gap]), np.zeros(3)))
     cube = rt.Difference(of=(rt.Box(), cut), transform=matrix(axes, center))
     square = rt.Rectangle(transform=matrix(axes, center))

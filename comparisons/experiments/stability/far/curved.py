@@ -5,9 +5,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.experiments.stability.far.law import U_SINGLE, judge_by_moving
+from comparisons.experiments.stability.far.law import judge_by_moving
 from comparisons.experiments.stability.far.spheres import RAYS, SCENES, in_mitsuba, tangent_gaps
-from comparisons.experiments.stability.harness.outcomes import MITSUBA, OURS, FloatArray, Outcomes
+from comparisons.experiments.stability.harness.outcomes import (
+    MITSUBA,
+    OURS,
+    FloatArray,
+    Outcomes,
+    unit_of,
+)
 from comparisons.experiments.stability.harness.rays import Rays
 from comparisons.experiments.stability.harness.series import Draw
 from comparisons.experiments.stability.harness.steps import matrix
@@ -205,7 +211,7 @@ def compete(
         with scalar():
             for k, shape in enumerate(shapes):
                 t[k::SCENES] = in_mitsuba(shape, rounded.o[k::SCENES], rounded.d[k::SCENES])
-        found[MITSUBA] = judge_by_moving(rounded, t, U_SINGLE)
+        found[MITSUBA] = judge_by_moving(rounded, t, unit_of(MITSUBA))
     return found
 
 

@@ -30,9 +30,6 @@ r² - |p|² + (p·d)²/a is off by 2·2 u r² + 3 u r² + u r² + 2 u r², and r
 r.  Nothing here grows with the distance, nor with the offset.
 """
 
-U_SINGLE = 2.0**-24
-"""u of float32: Mitsuba is judged by the same law with this."""
-
 ROUNDINGS = 16.0
 """u (|t| |d| + D) that t |d| may be off by besides: the issue's number.  c / q rounds by some 10 u
 of itself."""

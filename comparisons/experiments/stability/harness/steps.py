@@ -39,3 +39,14 @@ def matrix(linear: FloatArray, center: FloatArray) -> tuple[Matrix]:
     """The one step p -> linear p + center."""
     x, y, z = (tuple(row) for row in np.column_stack([linear, center]).tolist())
     return (Matrix(matrix=(x, y, z)),)
+
+
+def orthogonal(rng: np.random.Generator) -> FloatArray:
+    """(3, 3), any: of normal numbers, so that it is spread evenly up to the signs of columns."""
+    return np.asarray(np.linalg.qr(rng.normal(size=(3, 3)))[0])
+
+
+def turning(rng: np.random.Generator) -> FloatArray:
+    """The same without mirroring."""
+    q = orthogonal(rng)
+    return np.asarray(q * np.sign(np.linalg.det(q)))

@@ -8,7 +8,7 @@ import numpy as np
 import reference_rt as rt
 from comparisons.experiments.stability.harness.meshes import cube, write
 from comparisons.experiments.stability.harness.outcomes import FloatArray
-from comparisons.experiments.stability.harness.steps import any_turn, at, scaled
+from comparisons.experiments.stability.harness.steps import any_turn, at, orthogonal, scaled
 from comparisons.geometry.affine import unit_vectors
 from reference_rt.core import transform
 
@@ -100,7 +100,7 @@ def slivers(rng: np.random.Generator, aspect: float, n: int) -> FloatArray:
     line = unit_vectors(rng, 1)[0]
     ends = np.sort(rng.uniform(-1.0, 1.0, (n // 2, 3)), axis=1)
     bundle = ends[..., None] * line + unit_vectors(rng, 3 * (n // 2)).reshape(-1, 3, 3) / aspect
-    turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    turn = orthogonal(rng)
     strips = n - n // 2
     y = np.sort(rng.uniform(-1.0, 1.0, strips)) / np.sqrt(aspect)
     flat = np.zeros((strips, 3, 3))

@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 
 from comparisons.experiments.fuzz.assets import FILES, MESHES
-from comparisons.experiments.fuzz.data import named_in
+from comparisons.experiments.fuzz.data import Way, at, named_in, numbers_in
 from comparisons.experiments.fuzz.fields import Draw
 from comparisons.experiments.fuzz.generate import Assembly
-
-Way = tuple[str | int, ...]
 
 TINY, LEAST, MOST = 2.0**-1022, 5e-324, 1.7976931348623157e308
 
@@ -50,16 +48,6 @@ def deep() -> Iterator[None]:
         sys.setrecursionlimit(usual)
 
 
-def numbers_in(data: Any, path: Way = ()) -> Iterator[Way]:
-    """The ways to all numbers."""
-    if isinstance(data, dict | list):
-        items = data.items() if isinstance(data, dict) else enumerate(data)
-        for key, value in items:
-            yield from numbers_in(value, (*path, key))
-    elif isinstance(data, int | float) and not isinstance(data, bool):
-        yield path
-
-
 def nodes_in(data: Any, path: Way = ()) -> Iterator[Way]:
     """The ways to everything but the whole."""
     if path:
@@ -67,12 +55,6 @@ def nodes_in(data: Any, path: Way = ()) -> Iterator[Way]:
     if isinstance(data, dict | list):
         for key, value in data.items() if isinstance(data, dict) else enumerate(data):
             yield from nodes_in(value, (*path, key))
-
-
-def at(data: Any, path: Way) -> Any:
-    for key in path:
-        data = data[key]
-    return data
 
 
 def pick(rng: np.random.Generator, choices: Any) -> Any:

@@ -1,7 +1,6 @@
 """Shapes of every kind, placed by maps that become extreme; rays that are aimed at them, meet them
 and leave them, ours and Mitsuba's."""
 
-import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,10 +8,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import trimesh
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.meshes import write_obj
+from comparisons.experiments.stability.harness.meshes import ball, write_obj
 from comparisons.experiments.stability.harness.series import Draw
 from comparisons.experiments.stability.harness.shadows import bound
 from comparisons.experiments.stability.harness.steps import matrix, vector
@@ -89,15 +87,11 @@ def _triangle(linear: FloatArray, center: FloatArray, _folder: Path, _rng: Any) 
     return rt.Triangle(v0=tuple(v[0]), v1=tuple(v[1]), v2=tuple(v[2]))
 
 
-@functools.cache
-def _ball() -> Any:
-    return trimesh.creation.icosphere(subdivisions=1)
-
-
 def _mesh(linear: FloatArray, center: FloatArray, folder: Path, _rng: Any) -> Any:
     file = folder / "ball.obj"
     if not file.exists():
-        write_obj(file, _ball().vertices, _ball().faces)
+        mesh = ball(1, 1.0)
+        write_obj(file, mesh.vertices, mesh.faces)
     return rt.Mesh(file=str(file), transform=matrix(linear, center))
 
 

@@ -46,7 +46,7 @@ from comparisons.experiments.stability.harness.outcomes import (
 )
 from comparisons.experiments.stability.harness.scenes import SIZE
 from comparisons.experiments.stability.harness.series import Draw, Family, Sweep, decades, series
-from comparisons.experiments.stability.harness.steps import matrix
+from comparisons.experiments.stability.harness.steps import matrix, turning
 from comparisons.experiments.stability.metamorphic import light, rays
 from comparisons.experiments.stability.metamorphic.pictures import shoot_light, shoot_rays
 from reference_rt.shapes.csg import FAR
@@ -96,9 +96,7 @@ def turns_of(rng: np.random.Generator, x: float) -> list[FloatArray]:
     if x == EXCHANGES:
         return [np.eye(3)[list(order)] for order in permutations(range(3)) if order != (0, 1, 2)]
     mirror = np.diag([1.0, 1.0, -1.0 if x == BOTH_OF_THESE else 1.0])
-    # QR of normal numbers: turns that are spread evenly, up to the signs of columns.
-    found = [np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(6)]
-    return [turn * np.sign(np.linalg.det(turn)) @ mirror for turn in found]
+    return [turning(rng) @ mirror for _ in range(6)]
 
 
 EXACT_TO = 1e12

@@ -18,15 +18,12 @@ from comparisons.experiments.stability.harness.outcomes import (
     Outcome,
     Outcomes,
     of_pixels,
+    unit_of,
 )
 from comparisons.experiments.stability.harness.scenes import SIZE
 from comparisons.experiments.stability.harness.series import Draw
 from comparisons.geometry.exact.dyadic import BoolArray
-from comparisons.geometry.frame import UNIT_ROUNDOFF as U32
 from comparisons.mitsuba.backend import scalar
-from reference_rt.core.ray import UNIT_ROUNDOFF
-
-ROUNDOFF = {OURS: UNIT_ROUNDOFF, MITSUBA: U32}
 
 STEPS = 4.0
 """Surfaces that a path meets: each adds an error of that size."""
@@ -82,7 +79,7 @@ def before(render: Renderer, scene: rt.Scene, shift: float, u: float) -> Before:
 @lru_cache(maxsize=4)
 def remembered(contestant: str, scene: rt.Scene, shift: float) -> Before:
     """`before`, which is the same for all factors."""
-    return before(partial(colours, contestant), scene, shift, ROUNDOFF[contestant])
+    return before(partial(colours, contestant), scene, shift, unit_of(contestant))
 
 
 @lru_cache(maxsize=4)
@@ -143,7 +140,7 @@ def judged(contestant: str, scene: rt.Scene, motion: Motion, mirrored: bool = Fa
     What rounds separately at each surface no common move finds: where a few pixels are wrong, they
     are compared with scenes each part of which is moved by `shift` in a direction of its own.
     """
-    render, u = partial(colours, contestant), ROUNDOFF[contestant]
+    render, u = partial(colours, contestant), unit_of(contestant)
     shift = REACH * u * (SIZE + max(map(abs, motion.offset)) / motion.factor)
     base = remembered(contestant, scene, shift)
     found = render(moved(scene, motion))

@@ -15,7 +15,7 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness.outcomes import FloatArray
-from comparisons.experiments.stability.harness.steps import any_turn, scaled
+from comparisons.experiments.stability.harness.steps import any_turn, orthogonal, scaled
 from comparisons.geometry.frame import round32
 from reference_rt.core import transform
 
@@ -43,10 +43,7 @@ class Trial:
 
 def _turn(rng: np.random.Generator, turned: bool) -> FloatArray:
     """A rotation (3, 3): any, or one that permutes the axes."""
-    if turned:
-        q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-        return np.asarray(q)
-    return np.asarray(np.eye(3)[rng.permutation(3)])
+    return orthogonal(rng) if turned else np.asarray(np.eye(3)[rng.permutation(3)])
 
 
 def barycentrics(rng: np.random.Generator, n: int) -> FloatArray:
