@@ -134,6 +134,24 @@ def test_series_refuse_an_end_without_a_law():
         Series("s", Sweep("x", (2.0, 1.0), (), 1, 1), "", lambda *_: {})
 
 
+def test_a_function_becomes_a_series_of_its_family(alone):
+    def near_by(draw, x):
+        """What is near
+        is drawn."""
+
+    near_by.__module__ = f"{series.FAMILIES}.T.near"
+    sweep = Sweep("x", (1.0, 2.0), (1.0,), 1, 1)
+    assert series.series(sweep, unit="u")(near_by) is near_by
+    series.series(sweep, "by name", "About.")(near_by)
+    series.MODULES["T"] = "T"
+    one, other = Family("T", "", "").series
+    assert (one.name, one.about, one.unit) == ("near by", "What is near is drawn.", "u")
+    assert (other.name, other.about, other.measure) == ("by name", "About.", near_by)
+    near_by.__module__ = f"{series.FAMILIES}.T.far"
+    with pytest.raises(ValueError, match="two series of the name 'near by'"):
+        series.series(sweep)(near_by)
+
+
 def test_rows_of_the_first_failures_are_shown():
     wrong, undecided = np.array([False, True, True, True, True, True]), np.arange(6) == 2
     found = outcome(

@@ -125,14 +125,14 @@ FAMILIES = "comparisons.experiments.stability"
 """The package of the families' modules."""
 
 _REGISTERED: dict[str, dict[str, Series]] = {}
-"""By the module of the function, and by name."""
+"""By the module or folder of the family, and by name."""
 
 M = TypeVar("M", bound=Measure)
 
 
 def add(module: str, one: Series) -> None:
-    """Register a series of a module.  Raises ValueError for a second one of its name."""
-    known = _REGISTERED.setdefault(module, {})
+    """Register a series of a module's family.  Raises ValueError for a second one of its name."""
+    known = _REGISTERED.setdefault(module.removeprefix(f"{FAMILIES}.").partition(".")[0], {})
     if one.name in known:
         raise ValueError(f"{module}: two series of the name '{one.name}'")
     known[one.name] = one
@@ -191,13 +191,7 @@ class Family:
     @property
     def by_name(self) -> Mapping[str, Series]:
         """The same by name."""
-        inside = f"{FAMILIES}.{MODULES[self.id]}."
-        return {
-            name: one
-            for module, some in _REGISTERED.items()
-            if f"{module}.".startswith(inside)
-            for name, one in some.items()
-        }
+        return _REGISTERED.get(MODULES[self.id], {})
 
 
 MODULES = {
