@@ -9,17 +9,9 @@
 `help(reference_rt.Sphere)` and its like describe a type; `Sphere.model_fields["radius"]` a field.
 
 - A scene: Scene, Film, json_schema; SceneError, SceneWarning
-- Cameras: Perspective, Orthographic, Pinhole, ThinLens
-- Shapes: Sphere, Plane, Disk, Rectangle, Triangle, Polygon, Box, Cylinder, Cone, Torus, Quadric,
-  Mesh, Instance; solids: Union, Intersection, Difference
-- Materials: Diffuse, Mirror, Dielectric, ThinDielectric, Conductor, RoughConductor,
-  RoughDielectric, Plastic, RoughPlastic, Principled, PrincipledThin, GltfPbr, Phong, Emissive;
-  made of others: Mask, TwoSided, Blend, Bump, NormalMap
-- Textures: Checker, Bitmap, VertexColours, Product
-- Lights: Point, Spot, Projector, Directional, Constant, EnvironmentMap, Ambient
-- Integrators: Path, Direct, Whitted, RayCast
-- Samplers: Sobol, Independent, Grid
-- Filters: BoxFilter, TentFilter, GaussianFilter, MitchellFilter, CatmullRomFilter, LanczosFilter
+- Its parts: a class for each type of shape (Sphere, Mesh, ...), solid (Union, ...), material
+  (Diffuse, ...), texture, light, camera, integrator, sampler and filter; `dir(reference_rt)` has
+  them all, and `__init__.pyi` by kind
 - Pictures: render, Picture, read_image, ImageError
 - Queries: query (array queries, the methods of Scene), transform (affine maps), textbook (the
   textbook's intersection methods), build_tables, SceneTables

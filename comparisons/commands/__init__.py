@@ -6,5 +6,5 @@ done by the package that it imports when it runs, inside `compare_extra`: `refer
 not wait for those imports.  Arguments and outputs are checked before the work begins.
 
 To add a command, write its function and list it in `register.py`; options that several commands
-have are in `options.py`.
+have are in `options.py`, and what they write is an `Outputs`.
 """

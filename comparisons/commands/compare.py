@@ -3,7 +3,6 @@ writes a scene for another renderer.
 """
 
 import os
-import sys
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
@@ -24,6 +23,7 @@ from comparisons.commands.options import (
     Witness,
     compare_extra,
     out_folder,
+    some_of,
 )
 from comparisons.results.rungs import COMPARED
 from reference_rt.cli.guarded import guarded, say
@@ -180,8 +180,7 @@ def suite(
     Finished cases are kept in the output folder and not run again.
     """
     with compare_extra():
-        from comparisons.report import ci as github_actions
-        from comparisons.report import ci as junit_xml
+        from comparisons.report.ci import Formats
         from comparisons.results.case import exit_code
         from comparisons.suites.run import Options, Run, run_suite, summarise
         from comparisons.suites.suite import Changes, load_suite, plan
@@ -189,9 +188,7 @@ def suite(
     from reference_rt.util.files import check_writable
     from reference_rt.util.workers import Threads
 
-    rungs = tuple(rung or ())
-    if unknown := [name for name in rungs if name not in COMPARED]:
-        raise UsageError(f"--rung: expected one of {', '.join(COMPARED)}, got '{unknown[0]}'")
+    rungs = some_of("--rung", rung, COMPARED) if rung else ()
     source = load_suite(name)
     changes = Changes(defaults=by_name(define))
     planned = plan(source, scenes, tuple(only or ()), rungs, changes)
@@ -205,22 +202,13 @@ def suite(
     # A cluster has as many cases at a time as threads.
     threads = 1 if where.is_cluster else max(cores // (workers or most), 1)
     files = {work.name: work.path.as_posix() for work in planned.work}
-    on_github = github or github_actions.is_there()
-    summary = github_actions.summary_path() if on_github else None
-    check_writable(*(path for path in (junit, summary) if path is not None))
+    for_ci = Formats(junit, github)
+    check_writable(*for_ci.files)
 
     def tell(run: Run) -> None:
         """Write all outputs, after an interruption too: a build server must not show those of an
         earlier run."""
-        if junit is not None:
-            junit_xml.write_junit(
-                junit, run.cases, source.name, run.walls, run.not_run, run.missing
-            )
-        if on_github:
-            github_actions.annotate(run.cases, sys.stdout, files, run.missing)
-        if summary is not None:
-            title = source.name
-            github_actions.summarise(run.cases, summary, title, run.not_run, run.missing)
+        for_ci.write(source.name, run.cases, files, run.walls, run.not_run, run.missing)
         summarise(run.cases, run.walls, run.not_run, run.missing)
         say(f"{options.results}, {options.report}", err=True)
 

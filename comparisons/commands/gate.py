@@ -174,6 +174,7 @@ def gate(
     """
     started = time.perf_counter()
     with compare_extra("the gate"):
+        from comparisons.commands.outputs import Outputs
         from comparisons.compare.looks import SECONDS
         from comparisons.gate import outputs
         from comparisons.gate.driver import Command, Driver
@@ -184,6 +185,7 @@ def gate(
         from comparisons.gate.rounds import Rounds, gated_renderer
         from comparisons.renderers import witness_facts
         from comparisons.report import biases, terminal
+        from comparisons.report.ci import Formats
         from comparisons.results.case import trace_command
         from comparisons.results.headline import headline
         from comparisons.translator.resolved import write_resolved
@@ -254,8 +256,9 @@ def gate(
         raise UsageError("--reference-layer: only applies to --reference; expected that too")
     name = baseline or ("" if described is None else described.name)
     name = printable(name or Path((reference or [Path("nothing")])[0]).stem)
-    kept = () if run is None else (out / "candidates" / "a candidate",)
-    outputs.prepare(out, *kept, *outputs.ci_files(junit, github))
+    for_ci = Formats(junit, github)
+    kept = () if run is None else ("candidates",)
+    Outputs(out, ("results.json", "report.html"), kept, others=for_ci.files).prepare()
     driver: Driver | None = None
     failed: ReferenceRtError | None = None
     try:
@@ -301,7 +304,8 @@ def gate(
     facts |= {"browser": browser} if browser else {}
     facts |= witness_facts(witness)
     results, report = outputs.write(case, out, facts, time.perf_counter() - started)
-    outputs.for_ci(case, junit, "" if scene is None else scene.as_posix(), github)
+    about = {} if scene is None else {case.scene: scene.as_posix()}
+    for_ci.write("gate", [case], about, title=f"gate: {case.scene}")
     if failed is not None:
         raise failed
     say(f"{case.scene}: {case.verdict}: {headline(case)}")

@@ -1,6 +1,6 @@
 """Options that several commands have, with one help text each."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -9,7 +9,7 @@ import typer
 
 from reference_rt.cli.options import ClusterFile as ClusterFile
 from reference_rt.cli.options import Scheduler as Scheduler
-from reference_rt.util.errors import ReferenceUnavailableError
+from reference_rt.util.errors import ReferenceUnavailableError, UsageError
 
 # ---- the message of a command whose Python packages, the extra `compare`, are not installed ------
 
@@ -77,6 +77,14 @@ TimeLimit = Annotated[
         help="Add no replicates beyond this time, for each scene. (default: 600)",
     ),
 ]
+
+
+def some_of(option: str, given: Iterable[str] | None, known: Collection[str]) -> tuple[str, ...]:
+    """The names that are given, once each, or all.  Raises UsageError for one that is unknown."""
+    names = tuple(dict.fromkeys(given or known))
+    if unknown := [name for name in names if name not in known]:
+        raise UsageError(f"{option}: expected one of {', '.join(known)}, got '{unknown[0]}'")
+    return names
 
 
 def out_folder(what: str, metavar: str | None = None) -> Any:

@@ -17,10 +17,11 @@ from comparisons.commands.options import (
     Scheduler,
     compare_extra,
     out_folder,
+    some_of,
     table_in,
 )
 from reference_rt.cli.guarded import guarded, say
-from reference_rt.cli.options import Defaults, by_name
+from reference_rt.cli.options import Defaults, by_name, size_of
 from reference_rt.util.errors import SceneError, UsageError, printable
 
 
@@ -46,27 +47,25 @@ def bench(
 ) -> None:
     """Measure the renderer's speed against Mitsuba's; takes about half an hour."""
     with compare_extra():
+        from comparisons.commands.outputs import Outputs
         from comparisons.experiments.bench import outputs
         from comparisons.experiments.bench.row import Setting
         from comparisons.experiments.bench.run import all_groups, chosen, run
-        from comparisons.report import templates, terminal
+        from comparisons.report import terminal
 
     setting = Setting(scenes=scenes, mesh=mesh, quick=quick)
     groups = chosen(only or (), all_groups(setting))
     if mesh is not None and not mesh.is_file():
         raise UsageError(f"--mesh: there is no file '{mesh}'")
-    if markdown is not None:
-        templates.check(markdown, "bench")
+    writes = Outputs(out, ("results.json", "bench.md"), ("rows",), (markdown, "bench"))
+    writes.check()
     with outputs.Display() as display:
         outcome = run(groups, replace(setting, say=display.say), out, display, fresh)
     console = terminal.console()
     console.print(outputs.terminal(outcome.rows, console.width))
-    if markdown is not None:
-        written = outputs.markdown(outcome.rows, outcome.machine, outcome.not_measured)
-        templates.rewrite(markdown, "bench", written)
     for name, why in outcome.not_measured.items():
         say(f"{name}: not measured: {why}", err=True)
-    say(f"{out / 'results.json'}, {out / 'bench.md'}", err=True)
+    writes.finish(lambda: outputs.markdown(outcome.rows, outcome.machine, outcome.not_measured))
     raise typer.Exit(0 if outcome.met else 1)
 
 
@@ -84,6 +83,7 @@ def methods(
 ) -> None:
     """Time the textbook's intersection methods, in nanoseconds per ray."""
     with compare_extra("measuring"):
+        from comparisons.commands.outputs import Outputs
         from comparisons.experiments.methods.outputs import terminal as table_of
         from comparisons.experiments.methods.outputs import write, write_page
         from comparisons.experiments.methods.run import FAMILIES, FULL, QUICK, run
@@ -92,13 +92,10 @@ def methods(
         import_module("matplotlib")  # before minutes of measuring that the page then cannot show
     from comparisons.report import terminal
     from reference_rt.util.console import ProgressLine
-    from reference_rt.util.files import check_writable
 
-    names = list(dict.fromkeys(family or FAMILIES))
-    if unknown := [name for name in names if name not in FAMILIES]:
-        raise UsageError(f"--family: expected one of {', '.join(FAMILIES)}, got '{unknown[0]}'")
-    page = out / "methods.html"
-    check_writable(out / "results.json", out / "results.csv", page)
+    names = some_of("--family", family, FAMILIES)
+    writes = Outputs(out, ("results.json", "results.csv", "methods.html"))
+    writes.check()
     effort, about = FULL if full else QUICK, ours()
     rows = []
     with ProgressLine() as progress:
@@ -106,13 +103,13 @@ def methods(
             rows += run(name, effort, seed, progress)
             write(out, rows, effort, seed, about)
         progress("page", 0.0)
-        write_page(page, rows, effort, seed, about)
+        write_page(writes.files[-1], rows, effort, seed, about)
         progress("page", 1.0)
     console = terminal.console()
     for name in names:
         console.print(table_of([row for row in rows if row.family == name], console.width))
         console.print()
-    say(f"{out / 'results.json'}, results.csv, methods.html", err=True)
+    writes.finish()
 
 
 @guarded
@@ -166,6 +163,7 @@ def converge(
     A rung is a number of samples per pixel.  Finished rungs are kept in the output folder.
     """
     with compare_extra():
+        from comparisons.commands.outputs import Outputs
         from comparisons.experiments.convergence.findings import Curves
         from comparisons.experiments.convergence.methods import chosen
         from comparisons.experiments.convergence.outputs import (
@@ -178,20 +176,17 @@ def converge(
         from comparisons.experiments.convergence.page import plots_of, write_page
         from comparisons.experiments.convergence.run import INVALID, curves_of
         from comparisons.experiments.convergence.store import Settings
-        from comparisons.report import templates
-        from comparisons.report.plots import save
         from comparisons.results.case import INTERRUPTED
         from comparisons.runs.elsewhere import run_elsewhere
         from comparisons.runs.provenance import provenance
         from comparisons.suites.suite import Changes, folder_name
     from reference_rt.cli.options import Where
     from reference_rt.util.console import ProgressLine
-    from reference_rt.util.files import check_writable
     from reference_rt.util.workers import Processes
 
     settings = Settings(
         time_limit=time_limit,
-        size=_size(size),
+        size=None if size is None else size_of(size),
         max_spp=max_spp,
         replicates=replicates,
         targets=_targets(targets),
@@ -202,12 +197,9 @@ def converge(
     names = [printable(path.stem) for path in scenes]
     if double := [name for name in names if names.count(name) > 1]:
         raise UsageError(f"two scenes have the name '{double[0]}'; expected different names")
-    files = [out / name for name in ("results.json", "results.csv", "report.html")]
-    if plots is not None:
-        check_writable(plots / "a plot")
-    check_writable(*files, out / "rungs" / "a rung")
-    if markdown is not None:
-        templates.check(markdown, "convergence")
+    names_of_files = ("results.json", "results.csv", "report.html")
+    writes = Outputs(out, names_of_files, ("rungs",), (markdown, "convergence"), plots)
+    writes.check()
     facts = provenance()
     found = [Curves(name, problem=INTERRUPTED) for name in names]
 
@@ -232,27 +224,15 @@ def converge(
     for k, curves in measured(Where(workers, scheduler, cluster)):
         found[k] = replace(curves, scene=names[k], again=again(scenes[k], out, settings))
         # After each scene, so that an interruption loses none that is finished.
-        write_results(files[0], found, settings, facts)
-        write_table(files[1], found)
-        write_page(files[2], found, settings, facts)
+        results, table, page = writes.files
+        write_results(results, found, settings, facts)
+        write_table(table, found)
+        write_page(page, found, settings, facts)
         for line in lines_of(found[k]):
             say(line)
-    if markdown is not None:
-        templates.rewrite(markdown, "convergence", tables(found, facts))
-    if plots is not None:
-        save(plots, plots_of(found), facts)
-    say(", ".join(map(str, files)), err=True)
+    writes.finish(lambda: tables(found, facts), lambda: plots_of(found), facts)
     if any(curves.problem.startswith(INVALID) for curves in found):
         raise typer.Exit(SceneError.exit_code)
-
-
-def _size(size: str | None) -> tuple[int, int] | None:
-    if size is None:
-        return None
-    width, _, height = size.lower().partition("x")
-    if not all(n.isdecimal() and 0 < len(n) < 6 and int(n) > 0 for n in (width, height)):
-        raise UsageError(f"--size: expected WIDTHxHEIGHT, such as 96x72, got '{size}'")
-    return int(width), int(height)
 
 
 def _targets(text: str) -> tuple[float, ...]:

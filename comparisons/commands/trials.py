@@ -3,10 +3,10 @@
 """
 
 import os
-import re
 from collections.abc import Callable
 from contextlib import closing
 from fnmatch import fnmatchcase
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
@@ -23,6 +23,7 @@ from comparisons.commands.options import (
     Scheduler,
     compare_extra,
     out_folder,
+    some_of,
     table_in,
 )
 from reference_rt.cli.guarded import guarded, say
@@ -148,8 +149,8 @@ def stability(
     Exact arithmetic and closed forms decide which answer is right.
     """
     with compare_extra():
-        from comparisons.experiments.stability.harness import outputs
-        from comparisons.experiments.stability.harness import page as page_of
+        from comparisons.commands.outputs import Outputs
+        from comparisons.experiments.stability.harness import outputs, page
         from comparisons.experiments.stability.harness.points import summaries
         from comparisons.experiments.stability.harness.run import (
             Choice,
@@ -159,33 +160,23 @@ def stability(
         )
         from comparisons.experiments.stability.harness.series import MODULES, Effort
         from comparisons.experiments.stability.harness.series import family as family_of
-        from comparisons.report import templates, terminal
-        from comparisons.report.plots import save
+        from comparisons.report import terminal
         from comparisons.runs.provenance import ours, provenance
 
         import_module("matplotlib")  # before minutes of measuring that the page then cannot show
     from reference_rt.cli.options import Where
-    from reference_rt.util.files import check_writable
     from reference_rt.util.workers import Threads
 
-    names = tuple(dict.fromkeys(family or MODULES))
-    if unknown := [name for name in names if name not in MODULES]:
-        raise UsageError(f"--family: expected one of {', '.join(MODULES)}, got '{unknown[0]}'")
+    names = some_of("--family", family, MODULES)
     if series is not None:
         if len(names) > 1:
             raise UsageError("--series: expected one --family with it")
-        known = family_of(names[0]).by_name
-        if series not in known:
-            raise UsageError(f"--series: expected one of {', '.join(known)}, got '{series}'")
+        some_of("--series", [series], family_of(names[0]).by_name)
     if at is not None and series is None:
         raise UsageError("--at: expected a --series with it")
-    page = out / "stability.html"
-    kept = out / "settings" / "a setting", out / "pictures" / "a picture"
-    if plots is not None:
-        check_writable(plots / "a plot")
-    check_writable(out / "results.json", out / "results.csv", page, *kept)
-    if markdown is not None:
-        templates.check(markdown, "stability")
+    files, kept = ("results.json", "results.csv", "stability.html"), ("settings", "pictures")
+    writes = Outputs(out, files, kept, (markdown, "stability"), plots)
+    writes.check()
     missing = mitsuba_is_there() if mitsuba else "not asked"
     effort: Effort = "full" if full else "quick"
     choice = Choice(names, effort, seed, series, at, not missing)
@@ -200,13 +191,9 @@ def stability(
         outputs.write_results(out, found, effort, seed, facts)
         display.line("pictures and page")
         pictures = shoot(choice, found, out, opened)
-        page_of.write_page(page, found, pictures, effort, seed, facts)
+        page.write_page(writes.files[-1], found, pictures, effort, seed, facts)
     console = terminal.console()
     console.print(outputs.terminal(found, console.width))
-    if markdown is not None:
-        templates.rewrite(markdown, "stability", outputs.markdown(found, effort, seed, facts))
-    if plots is not None:
-        save(plots, page_of.failures(found), facts)
     holds = True
     for one in (s for some in summaries(found).values() for s in some):
         holds &= one.holds
@@ -215,7 +202,8 @@ def stability(
                 say(f"again: {outputs.again(f, effort, seed)}", err=True)
                 for example in f.ours.examples if f.ours else ():
                     say(f"  {dict(example)}", err=True)
-    say(f"{out / 'results.json'}, results.csv, stability.html", err=True)
+    table = partial(outputs.markdown, found, effort, seed, facts)
+    writes.finish(table, lambda: page.failures(found), facts)
     raise typer.Exit(0 if holds else 1)
 
 
@@ -294,6 +282,7 @@ def fuzz(
     Exit codes: 0: nothing was found; 1: findings; 2: wrong usage; 4: Mitsuba is missing.
     """
     with compare_extra("fuzzing"):
+        from comparisons.commands.outputs import Outputs
         from comparisons.experiments.fuzz import summary
         from comparisons.experiments.fuzz.finding import RUNGS, Effort, Grammar
         from comparisons.experiments.fuzz.results import remove
@@ -301,8 +290,7 @@ def fuzz(
         from comparisons.experiments.fuzz.schema import features as known
         from comparisons.experiments.fuzz.summary import Display, write_page
         from comparisons.runs.provenance import provenance
-    from reference_rt.cli.options import Where
-    from reference_rt.util.files import check_writable
+    from reference_rt.cli.options import Where, seconds_of
     from reference_rt.util.workers import Threads
 
     where = Where(workers, scheduler, cluster)
@@ -313,12 +301,12 @@ def fuzz(
         return
     effort: dict[str, Any] = {} if rays is None else {"pixels": rays, "light_pixels": rays}
     if rungs is not None:
-        effort["rungs"] = _rungs(rungs, RUNGS)
+        effort["rungs"] = some_of("--rungs", rungs.split(","), RUNGS)
     names = () if features is None else tuple(features.split(","))
     known(names)
-    seconds = None if time is None else _seconds(time)
-    page = out / "fuzz.html"
-    check_writable(out / "fuzz.json", page, *([junit] if junit else []))
+    seconds = None if time is None else seconds_of(time, "--time")
+    writes = Outputs(out, ("fuzz.json", "fuzz.html"), others=(junit,))
+    writes.check()
     if fresh:
         remove(out)
     scenes = tuple(_data(path, out) for path in scene or ())
@@ -341,14 +329,14 @@ def fuzz(
             found = run(plan, display.done, display.line)
     facts = provenance()
     summary.write_results(plan, found, facts, junit)
-    write_page(page, plan, found, facts)
+    write_page(writes.files[-1], plan, found, facts)
     for line in summary.words(found):
         say(line)
     for one, times in summary.distinct(found):
         say(f"{one.finding.rung}: {one.finding.cause} ({times} scenes, such as {one.number})")
         say(f"  {one.finding.detail.splitlines()[0][:300]}")
         say(f"  {summary.again(plan, one)}")
-    say(f"{out / 'fuzz.json'}, fuzz.html", err=True)
+    writes.finish()
     raise typer.Exit(1 if found.findings else 0)
 
 
@@ -368,21 +356,6 @@ def _plant(pattern: str, out: Path, seed: int, workers: int) -> None:
         say(f"{one.fault}: {after}; {one.shapes} shapes, {one.lines} lines")
     say(summary(found))
     raise typer.Exit(0 if all(one.scenes for one in found) else 1)
-
-
-def _rungs(text: str, known: tuple[str, ...]) -> tuple[str, ...]:
-    names = tuple(text.split(","))
-    for name in names:
-        if name not in known:
-            raise UsageError(f"--rungs: expected some of {', '.join(known)}, got '{name}'")
-    return names
-
-
-def _seconds(text: str) -> float:
-    match = re.fullmatch(r"(\d+(?:\.\d+)?)([smh])", text)
-    if match is None:
-        raise UsageError(f"--time: expected a duration such as 90s, 10m or 2h, got '{text}'")
-    return float(match[1]) * {"s": 1.0, "m": 60.0, "h": 3600.0}[match[2]]
 
 
 def _data(path: Path, out: Path) -> dict[str, Any]:

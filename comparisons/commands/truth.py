@@ -53,9 +53,10 @@ def truth(
     invalid; 4: Mitsuba is missing.
     """
     with compare_extra("truth"):
+        from comparisons.commands.outputs import Outputs
         from comparisons.mitsuba.backend import SCALAR
         from comparisons.renderers import other
-        from comparisons.report import templates, terminal
+        from comparisons.report import terminal
         from comparisons.runs.provenance import ours, provenance
         from comparisons.truth import outputs
         from comparisons.truth.renderers import RENDERERS, REPLICATES, load
@@ -66,9 +67,8 @@ def truth(
         raise UsageError(f"--renderer: expected ours, mitsuba, both or cycles, got '{renderer}'")
     picked = _chosen(names or ())
     who = [each for each in RENDERERS if renderer == each or (renderer, each) in BOTH]
-    outputs.prepare(out)
-    if markdown is not None:
-        templates.check(markdown, "truth")
+    writes = Outputs(out, ("results.json", "report.html"), markdown=(markdown, "truth"))
+    writes.prepare()
     begun = time.perf_counter()
     facts = provenance() if "mitsuba" in who else ours()
     facts |= {name: other(name).version() for name in who if name not in ("ours", "mitsuba")}
@@ -82,10 +82,9 @@ def truth(
         progress("cases", 1.0)
     facts |= {"variant": SCALAR} if "mitsuba" in who else {}
     facts |= {"seconds": round(time.perf_counter() - begun, 1)}
-    _finish(out, rows, facts)
+    outputs.write(out, rows, facts)
     outputs.show(terminal.console(), rows)
-    if markdown is not None:
-        templates.rewrite(markdown, "truth", outputs.markdown(rows, facts))
+    writes.finish(lambda: outputs.markdown(rows, facts))
     counted = [row for row in rows if row.renderer == who[0]]
     raise typer.Exit(outputs.exit_code(counted))
 
@@ -103,6 +102,7 @@ def truth_gate(
     driving: fields of `comparisons.truth.renderers.Driven`, None for its own.
     """
     with compare_extra("truth"):
+        from comparisons.commands.outputs import Outputs
         from comparisons.gate.pictures_in import read_candidates
         from comparisons.report import terminal
         from comparisons.runs.provenance import ours
@@ -112,7 +112,8 @@ def truth_gate(
     picked = _chosen([name], "--truth: ")
     if command is None and len(picked) > 1:
         raise UsageError(f"--truth: '{name}' is {len(picked)} cases; expected one, or --command")
-    outputs.prepare(out)
+    writes = Outputs(out, ("results.json", "report.html"))
+    writes.prepare()
     facts: dict[str, Any] = ours()
     if command is None:
         facts["candidates"] = [str(path) for path in candidates]
@@ -123,8 +124,9 @@ def truth_gate(
         given = {key: value for key, value in driving.items() if value is not None}
         driven = Driven(command, SCENES, out / "candidates", **given)
         rows = [driven.row(case, lambda line: say(line, err=True)) for case in picked]
-    _finish(out, rows, facts)
+    outputs.write(out, rows, facts)
     outputs.show(terminal.console(), rows)
+    writes.finish()
     raise typer.Exit(outputs.exit_code(rows))
 
 
@@ -135,10 +137,3 @@ def _chosen(names: Sequence[str], option: str = "") -> "list[Case]":
         return chosen(names)
     except ValueError as error:
         raise UsageError(f"{option}{error}") from None
-
-
-def _finish(out: Path, rows: "list[Row]", facts: dict[str, Any]) -> None:
-    from comparisons.truth import outputs
-
-    outputs.write(out, rows, facts)
-    say(f"{out / 'results.json'}, {out / 'report.html'}", err=True)

@@ -7,9 +7,9 @@ import numpy as np
 from comparisons.compare.budget import Budget
 from comparisons.compare.judge import Rendered, of_replicates
 from comparisons.compare.looks import Pool, mean_picture
-from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.mitsuba.counterpart import Counterpart, trace
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.results.case import Images
 from comparisons.rungs.layers.seen import Seen
 from comparisons.rungs.rays.camera import camera_rays, ends

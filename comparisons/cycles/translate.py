@@ -19,14 +19,16 @@ from typing import Any
 import numpy as np
 
 import reference_rt as rt
+from comparisons import shapes
 from comparisons.cameras.translate import focus_of
-from comparisons.cycles.surfaces import Surface, name_of, surface_of
+from comparisons.cycles.surfaces import placed_arrays, triangles_of, type_name
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import copies_of, place_of
 from comparisons.geometry.frame import SHARE, round32
 from comparisons.materials import type_of
 from comparisons.renderers import NoCounterpartError
 from comparisons.renderers.vocabulary import Data, plain_rgb
+from comparisons.shapes.soup import Soup
 from comparisons.textures import BY_DESCRIPTION
 from comparisons.translator.moved import frame_of, moved
 from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
@@ -255,7 +257,7 @@ def _(light: Directional) -> Data:
 def _meshes(writing: Writing) -> list[Data]:
     """The meshes of all copies.  Instances share their files, and have matrices."""
     scene, found, triangles = writing.scene, [], 0
-    made: dict[int, Surface] = {}
+    made: dict[int, Soup] = {}
     shared: dict[int, str] = {}
     for copy in copies_of(scene):
         for member in copy.members:
@@ -263,27 +265,25 @@ def _meshes(writing: Writing) -> list[Data]:
                 with writing.collected():
                     if member.tree is not None:
                         raise NoCounterpartError("solids (CSG)")
-                    key = id(leaf.shape)
+                    key, kind = id(leaf.shape), type_name(leaf.shape)
                     if key not in made:
-                        made[key] = surface_of(leaf.shape, scene.folder)
+                        made[key] = triangles_of(leaf.shape, scene.folder)
                     surface, name = made[key], _material(leaf.material, writing)
-                    if surface.uv is None and _has_texture(writing.named[name]["shader"]):
-                        raise NoCounterpartError(f"the shape {name_of(leaf.shape)} under a texture")
+                    if surface.uvs is None and _has_texture(writing.named[name]["shader"]):
+                        raise NoCounterpartError(f"the shape {kind} under a texture")
                     m = affine.map_in(leaf.shape, place_of(scene, leaf, copy.outer))
-                    vertices = affine.apply_points(m, surface.vertices)
+                    vertices = affine.apply_points(m, surface.positions)
                     if not _holds(vertices[surface.faces[:MEASURED]]):
-                        raise NoCounterpartError(
-                            f"the shape {name_of(leaf.shape)}, too small for float32"
-                        )
+                        raise NoCounterpartError(f"the shape {kind}, too small for float32")
                     _note_place(leaf.shape, writing.named[name], vertices, writing)
                     one: Data = {"material": name}
                     if copy.instance < 0 or affine.mirrors(m):
                         triangles += len(surface.faces)
-                        one["file"] = writing.save(**surface.placed(m))
+                        one["file"] = writing.save(**placed_arrays(surface, m))
                     else:
                         if key not in shared:
                             triangles += len(surface.faces)
-                            shared[key] = writing.save(**surface.placed(affine.IDENTITY))
+                            shared[key] = writing.save(**placed_arrays(surface, affine.IDENTITY))
                         one |= {"file": shared[key], "matrix": m.tolist()}
                     found.append(one)
                 if triangles > MOST_TRIANGLES:
@@ -292,19 +292,15 @@ def _meshes(writing: Writing) -> list[Data]:
     return found
 
 
-CLOSED = (rt.Sphere, rt.Box, rt.Torus)
-
-
 def _note_place(shape: Any, material: Data, vertices: FloatArray, writing: Writing) -> None:
     box = np.stack([vertices.min(axis=0), vertices.max(axis=0)])
     writing.reach = max(writing.reach, float(np.abs(box).max()))
     if material["sampling"] == "FRONT":
         writing.lamps.append(box)
     if "'glass'" in str(material["shader"]):
-        is_closed = isinstance(shape, CLOSED) or getattr(shape, "capped", False)
-        if not is_closed:
+        if not shapes.type_of(shape).encloses(shape):
             raise NoCounterpartError(
-                f"glass on the shape {name_of(shape)}, which may not be closed"
+                f"glass on the shape {type_name(shape)}, which may not be closed"
             )
         writing.glass.append(box)
 

@@ -8,8 +8,6 @@ import numpy as np
 from scipy.linalg import polar
 
 from comparisons.geometry import affine
-from comparisons.geometry.affine import is_similarity
-from comparisons.geometry.flatten import Copy, Leaf, Member
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.context import TranslationContext, UntranslatableError, rgb
 from comparisons.mitsuba.second import described_image
@@ -26,27 +24,7 @@ from reference_rt.lights import (
 )
 from reference_rt.materials import Emissive, Mask, ThinDielectric
 from reference_rt.scene.model import SceneModel
-from reference_rt.shapes import Box, Disk, Mesh, Rectangle, Sphere, Triangle
-from reference_rt.shapes.shape import TabulationContext
 from reference_rt.textures.image_file import read_image
-
-SAMPLED = (Sphere, Rectangle, Disk, Box, Triangle, Mesh)
-"""Emissive shapes of which `reference_rt` samples points, unless a map makes a sphere an ellipsoid.
-Other emissive shapes, and parts of groups and of solids, shine where a ray of a BSDF's samples hits
-them; Whitted's ray tracing has no such rays but mirrored ones, so that they light nothing."""
-
-
-def never_samples(
-    integrator: Any, copy: Copy, member: Member, leaf: Leaf, place: TabulationContext
-) -> bool:
-    """Whether a lamp lights nothing, because `reference_rt` samples lights alone and not this one.
-    Mitsuba samples the mesh that stands in for it."""
-    if not isinstance(integrator, Direct) or integrator.bsdf_samples > 0:
-        return False
-    shape = leaf.shape
-    if copy.instance >= 0 or member.tree is not None or not isinstance(shape, SAMPLED):
-        return True
-    return isinstance(shape, Sphere) and not is_similarity(affine.map_in(shape, place)[:, :3])
 
 
 @singledispatch

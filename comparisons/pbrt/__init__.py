@@ -14,7 +14,7 @@ import math
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import map_coordinates
@@ -24,6 +24,8 @@ from comparisons.geometry.flatten import Leaf, Member, copies_of
 from comparisons.mitsuba.files import Files, UnwritableError, check_name, ply, write_files
 from comparisons.pbrt.surfaces import Writing, words
 from comparisons.renderers.vocabulary import Params
+from comparisons.shapes import type_of
+from comparisons.shapes.shape import PbrtPart, PbrtPlace
 from comparisons.translator.resolved import Tessellated, placed, tessellated
 from reference_rt import lights
 from reference_rt.cameras import Orthographic, Pinhole, ThinLens, film
@@ -35,7 +37,7 @@ from reference_rt.lights.emitters.environment_map import orthogonal
 from reference_rt.materials import Emissive
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Independent, Sobol
-from reference_rt.shapes import Cylinder, Disk, Plane, Shape, Sphere
+from reference_rt.shapes import Plane, Shape
 from reference_rt.textures.image_file import read_image
 
 ENDLESS = 2**31 - 1
@@ -199,16 +201,6 @@ INLINE = 32
 """Most triangles that stand in the scene file itself."""
 
 
-class Part(NamedTuple):
-    """A shape of pbrt's;  place: the map of its own coordinates to the world;  reversed: whether
-    its normal is turned round."""
-
-    place: affine.Affine
-    plugin: str
-    params: Params
-    reversed: bool = False
-
-
 def shapes_of(writing: Writing) -> list[str]:
     """The lines of all shapes.  A group is written once, without its lamps: pbrt has none in
     instances, and so each copy's is written."""
@@ -282,7 +274,7 @@ def _leaf(
     return lines
 
 
-def native(shape: Shape, m: affine.Affine, textured: bool, emits: bool) -> list[Part]:
+def native(shape: Shape, m: affine.Affine, textured: bool, emits: bool) -> list[PbrtPart]:
     """pbrt's own shapes for one under the map m; none if triangles must stand for it: pbrt samples
     a lamp as if its transform kept lengths, and its disks have other texture coordinates."""
     is_similar = affine.is_similarity(m[:, :3])
@@ -290,29 +282,10 @@ def native(shape: Shape, m: affine.Affine, textured: bool, emits: bool) -> list[
         return []
     size = float(abs(np.linalg.det(m[:, :3]))) ** (1.0 / 3.0) if is_similar else 1.0
     m = np.column_stack([m[:, :3] / size, m[:, 3]])
-    mirrored = affine.mirrors(m)
-    match shape:
-        case Sphere(center=center, radius=r):
-            m = affine.compose(np.column_stack([np.eye(3), np.multiply(center, size)]), m)
-            # Its texture coordinate v runs down, pbrt's up.
-            turned = mirrored or textured
-            place = m * [1.0, 1.0, -1.0, 1.0] if turned else m
-            return [Part(place, "sphere", {"float radius": r * size}, turned and not mirrored)]
-        case Disk() if not textured:
-            place = m * [-1.0, 1.0, 1.0, 1.0] if mirrored else m
-            return [Part(place, "disk", {"float radius": size})]
-        case Cylinder(radius=r) if not (textured and shape.capped):
-            low, high = shape.z_min * size, shape.z_max * size
-            if mirrored and not textured:
-                m, low, high = m * [1.0, 1.0, -1.0, 1.0], -high, -low
-            params = {"float radius": r * size, "float zmin": low, "float zmax": high}
-            parts = [Part(m, "cylinder", params, mirrored and textured)]
-            if shape.capped:
-                for place, z in ((m, high), (m * [1.0, -1.0, -1.0, 1.0], -low)):
-                    cap = {"float radius": r * size, "float height": z}
-                    parts.append(Part(place, "disk", cap))
-            return parts
-    return []
+    to_pbrt = type_of(shape).to_pbrt
+    if to_pbrt is None:
+        return []
+    return to_pbrt(shape, PbrtPlace(m, size, affine.mirrors(m), textured))
 
 
 def _mesh(

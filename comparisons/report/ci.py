@@ -4,10 +4,12 @@ and the step summary, within GitHub's size limits; the worst cases first.
 
 import os
 import re
+import sys
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
@@ -61,15 +63,46 @@ _KINDS = {"invalid": "error", "differ": "error", "inconclusive": "warning"} | {
 }
 
 
-def is_there() -> bool:
-    """Whether this runs as a step of GitHub Actions."""
-    return os.environ.get("GITHUB_ACTIONS") == "true"
+@dataclass(frozen=True)
+class Formats:
+    """What is written for a CI service.  junit: the file of JUnit XML, None for none;  github:
+    whether to write annotations and a step's summary outside of GitHub Actions, too."""
 
+    junit: Path | None
+    github: bool
 
-def summary_path() -> Path | None:
-    """The file of the step's summary; None outside of GitHub Actions."""
-    path = os.environ.get("GITHUB_STEP_SUMMARY")
-    return Path(path) if path else None
+    @property
+    def _on_github(self) -> bool:
+        return self.github or os.environ.get("GITHUB_ACTIONS") == "true"
+
+    @property
+    def _summary(self) -> Path | None:
+        path = os.environ.get("GITHUB_STEP_SUMMARY") if self._on_github else None
+        return Path(path) if path else None
+
+    @property
+    def files(self) -> list[Path]:
+        """Those that `write` writes."""
+        return [path for path in (self.junit, self._summary) if path is not None]
+
+    def write(
+        self,
+        name: str,
+        cases: Sequence[Case],
+        files: Mapping[str, str],
+        walls: Mapping[str, float] | None = None,
+        not_run: Mapping[str, str] | None = None,
+        missing: Sequence[str] = (),
+        title: str = "",
+    ) -> None:
+        """Write all of them.  title: of the summary, by default the name;  the others as `annotate`
+        and `write_junit` have them.  Raises ImageError."""
+        if self.junit is not None:
+            write_junit(self.junit, cases, name, walls, not_run, missing)
+        if self._on_github:
+            annotate(cases, sys.stdout, files, missing)
+        if self._summary is not None:
+            summarise(cases, self._summary, title or name, not_run, missing)
 
 
 def annotate(
@@ -209,14 +242,33 @@ def write_junit(
     were skipped, by name: skipped tests;  missing: names of cases that an interrupted run did not
     reach: errors.
     """
+    tests = [_test(case, (seconds or {}).get(case.scene)) for case in ranked(cases)]
+    tests += [Test(left, Error(INTERRUPTED, "missing")) for left in missing]
+    tests += [Test(left, Skipped(_legal(why))) for left, why in (not_run or {}).items()]
+    write_tests(path, name, tests)
+
+
+class Test(NamedTuple):
+    """result: None if it passed;  details: beside the result."""
+
+    name: str
+    result: Error | Failure | Skipped | None = None
+    details: str = ""
+    seconds: float = 0.0
+
+
+def write_tests(path: Path, name: str, tests: Iterable[Test]) -> None:
+    """Write one suite as JUnit XML, whole or not at all.  Raises ImageError."""
     suite = TestSuite(_legal(name))
-    for case in ranked(cases):
-        of_steps = sum(sum(times.values()) for times in case.seconds.values())
-        suite.add_testcase(_test(case, name, (seconds or {}).get(case.scene, of_steps)))
-    for left in missing:
-        suite.add_testcase(_without_case(left, name, Error(INTERRUPTED, "missing")))
-    for skipped, why in (not_run or {}).items():
-        suite.add_testcase(_without_case(skipped, name, Skipped(_legal(why))))
+    for test in tests:
+        written = TestCase(_legal(test.name), _legal(name), round(test.seconds, 3))
+        if test.result is not None:
+            written.result = [test.result]
+        if test.details and test.result is None:
+            written.system_out = _legal(test.details)
+        elif test.details:
+            test.result.text = _legal(test.details)
+        suite.add_testcase(written)
     document = JUnitXml(_legal(name))
     document.add_testsuite(suite)
     document.update_statistics()
@@ -224,23 +276,14 @@ def write_junit(
         document.write(str(temporary), pretty=True)
 
 
-def _without_case(case: str, suite: str, result: Error | Skipped) -> TestCase:
-    test = TestCase(_legal(case), _legal(suite), 0.0)
-    test.result = [result]
-    return test
-
-
-def _test(case: Case, suite: str, seconds: float) -> TestCase:
-    test = TestCase(_legal(case.scene), _legal(suite), round(seconds, 3))
-    details = _legal("\n".join(_details(case)))
-    if case.verdict in PASSING:
-        test.system_out = details
-        return test
+def _test(case: Case, seconds: float | None) -> Test:
+    """seconds: None for the sum over its steps."""
+    if seconds is None:
+        seconds = sum(sum(times.values()) for times in case.seconds.values())
     kind = Error if case.verdict == _BROKEN else Failure
     result = kind(_legal(f"{case.verdict}: {headline(case)}"), case.verdict)
-    result.text = details
-    test.result = [result]
-    return test
+    told = "\n".join(_details(case))
+    return Test(case.scene, None if case.verdict in PASSING else result, told, seconds)
 
 
 def _details(case: Case) -> list[str]:

@@ -86,9 +86,10 @@ class Table(Generic[R]):
         return [[column.text(column.of(row)) for column in self.seen] for row in self.rows]
 
     @property
-    def marked(self) -> list[tuple[str, list[Shown]]]:
-        """The mark of each row, and its cells."""
-        return [(self.mark(row), cells) for row, cells in zip(self.rows, self.cells, strict=True)]
+    def marked(self) -> list[tuple[str, list[str | Cell]]]:
+        """The mark of each row and its cells, for a page."""
+        plain_text = [[c.plain if isinstance(c, Text) else c for c in row] for row in self.cells]
+        return [(self.mark(row), cells) for row, cells in zip(self.rows, plain_text, strict=True)]
 
     def terminal(self, width: int, title: str = "") -> RenderableType:
         """For a terminal of so many columns."""
@@ -99,8 +100,9 @@ class Table(Generic[R]):
 
     def markdown(self, escaped: Callable[[str], str] = _without_bars) -> list[str]:
         """The lines of a table;  escaped: what is markup in the text of a cell."""
-        rows = [[escaped(_text(cell)) for cell in row] for row in self.cells]
-        head, *body = [f"| {' | '.join(row)} |" for row in (self.head, *rows)]
+        rows: list[list[Shown]] = [[*self.head], *self.cells]
+        lines = (" | ".join(escaped(_text(cell)) for cell in row) for row in rows)
+        head, *body = [f"| {line} |" for line in lines]
         return [head, "|---" * len(self.head) + "|", *body]
 
     def records(self) -> list[dict[str, Any]]:

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.geometry.frame import SHADOW_EPSILON
-from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.plugins.whitted import without
 from comparisons.mitsuba.scene import for_rays, light_id
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.coincidence import is_doubled, on_two_surfaces

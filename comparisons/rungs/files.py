@@ -25,26 +25,16 @@ from typing import Any
 import numpy as np
 
 from comparisons.geometry import affine
-from comparisons.geometry.equations import EQUATIONS
 from comparisons.geometry.flatten import maps_of
 from comparisons.mitsuba.second import Corners, by_second, by_us, image, rounding_of
 from comparisons.results.case import RungResult
+from comparisons.shapes import type_of
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.lights import EnvironmentMap
 from reference_rt.lights.emitters import environment_map
 from reference_rt.rendering.scene import Scene
-from reference_rt.shapes import (
-    Box,
-    Disk,
-    Mesh,
-    Plane,
-    Quadric,
-    Rectangle,
-    Sphere,
-    Torus,
-    Triangle,
-)
+from reference_rt.shapes import Mesh, Triangle
 from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.shape import Shape, Solid, TabulationContext
 from reference_rt.textures import Bitmap
@@ -140,7 +130,7 @@ def _check_shape(where: str, shape: Shape, folder: Path, found: Found) -> None:
                 f"{_text(theirs[k])}"
             )
         found.count("instances")
-    elif type(shape) in EQUATIONS:
+    elif type_of(shape).surface is not None:
         _check_equation(where, shape, found)
     else:
         found.unread.append(type(shape).__name__.lower())
@@ -244,34 +234,31 @@ def _unit(v: FloatArray) -> FloatArray:
     return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
 
 
-NAMES = {kind: "boxes" if kind is Box else f"{kind.__name__.lower()}s" for kind in EQUATIONS} | {
-    Torus: "tori"
-}
-
-
 def _check_equation(where: str, shape: Shape, found: Found) -> None:
     """Rays at places within the shape, from everywhere; they must meet it where its equation holds,
     and reach as far as it does."""
-    surface, m = EQUATIONS[type(shape)](shape), affine.of_steps(shape.transform)
+    of = type_of(shape)
+    assert of.surface is not None
+    surface, m = of.surface(shape), affine.of_steps(shape.transform)
     linear, offset = m[:, :3], m[:, 3]
     inverse = np.linalg.inv(linear)
     rng = np.random.default_rng(38)
-    half, middle = np.array(surface.half, float), np.array(surface.middle, float)
+    half, middle = np.array(surface.half), np.array(surface.middle)
     size = float(np.linalg.norm(half))
     target = middle + half * rng.uniform(-0.95, 0.95, (RAYS, 3))
     begin = middle + 4.0 * size * _unit(rng.normal(size=(RAYS, 3)))
     o, d = begin @ linear.T + offset, (target - begin) @ linear.T
     hits = Scene(shapes=(shape.model_copy(update={"material": None}),)).intersect(o, d)
-    found.count(NAMES[type(shape)])
+    found.count(of.table.field if of.table else f"{type(shape).__name__.lower()}s")
     if not hits.hit.any():
-        if isinstance(shape, Sphere | Box | Disk | Rectangle | Plane):
+        if surface.is_full:
             found.differences.append(f"{where}: rays do not meet it where its description is")
         return
     q = (hits.p[hits.hit] - offset) @ inverse.T
     # Our points are right to some ulp of the coordinates, in the world, seen in the shape's space.
     reach = float(np.abs(hits.p[hits.hit]).max() + np.abs(offset).max())
     rounding = 2.0**-40 * (size + np.linalg.norm(inverse, 2) * reach)
-    error = np.abs(surface.f(q)) if not _is_flat(shape) else np.maximum(surface.f(q), 0.0)
+    error = surface.distance(q)
     p, n = hits.p[hits.hit], hits.n[hits.hit]
     k = int(error.argmax())
     if error[k] > rounding:
@@ -280,11 +267,8 @@ def _check_equation(where: str, shape: Shape, found: Found) -> None:
             "in its own space"
         )
         return
-    gradient = surface.gradient(q)
+    gradient = surface.normals(q)
     is_smooth = np.linalg.norm(gradient, axis=1) > 0.0
-    if isinstance(shape, Quadric) and shape.capped:
-        value = np.maximum(np.array(shape.lower) - q, q - np.array(shape.upper)).max(axis=1)
-        is_smooth &= value < -1e-9 * size
     p, n, expected = p[is_smooth], n[is_smooth], _unit(gradient[is_smooth] @ inverse)
     # Mirrored shapes keep the front of their description.
     off = np.linalg.norm(expected - n, axis=1)
@@ -293,10 +277,6 @@ def _check_equation(where: str, shape: Shape, found: Found) -> None:
         found.differences.append(
             f"{where}: has the normal {_text(n[k])} at {_text(p[k])}; expected {_text(expected[k])}"
         )
-
-
-def _is_flat(shape: Shape) -> bool:
-    return isinstance(shape, Disk | Rectangle | Plane)
 
 
 # ---- images --------------------------------------------------------------------------------------

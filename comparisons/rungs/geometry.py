@@ -1,18 +1,18 @@
 """The rung of geometry: the same rays hit the same surfaces at the same points."""
 
 import dataclasses
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from comparisons.geometry import affine
-from comparisons.geometry.exact.referee import Referee, identity_of
 from comparisons.geometry.frame import round32
-from comparisons.geometry.sizes import LeafSizes, ShapeSizes
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.hits import BoolArray, MitsubaHits, rows_of
+from comparisons.referee.referee import Referee, identity_of
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.results.case import RungResult, Status
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.any_hit import any_hits
@@ -111,42 +111,12 @@ def _spots(sizes: ShapeSizes, rng: np.random.Generator) -> FloatArray:
     for copy in copies:
         for leaf in sizes.leaves_of(copy):
             if id(leaf) not in local:
-                spots = np.concatenate([np.zeros((0, 3)), *_spots_of(leaf)])
+                spots = leaf.known.targets(leaf.table)
                 if len(spots) > MOST_SPOTS:
                     spots = spots[rng.choice(len(spots), MOST_SPOTS, replace=False)]
                 local[id(leaf)] = spots
             found.append(affine.apply_points(copy.outer, local[id(leaf)][:share]))
     return np.concatenate(found)
-
-
-def _spots_of(leaf: LeafSizes) -> Iterator[FloatArray]:
-    """Corners and middles of edges (n, 3) of a shape, in its group's coordinates."""
-    table = leaf.table
-    if leaf.field == "triangles":
-        v = table.vertices.reshape(-1, 3, 3)
-        yield v.reshape(-1, 3)
-        yield (0.5 * (v + np.roll(v, 1, axis=1))).reshape(-1, 3)
-    elif leaf.field == "boxes":
-        ends = np.array([[x, y, z] for x in _TICKS for y in _TICKS for z in _TICKS])
-        q = ends[np.count_nonzero(ends, axis=1) >= 2]
-        yield table.center[0] + q @ table.edges[0].reshape(3, 3)
-    elif leaf.field == "polygons":
-        yield from _flat(table, table.outline[:, :2])
-        yield from _flat(table, 0.5 * (table.outline[:, :2] + table.outline[:, 2:]))
-    elif leaf.field in ("rectangles", "disks"):
-        square = np.array([[x, y] for x in _TICKS for y in _TICKS if x or y])
-        if leaf.field == "disks":
-            phi = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
-            square = np.column_stack([np.cos(phi), np.sin(phi)])
-        yield from _flat(table, square)
-
-
-_TICKS = (-1.0, 0.0, 1.0)
-
-
-def _flat(table: object, xy: FloatArray) -> Iterator[FloatArray]:
-    edges = np.array([table.x_edge[0], table.y_edge[0]])  # type: ignore[attr-defined]
-    yield table.center[0] + xy @ edges  # type: ignore[attr-defined]
 
 
 # ---- which tracer's hit is wrong where they differ: exact arithmetic decides ---------------------

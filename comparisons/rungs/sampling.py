@@ -8,7 +8,7 @@ another probability than the one that estimates divide by may leave the image me
 
 import numpy as np
 
-from comparisons.geometry.sizes import ShapeSizes
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.results.case import RungResult
 from comparisons.rungs.rays.rays import described, mixed_rays
 from reference_rt.core.arrays import FloatArray, IntArray

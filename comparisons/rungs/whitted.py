@@ -8,12 +8,12 @@ import numpy as np
 from scipy import optimize
 
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF, round32
-from comparisons.geometry.sizes import ShapeSizes
-from comparisons.lights.translate import SAMPLED, ambient_of, translate_integrator
+from comparisons.lights.translate import ambient_of, translate_integrator
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.plugins.whitted import MOST_COMPONENTS
 from comparisons.mitsuba.scene import for_rays
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.arbiter import NEIGHBOURS, RADII, BoolArray, directions
@@ -21,6 +21,7 @@ from comparisons.rungs.rays.coincidence import is_steep, moved, on_two_surfaces,
 from comparisons.rungs.rays.lamp_images import changes_of_lamps
 from comparisons.rungs.rays.light_error import LightContext, cut_off, of_direct_light
 from comparisons.rungs.rays.rays import Rays, described, pixel_rays
+from comparisons.shapes import type_of
 from comparisons.translator.accuracy import accuracy, coat_error
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import Whitted
@@ -299,11 +300,12 @@ def plugin_radiance(
 ) -> Callable[..., FloatArray]:
     """Mitsuba's Whitted ray tracing: `Rays`, and where they end if they do -> radiance (n, 3)."""
     mi = mitsuba()
+    # Without rays of a BSDF's samples, what is not sampled lights nothing.
     unlit = [
         name
         for name, mi_shape in counterpart.mi_shapes.items()
         if mi_shape.instance >= 0
-        or not isinstance(mi_shape.leaf, SAMPLED)
+        or not type_of(mi_shape.leaf).is_sampled
         or mi_shape.plugin.stand_in is not None
     ]
     boxes = [

@@ -6,13 +6,13 @@ from functools import partial
 import numpy as np
 
 from comparisons.mitsuba.hits import BoolArray
-from comparisons.shapes.surfaces import Limits, Patch
+from comparisons.shapes.surface import Limits, Patch
 from reference_rt.core.arrays import FloatArray, IntArray
 
 CURVED = (768, 384)
 STRAIGHT = (2048, 4)
 """Cells of a patch that is curved along u and v, and of one that is straight along v: see
-`primitives.SIDE` for why that has more than one."""
+`tubes.SIDE` for why that has more than one."""
 
 ZERO = 1e-12
 """A slope below this fraction of the largest counts as 0."""

@@ -1,7 +1,7 @@
 """Fine meshes that stand in for curved surfaces that Mitsuba lacks, with the surface's normals, and
 how far they are off: in distance, normals, texture coordinates and tangents."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
@@ -10,19 +10,13 @@ import numpy as np
 
 from comparisons.geometry import affine
 from comparisons.geometry.frame import round32
-from comparisons.geometry.sizes import heights_of
 from comparisons.mitsuba.context import UntranslatableError
 from comparisons.mitsuba.hits import Plugin, StandIn
 from comparisons.mitsuba.plugins.exact_coordinates import Coordinates, derivatives_at
-from comparisons.shapes.meshes import (
-    MOST_INSTANCES,
-    MOST_TRIANGLES,
-    Site,
-    Soup,
-    placed,
-    with_mesh_light,
-)
-from comparisons.shapes.surfaces import Implicit, Limits, Patch, meshed
+from comparisons.shapes.meshing import meshed
+from comparisons.shapes.site import MOST_INSTANCES, MOST_TRIANGLES, Site, placed, with_mesh_light
+from comparisons.shapes.soup import Soup, heights_of
+from comparisons.shapes.surface import Limits, Patch, Surface
 from reference_rt.core.arrays import FloatArray
 from reference_rt.shapes.shape import Shape
 
@@ -39,7 +33,7 @@ WEIGHTS /= WEIGHTS.sum(axis=1, keepdims=True)
 sides."""
 
 
-def measured_error(soup: Soup, surface: Implicit, m: affine.Affine) -> tuple[float, float]:
+def measured_error(soup: Soup, surface: Surface, m: affine.Affine) -> tuple[float, float]:
     """The largest distance and the largest angle, in radians, between a mesh and its surface.
 
     The distance is f over its gradient in the scene, exact but for terms of second order.
@@ -99,7 +93,7 @@ any direction on a mesh."""
 
 
 def measured_twist(
-    soup: Soup, of: Coordinates, surface: Implicit, m: affine.Affine, exact: bool
+    soup: Soup, of: Coordinates, surface: Surface, m: affine.Affine, exact: bool
 ) -> float:
     """The angle in the scene, in radians, between the derivatives of the position by u of mesh and
     surface.
@@ -172,17 +166,14 @@ def coarser(factor: float) -> Iterator[None]:
 
 def stand_in(
     shape: Shape,
-    patches: Sequence[Patch],
-    surface: Implicit,
-    box: Limits | None,
+    surface: Surface,
     site: Site,
     of: Coordinates,
     with_uv: Callable[[Soup], Soup] | None = None,
 ) -> Plugin:
-    """The mesh that stands in for a shape, and its error in the scene; patches, surface, box and
-    `of` are in the shape's own coordinates.  with_uv: adds texture coordinates, where there is a
-    texture."""
-    own = affine.of_steps(shape.transform)
+    """The mesh that stands in for a shape, and its error in the scene; surface and `of` are in the
+    shape's own coordinates.  with_uv: adds texture coordinates, where there is a texture."""
+    own, patches = affine.of_steps(shape.transform), surface.patches()
     most = 2.0 * sum(patch.cells[0] * patch.cells[1] for patch in patches) * _fineness.get() ** 2
     exact = _has_exact_coordinates(site, most)
     fineness = _fineness.get()
@@ -191,9 +182,9 @@ def stand_in(
         fineness *= min(1.0, (MOST_TRIANGLES / (site.copies * most)) ** 0.5)
     key: tuple[Any, ...] = ("stand-in", id(shape), fineness)
     if key not in site.shared:
-        soup = meshed(patches, surface, box, fineness)
+        soup = meshed(surface, fineness)
         sag, turn = measured_error(soup, surface, own)
-        coarse, _ = measured_error(meshed(patches, surface, box, 0.5 * fineness), surface, own)
+        coarse, _ = measured_error(meshed(surface, 0.5 * fineness), surface, own)
         name, ratio = type(shape).__name__.lower(), coarse / sag if sag > 0.0 else 1.0
         site.shared[key] = soup, StandIn(name, len(soup.faces), sag, turn, ratio)
     soup, found = site.shared[key]
@@ -205,6 +196,7 @@ def stand_in(
     if site.textured and soup.uvs is not None:
         key = (*key, "slip")
         if key not in site.shared:
+            box = None if patches[0].has_uv else surface.ends
             site.shared[key] = measured_slip(soup, patches[0], box)
         found = found._replace(slip=site.shared[key], shift=0.0 if exact else site.shared[key])
     m = affine.compose(own, site.place.outer)
@@ -267,3 +259,31 @@ def _is_bumped(part: Any) -> bool:
     return part.get("type") in ("bumpmap", "exact_bump") or any(
         _is_bumped(inner) for inner in part.values()
     )
+
+
+# ---- closed meshes, for files --------------------------------------------------------------------
+
+
+GRID = 1e-9
+"""Vertices of one place, over the size of the mesh: apart by rounding where a patch meets itself.
+"""
+
+
+def _welded(soup: Soup) -> Soup:
+    """The mesh with vertices of one place at the very same place, so that it is closed, and without
+    the triangles that lose their area."""
+    size = float(np.ptp(soup.positions, axis=0).max())
+    places = np.round(soup.positions / (GRID * size)).astype(np.int64)
+    _, first, number = np.unique(places, axis=0, return_index=True, return_inverse=True)
+    number = number.ravel()
+    corners = number[soup.faces]
+    kept = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    return Soup(
+        soup.positions[first][number], soup.normals, soup.uvs, soup.colours, soup.faces[kept]
+    )
+
+
+def tessellated(surface: Surface, m: affine.Affine) -> tuple[list[Soup], float]:
+    """A surface as a closed mesh, and its error under the map m."""
+    soup = meshed(surface, 1.0)
+    return [_welded(soup)], measured_error(soup, surface, m)[0]

@@ -19,14 +19,13 @@ from comparisons.cameras.translate import (
     translate_sampler,
 )
 from comparisons.geometry import affine
-from comparisons.geometry.flatten import Copy, Leaf, copies_of, place_of
+from comparisons.geometry.flatten import Copy, Leaf, Member, copies_of, place_of
 from comparisons.geometry.frame import Frame
 from comparisons.lights.translate import (
     BLACK,
     counts_lights_often,
     drops_light,
     in_place_of,
-    never_samples,
     translate_integrator,
     translate_light,
 )
@@ -44,11 +43,14 @@ from comparisons.mitsuba.hits import MitsubaShape, Plugin
 from comparisons.mitsuba.lit_scene import LitScene
 from comparisons.mitsuba.scene import light_id, shape_id
 from comparisons.renderers import ReferenceSampler
-from comparisons.shapes import Site, translate_shape
-from comparisons.shapes.meshes import MOST_INSTANCES
+from comparisons.shapes import translate_shape, type_of
+from comparisons.shapes.site import MOST_INSTANCES, Site
 from comparisons.translator.moved import frame_of, moved
+from reference_rt.integrators import Direct
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
+from reference_rt.shapes import Sphere
+from reference_rt.shapes.shape import TabulationContext
 
 # Without this Embree drops rays that hit a shared edge (Mitsuba issue 1149).
 ROBUST = {"embree_use_robust_intersections": True}
@@ -160,6 +162,22 @@ def _reach(scene: Scene, copies: list[Copy]) -> float:
     return found
 
 
+def _never_samples(
+    integrator: Any, copy: Copy, member: Member, leaf: Leaf, place: TabulationContext
+) -> bool:
+    """Whether a lamp lights nothing, because `reference_rt` samples lights alone and not this one:
+    parts of groups and of solids, ellipsoids, and shapes that are not `is_sampled` shine where a
+    ray of a BSDF's samples hits them.  Mitsuba samples the mesh that stands in for it."""
+    if not isinstance(integrator, Direct) or integrator.bsdf_samples > 0:
+        return False
+    shape = leaf.shape
+    if copy.instance >= 0 or member.tree is not None or not type_of(shape).is_sampled:
+        return True
+    return isinstance(shape, Sphere) and not affine.is_similarity(
+        affine.map_in(shape, place)[:, :3]
+    )
+
+
 def _add(
     result: _Translated,
     scene: Scene,
@@ -178,7 +196,7 @@ def _add(
         for leaf in member.leaves:
             place = place_of(scene, leaf, copy.outer)
             parts = parts_of(leaf.material, context)
-            if "emitter" in parts and never_samples(scene.integrator, copy, member, leaf, place):
+            if "emitter" in parts and _never_samples(scene.integrator, copy, member, leaf, place):
                 parts["emitter"]["sampling_weight"] = 0.0
             site = Site(
                 place=place,

@@ -9,8 +9,9 @@ import numpy as np
 
 from comparisons.cameras.translate import focus_of
 from comparisons.geometry.frame import Frame, frame_for
-from comparisons.geometry.sizes import ShapeSizes
-from comparisons.shapes.meshes import Soup, soup_of
+from comparisons.referee.sizes import ShapeSizes
+from comparisons.shapes.mesh import soup_of
+from comparisons.shapes.soup import Soup
 from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
 from reference_rt.cameras.camera import Camera
 from reference_rt.core.transform import Scale, Translate

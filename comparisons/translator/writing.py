@@ -23,25 +23,25 @@ from comparisons.mitsuba.files import (
     Element,
     Files,
     Reference,
-    Vector,
     check_name,
     matrix_step,
     ply,
     write_files,
 )
 from comparisons.mitsuba.hits import Plugin
-from comparisons.shapes import Site, translate_shape
-from comparisons.shapes.primitives import is_round
+from comparisons.shapes import translate_shape, type_of
+from comparisons.shapes.site import Site
 from comparisons.textures.translate import colour
 from comparisons.translator import elements
 from comparisons.translator.elements import OURS, Surfaces
 from reference_rt.core import transform
 from reference_rt.materials import Emissive
 from reference_rt.rendering.scene import Scene
-from reference_rt.shapes import Box, Cylinder, Disk, Mesh, Rectangle, Shape, Sphere
+from reference_rt.shapes import Mesh, Shape
 from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.meshes.files.data import MeshData
 from reference_rt.shapes.meshes.topology import smooth_normals
+from reference_rt.shapes.shape import Solid
 from reference_rt.util.errors import SceneError
 
 
@@ -84,32 +84,14 @@ class Shapes:
         values: dict[str, Any] = {"to_world": to_world} if to_world else {}
         textured = is_textured(shape.material, self.surfaces.context)
         linear = transform.affine(shape.transform)[:, :3]
-        match shape:
-            case Sphere() if transform.is_similarity(linear) and np.linalg.det(linear) > 0.0:
-                values = {
-                    "center": Vector(*shape.center),
-                    "radius": float(shape.radius),
-                    **values,
-                }
-                found = Element("shape", "sphere", values)
-            case Rectangle():
-                found = Element("shape", "rectangle", values)
-            case Disk():
-                found = Element("shape", "disk", values)
-            case Box() if not textured:
-                found = Element("shape", "cube", values)
-            case Cylinder(capped=False) if is_round(linear):
-                values = {
-                    "p0": Vector(0.0, 0.0, shape.z_min),
-                    "p1": Vector(0.0, 0.0, shape.z_max),
-                    "radius": float(shape.radius),
-                    **values,
-                }
-                found = Element("shape", "cylinder", values)
-            case Mesh() if np.linalg.det(linear) > 0.0:
-                return self._mesh(shape, values)
-            case _:
-                return None
+        if isinstance(shape, Mesh) and np.linalg.det(linear) > 0.0:
+            return self._mesh(shape, values)
+        own_plugin = None if isinstance(shape, Solid) else type_of(shape).own_plugin
+        own = None if own_plugin is None else own_plugin(shape, linear, textured)
+        if own is None:
+            return None
+        plugin, numbers = own
+        found = Element("shape", plugin, {**numbers, **values})
         return self._with_material(found, shape.material)
 
     def _with_material(

@@ -18,7 +18,7 @@ from comparisons.results.files import plain, write_json
 from comparisons.statistics.metrics import encode, white_level
 from comparisons.truth.case import AREAS, Case, Expected, FloatArray
 from comparisons.truth.judge import LEVEL, Judged
-from reference_rt.util.files import check_writable, replacing
+from reference_rt.util.files import replacing
 
 SCHEMA = 1
 """Increased whenever a reader of the former layout would misread the new one."""
@@ -96,14 +96,6 @@ def scores(rows: Sequence[Row]) -> list[Score]:
                 right = sum(r.status == "right" for r in judged)
                 found.append(Score(area, renderer, right, len(judged)))
     return found
-
-
-def prepare(out: Path) -> None:
-    """Check that `write` can write, and remove what an earlier run wrote.  Raises ImageError."""
-    files = out / "results.json", out / "report.html"
-    check_writable(*files)
-    for file in files:
-        file.unlink(missing_ok=True)
 
 
 def write(out: Path, rows: Sequence[Row], provenance: Mapping[str, Any]) -> None:

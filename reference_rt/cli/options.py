@@ -73,12 +73,7 @@ def adjusted(
     """The scene with the options of the command line.  Raises UsageError."""
     from reference_rt.rendering.render import with_settings
 
-    pixels = None
-    if size is not None:
-        width, _, height = size.lower().partition("x")
-        if not all(n.isdecimal() and len(n) < 11 for n in (width, height)):
-            raise UsageError(f"--size: expected WIDTHxHEIGHT, such as 640x480, got '{size}'")
-        pixels = int(width), int(height)
+    pixels = None if size is None else size_of(size)
     try:
         return with_settings(scene, spp=spp, size=pixels, integrator=integrator, seed=seed)
     except SceneError as error:
@@ -102,13 +97,24 @@ def without_blas() -> Iterator[None]:
             del sys.modules[name]
 
 
-# ---- quantities of the command line: durations, numbers of bytes, percentages --------------------
+# ---- quantities of the command line: sizes, durations, numbers of bytes, percentages -------------
 
 
 _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 _BYTES = {"K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40}
 _NUMBER = re.compile(r"(\d+\.?\d*|\.\d+)\s*([a-zA-Z%]*)", re.ASCII)
 _MOST_DIGITS = 30
+
+
+def size_of(text: str) -> tuple[int, int]:
+    """Width and height in pixels, as in 640x480.  Raises UsageError that names --size."""
+    sides = text.lower().split("x")
+    if len(sides) != 2 or not all(n.isdecimal() and len(n) < 11 for n in sides):
+        raise UsageError(f"--size: expected WIDTHxHEIGHT, such as 640x480, got '{text}'")
+    width, height = map(int, sides)
+    if min(width, height) < 1:
+        raise UsageError(f"--size: expected greater than or equal to 1, got '{text}'")
+    return width, height
 
 
 def seconds_of(text: str, option: str) -> float:

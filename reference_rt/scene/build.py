@@ -77,7 +77,8 @@ def light_tables(scene: SceneModel, geometry: Geometry, palette: Palette) -> Lig
     tables: dict[str, Any] = {}
     for code, field, description, module in LIGHT_TABLES:
         found: list[Any] = [light for light in scene.lights if isinstance(light, description)]
-        tables[field] = join([light.tabulate(palette) for light in found]) if found else None
+        made = [light.tabulate(palette) for light in found]
+        tables[field] = _joined(module, made) if found else None
         if found:
             kinds += [code] * len(found)
             rows += range(len(found))

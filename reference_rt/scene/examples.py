@@ -17,7 +17,7 @@ NAMED: dict[str, dict[str, Any]] = {
         "small": Bitmap(file="image.npy", encoding="raw", scale=0.25),
     },
     "materials": {"base": Diffuse(), "other": Mirror()},
-    "groups": {"group": (Sphere(radius=0.8), Box(transform=(Scale(scale=0.5),)))},
+    "groups": {"group": (Sphere(radius=0.8), Box(transform=(Scale(scale=(0.5, 0.5, 0.5)),)))},
 }
 """Fields of a scene with all that examples name but files."""
 

@@ -6,15 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-import typer
 from builders import HELPERS
+from command_line import invoke
 from gate_checks import SCENE, pictures
 from page_in_browser import BROKEN_WORDS, CONTRASTS, FIRST_PICTURE
 from PIL import Image
 from suite_runs import RUNNER
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
-from comparisons.commands.compare import compare, report, suite
 from comparisons.gate import reference
 from comparisons.gate.browser import PageError, chromium_program
 from comparisons.mitsuba.backend import Backend
@@ -180,9 +179,6 @@ class Program:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.found: run.Run | None = None
-        self._app = typer.Typer()
-        for command in (suite, compare, report):
-            self._app.command()(command)
         whole = run.run_cases
 
         def with_fakes(plan: Any, options: run.Options, *more: Any) -> run.Run:
@@ -194,7 +190,7 @@ class Program:
             monkeypatch.delenv(name, raising=False)
 
     def __call__(self, *arguments: Any) -> Result:
-        return CliRunner().invoke(self._app, [str(argument) for argument in arguments])
+        return invoke(*arguments)
 
 
 @pytest.fixture

@@ -1,6 +1,6 @@
 """Rows of a benchmark with made-up times, for its tests."""
 
-from comparisons.experiments.bench import run
+from comparisons.experiments.bench.outputs import markdown
 from comparisons.experiments.bench.row import Row, against
 from comparisons.experiments.bench.run import machine
 
@@ -14,4 +14,4 @@ def made_up(name: str = "one", ratio: float = 0.5, goal: float = 0.8) -> Row:
 
 def a_table(rows: list[Row]) -> str:
     """The table of these rows."""
-    return run.markdown_table(rows, machine(), {"cold": "no time"})
+    return markdown(rows, machine(), {"cold": "no time"})

@@ -62,6 +62,11 @@ def unit_vectors(rng: np.random.Generator, n: int) -> FloatArray:
     return v / np.linalg.norm(v, axis=1, keepdims=True)
 
 
+def random_turn(rng: np.random.Generator) -> FloatArray:
+    """A rotation (3, 3), mirrored as often as not."""
+    return np.linalg.qr(rng.normal(size=(3, 3)))[0]
+
+
 def placed(rng: np.random.Generator, scale: float, offset: float) -> tuple:
     """Steps of a transform: unequal scales near `scale`, any rotation, a translation."""
     return (

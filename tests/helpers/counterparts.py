@@ -9,7 +9,7 @@ import pytest
 
 from comparisons.geometry.frame import OURS
 from comparisons.mitsuba.backend import scalar
-from comparisons.shapes import canonical, primitives
+from comparisons.shapes import canonical, torus
 from comparisons.shapes.stand_ins import coarser
 from comparisons.translator import load
 from reference_rt import Scene
@@ -19,7 +19,7 @@ from reference_rt import Scene
 def coarse_meshes(*cells: int) -> Iterator[None]:
     """Meshes in place of curved shapes with fewer cells, (along, around): quicker to make."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(primitives, "TORUS_CELLS", cells)
+        patch.setattr(torus, "TORUS_CELLS", cells)
         patch.setattr(canonical, "CURVED", cells)
         yield
 

@@ -1,43 +1,18 @@
-"""Every kind of shape, turned, sheared and mirrored."""
+"""Every type of shape, turned, sheared and mirrored."""
 
-from collections.abc import Callable
-from pathlib import Path
+from typing import Any
 
 import numpy as np
-from builders import icosphere, write_obj
 
-import reference_rt as rt
 from reference_rt.core import transform
-
-STAR = [[0.0, 1.0], [0.6, -0.8], [-1.0, 0.3], [1.0, 0.3], [-0.6, -0.8]]
-QUADRIC = {
-    "coefficients": (1.0, 1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.1),
-    "lower": (-0.9, -0.8, -0.7),
-    "upper": (0.8, 0.9, 1.0),
-}
-GROUPS = {"pair": (rt.Sphere(radius=0.8), rt.Sphere(radius=0.3, center=(0.2, 0.9, 0.1)))}
+from reference_rt.core.model import types_of
+from reference_rt.scene.examples import examples
+from reference_rt.shapes.csg import AnyShape
 
 
-def kinds(folder: Path) -> list[Callable[..., object]]:
-    """Each makes a shape, given a transform."""
-    file = write_obj(folder / "ball.obj", *icosphere(1))
-    return [
-        lambda **at: rt.Sphere(radius=0.8, **at),
-        rt.Box,
-        rt.Rectangle,
-        rt.Disk,
-        rt.Plane,
-        lambda **at: rt.Triangle(v0=(0, 0, 0), v1=(1, 0, 0), v2=(0, 1, 0), **at),
-        lambda **at: rt.Polygon(rings=(STAR,), **at),
-        lambda **at: rt.Mesh(file=str(file), **at),
-        lambda **at: rt.Cylinder(radius=0.5, capped=False, **at),
-        lambda **at: rt.Cone(radius=0.6, **at),
-        lambda **at: rt.Torus(major_radius=0.7, minor_radius=0.3, **at),
-        lambda **at: rt.Quadric(**QUADRIC, **at),
-        lambda **at: rt.Quadric(**QUADRIC, capped=True, **at),
-        lambda **at: rt.Difference(of=(rt.Box(), rt.Sphere(radius=1.2)), **at),
-        lambda **at: rt.Instance(group="pair", **at),
-    ]
+def every_shape(number: int) -> list[Any]:
+    """One example of each type, by its number."""
+    return [examples(of)[number] for of in types_of(AnyShape)]
 
 
 def tilted(rng: np.random.Generator, k: int, mirrored: bool) -> tuple:

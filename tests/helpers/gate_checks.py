@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import typer
-from typer.testing import CliRunner, Result
+from command_line import invoke
+from typer.testing import Result
 
-from comparisons.commands.gate import gate
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.exr import write_exr
 from reference_rt.rendering.render import render
@@ -52,9 +51,7 @@ def pictures(scene: str = SCENE, count: int = 4, spp: int = 256) -> FloatArray:
 
 def run(*arguments: str) -> tuple[Result, Any]:
     """`gate` with these, and the case in its results.json."""
-    app = typer.Typer()
-    app.command()(gate)
-    result = CliRunner().invoke(app, [*arguments, "--limit", LIMIT])
+    result = invoke("gate", *arguments, "--limit", LIMIT)
     path = Path("out/results.json")
     return result, json.loads(path.read_text()) if path.exists() else None
 

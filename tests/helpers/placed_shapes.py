@@ -3,12 +3,12 @@
 import itertools
 
 import numpy as np
-from builders import shapes_in_order, unit_vectors
+from builders import random_turn, shapes_in_order, unit_vectors
 from drivers import probe
 
 import reference_rt as rt
-from comparisons.geometry.exact import KINDS, columns_of, first_hit
 from comparisons.geometry.exact.dyadic import NEVER, Dyadic, nearest
+from comparisons.referee import KINDS, columns_of, first_hit
 from reference_rt.core.transform import Matrix
 from reference_rt.shapes import TABLES
 
@@ -18,7 +18,7 @@ from reference_rt.shapes import TABLES
 def random_map(rng, stretch=1.0, offset=3.0):
     """A step of a transform: rotation, scales from 10^-stretch to 10^stretch, shear, rotation,
     mirrored every other time, moved."""
-    rotations = [np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(2)]
+    rotations = [random_turn(rng) for _ in range(2)]
     sheared = np.eye(3) + np.triu(rng.uniform(-1, 1, (3, 3)), 1)
     factors = 10.0 ** rng.uniform(-stretch, stretch, 3) * [1, 1, rng.choice([-1, 1])]
     linear = rotations[0] @ sheared @ np.diag(factors)

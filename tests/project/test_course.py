@@ -5,9 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
-
-from reference_rt.cli.main import _add_commands, app
+from command_line import invoke
 
 ROOT = Path(__file__).parents[2]
 sys.path.append(str(ROOT / "docs"))
@@ -41,13 +39,12 @@ def test_what_is_shown_runs(page: Path, tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.chdir(tmp_path)
     Path("scenes").symlink_to(ROOT / "scenes")
     Path("examples").symlink_to(ROOT / "examples")
-    _add_commands()
 
     def shell(line: str) -> None:
         words = line.partition("#")[0].split()
         assert words[0] == "reference-rt", line
         help_only = ["--help"] if MEASURING.match(line) else []
-        result = CliRunner().invoke(app, [*words[1:], *help_only], catch_exceptions=False)
+        result = invoke(*words[1:], *help_only, catch_exceptions=False)
         expected = re.search(r"# exit (\d)", line)
         assert result.exit_code == int(expected[1] if expected else 0), result.output
 

@@ -4,10 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from command_line import invoke
 from hypothesis import settings
-from typer.testing import CliRunner, Result
-
-from reference_rt.cli.main import app
 
 # The same examples in every run, and no promise of speed: kernels compile inside the first.
 settings.register_profile("fixed", derandomize=True, database=None, deadline=None)
@@ -21,7 +19,7 @@ def refused(tmp_path: Path) -> Callable[..., str]:
 
     def run(exit_code: int, *arguments: str) -> str:
         before = sorted(tmp_path.rglob("*"))
-        result: Result = CliRunner().invoke(app, list(arguments))
+        result = invoke(*arguments)
         assert result.exit_code == exit_code, result.stderr
         assert sorted(tmp_path.rglob("*")) == before
         assert result.stdout == ""

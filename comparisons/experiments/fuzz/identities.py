@@ -19,7 +19,7 @@ from comparisons.experiments.fuzz.data import Data, named_in, shapes_of
 from comparisons.experiments.fuzz.finding import Finding
 from comparisons.experiments.relations import HIERARCHIES, REACH, Motion, differ, identities_of
 from comparisons.geometry.frame import Frame
-from comparisons.geometry.sizes import ShapeSizes
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays.rays import pixel_rays
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray

@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from junitparser import Failure, JUnitXml, TestCase, TestSuite
+from junitparser import Failure
 
 from comparisons.experiments.fuzz.coverage import TYPES, coverage
 from comparisons.experiments.fuzz.data import text_of
 from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced
 from comparisons.experiments.fuzz.run import Plan, Run
+from comparisons.report.ci import Test, write_tests
 from comparisons.report.table import Table, table_of
 from comparisons.report.templates import template, write
 from comparisons.results.files import write_json
@@ -140,23 +141,15 @@ def _is_invalid(finding: Finding | None) -> bool:
 
 def _write_junit(path: Path, plan: Plan, run: Run) -> None:
     """A test for each distinct finding, which fails, and one for all scenes without findings."""
-    suite = TestSuite("fuzz")
-    good = TestCase(f"{sum(f is None for f in _first(run))} scenes", "fuzz", run.seconds)
-    suite.add_testcase(good)
+    good = sum(f is None for f in _first(run))
+    tests = [Test(f"{good} scenes", seconds=run.seconds)]
     for one, count in distinct(run):
         name = f"{one.finding.rung}: {one.finding.cause}"
-        test = TestCase(printable(name), "fuzz", 0.0)
-        result = Failure(printable(f"{name} ({count} scenes)"), "finding")
+        failure = Failure(printable(f"{name} ({count} scenes)"), "finding")
         scene = text_of(one.scene) if one.scene else ""
-        text = f"{one.finding.detail}\n{scene}\nreproduce: {again(plan, one)}"
-        result.text = printable(text, kept="\n\t")
-        test.result = [result]
-        suite.add_testcase(test)
-    document = JUnitXml("fuzz")
-    document.add_testsuite(suite)
-    document.update_statistics()
-    with replacing(path) as temporary:
-        document.write(str(temporary), pretty=True)
+        told = f"{one.finding.detail}\n{scene}\nreproduce: {again(plan, one)}"
+        tests.append(Test(name, failure, told))
+    write_tests(path, "fuzz", tests)
 
 
 def words(run: Run) -> list[str]:

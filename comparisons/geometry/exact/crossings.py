@@ -1,28 +1,22 @@
-"""Exact crossings of each shape: rectangles, disks, planes, polygons, triangles; spheres, boxes,
-quadrics, tori.  `Crossings` is the result of every shape's function.
+"""What the exact crossings of shapes are made of: of planes, and of slabs between planes.
+
+`Crossings` is the result for every shape; their functions stand in `comparisons/shapes`.
 """
 
-import itertools
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-import flint
 import numpy as np
 import numpy.typing as npt
 
 from comparisons.geometry.exact.dyadic import (
-    CERTAIN,
-    FRACTION,
     NEVER,
     BoolArray,
     Dyadic,
     Fixed,
-    Integers,
     apply,
-    cross,
     dot,
     quotient,
-    roots,
     tied,
 )
 
@@ -106,68 +100,8 @@ def plane_crossing(row: Row, o: Dyadic, d: Dyadic) -> PlaneCrossing:
     return PlaneCrossing(t, meets, enters, coordinates[0], coordinates[1], den, in_plane)
 
 
-def _single(m: PlaneCrossing, inside: BoolArray, edge: BoolArray) -> Crossings:
+def single(m: PlaneCrossing, inside: BoolArray, edge: BoolArray) -> Crossings:
     return ordered([where(m.meets & inside, m.t)], [m.enters], [0], (m.meets & edge) | m.in_plane)
-
-
-def rectangles(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
-    m = plane_crossing(row, o, d)
-    sides = [(m.den - m.x), (m.den + m.x), (m.den - m.y), (m.den + m.y)]
-    least = np.min([side.sign() for side in sides], axis=0)
-    return _single(m, least >= 0, least == 0)
-
-
-def disks(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
-    m = plane_crossing(row, o, d)
-    sign = (m.den * m.den - m.x * m.x - m.y * m.y).sign()
-    return _single(m, sign >= 0, sign == 0)
-
-
-def planes(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
-    """An infinite plane; as a solid, the half-space below it."""
-    m = plane_crossing(row, o, d)
-    everywhere = np.ones(len(m.meets), bool)
-    return _single(m, everywhere, ~everywhere)
-
-
-def polygons(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
-    """One polygon: inside where its winding number has a bit of `mask` (the fill rule)."""
-    m = plane_crossing(row, o, d)
-    winding = np.zeros(len(m.meets), np.int64)
-    edge = np.zeros(len(m.meets), bool)
-    first, size = int(row["first"][0]), int(row["size"][0])
-    for ends in np.asarray(row["outline"])[first : first + size]:
-        a_x, a_y, b_x, b_y = (Dyadic.of(value) * m.den for value in ends)
-        a_x, a_y, b_x, b_y = a_x - m.x, a_y - m.y, b_x - m.x, b_y - m.y
-        side = (a_x * b_y - a_y * b_x).sign()
-        up, down = (a_y.sign() <= 0) & (b_y.sign() > 0), (b_y.sign() <= 0) & (a_y.sign() > 0)
-        winding += np.where(up & (side > 0), 1, 0) - np.where(down & (side < 0), 1, 0)
-        between = (a_x * b_x + a_y * b_y).sign() <= 0
-        edge |= (side == 0) & between
-    return _single(m, (winding & int(row["mask"][0])) != 0, edge)
-
-
-def triangles(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
-    """Triangles; edges and corners count as inside, and as touching."""
-    v = column(row, "vertices")
-    corners = [v[..., 3 * k : 3 * k + 3] - o for k in range(3)]
-    n = cross(corners[1] - corners[0], corners[2] - corners[0])
-    num, den = dot(corners[0], n), dot(d, n)
-    signs = np.array([dot(d, cross(corners[k], corners[(k + 1) % 3])).sign() for k in range(3)])
-    meets = den.sign() != 0
-    inside = (signs >= 0).all(axis=0) | (signs <= 0).all(axis=0)
-    edge = inside & (signs == 0).any(axis=0)
-    in_plane = ~meets & (num.sign() == 0)
-    code = np.broadcast_to(row.get("face", 0), inside.shape)
-    t = where(meets & inside, quotient(num, den))
-    return ordered([t], [den.sign() < 0], [code], (meets & edge) | in_plane)
-
-
-def spheres(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
-    f, r = o - column(row, "center"), column(row, "radius")
-    sign, near, far = roots(dot(d, d), dot(f, d), dot(f, f) - r * r)
-    t = [where(sign >= 0, near), where(sign >= 0, far)]
-    return ordered(t, [np.array(True), np.array(False)], [0, 0], sign == 0)
 
 
 class Slabs:
@@ -205,133 +139,3 @@ class Slabs:
         earlier = moves & (leave < self.t_out)
         self.t_out = np.where(earlier, leave, self.t_out)
         self.code_out = np.where(earlier, np.where(up, k + 3, k), self.code_out)
-
-
-def boxes(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
-    """Codes: the axis, + 3 on the positive side."""
-    q, e = in_local(row, o, d)
-    one = Dyadic.of(np.ones((1, 3)))
-    s = Slabs(q, e, -one, one, np.ones(3))
-    t = [where(~s.misses, s.t_in), where(~s.misses, s.t_out)]
-    return ordered(t, [np.array(True), np.array(False)], [s.code_in, s.code_out], s.touching)
-
-
-def quadrics(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
-    """Codes: 0 for f's surface, else 1 + the face of the clip box.
-
-    An uncapped quadric is entered from the side f > 0.
-    """
-    q, e = in_local(row, o, d)
-    k = column(row, "coefficients")
-    a, b, c = _along(k, q, e)
-    sign, near, far = roots(a, b, c)
-    s = Slabs(q, e, column(row, "lower"), column(row, "upper"), row["clipped"])
-    capped = np.broadcast_to(np.asarray(row["capped"]) != 0, len(q.n))
-    between = a.sign() >= 0  # f <= 0 between the roots, else outside of them
-    real, never = sign >= 0, np.full(len(q.n), NEVER, dtype=object)
-    touching = s.touching | (~s.misses & (sign == 0))
-    for t in (near, far):
-        touching |= real & ~s.misses & (tied(t, s.t_in) | tied(t, s.t_out))
-    # Where f <= 0, as two intervals; without roots the whole line or nothing.
-    constant_in = ~real & (c.sign() <= 0)
-    start = [
-        np.where(real & between, near, np.where((real & ~between) | constant_in, -never, never)),
-        np.where(real & ~between, far, never),
-    ]
-    end = [
-        np.where(real & between, far, np.where(real & ~between, near, never)),
-        np.where(real & ~between, never, never),
-    ]
-    times, enters, codes = [], [], []
-    for low, high in zip(start, end, strict=True):
-        inside_low, inside_high = np.maximum(low, s.t_in), np.minimum(high, s.t_out)
-        some = ~s.misses & (inside_low < inside_high)
-        for t, on_f, cap, way in (
-            (inside_low, low >= s.t_in, s.code_in, True),
-            (inside_high, high <= s.t_out, s.code_out, False),
-        ):
-            shown = some & (on_f | capped) & (abs(t) < NEVER)
-            times.append(where(shown, t))
-            enters.append(np.array(way))
-            codes.append(np.where(on_f, 0, 1 + cap))
-    return ordered(times, enters, codes, touching)
-
-
-def _along(k: Dyadic, q: Dyadic, e: Dyadic) -> tuple[Dyadic, Dyadic, Dyadic]:
-    """f(q + t e) = a t² + 2 b t + c; f's coefficients in the order x² y² z² xy yz xz x y z 1."""
-    pairs = list(itertools.chain(((i, i) for i in range(3)), ((0, 1), (1, 2), (0, 2))))
-
-    def quadratic(u: Dyadic, v: Dyadic) -> Dyadic:
-        terms = [k[..., n] * u[..., i] * v[..., j] for n, (i, j) in enumerate(pairs)]
-        return _total(terms)
-
-    def linear(u: Dyadic) -> Dyadic:
-        return _total([k[..., 6 + i] * u[..., i] for i in range(3)])
-
-    half = Dyadic.of(0.5)
-    b = half * (quadratic(q, e) + quadratic(e, q) + linear(e))
-    return quadratic(e, e), b, quadratic(q, q) + linear(q) + k[..., 9]
-
-
-def _total(terms: list[Dyadic]) -> Dyadic:
-    total = terms[0]
-    for term in terms[1:]:
-        total = total + term
-    return total
-
-
-def torus_quartic(row: Row, o: Dyadic, d: Dyadic) -> Integers:
-    """The coefficients (n, 5), up to a factor and with the constant term first, of
-    (|p|² + R² - r²)² - 4 R² (x² + y²) along the rays."""
-    q, e = in_local(row, o, d)
-    major, minor = column(row, "major"), column(row, "minor")
-    alpha, beta = dot(e, e), Dyadic.of(2.0) * dot(q, e)
-    gamma = dot(q, q) + major * major - minor * minor
-    four = Dyadic.of(4.0) * major * major
-    flat_q, flat_e = q[..., :2], e[..., :2]
-    ring = [
-        dot(flat_q, flat_q) * four,
-        Dyadic.of(2.0) * dot(flat_q, flat_e) * four,
-        dot(flat_e, flat_e) * four,
-    ]
-    coefficients = [
-        gamma * gamma - ring[0],
-        Dyadic.of(2.0) * beta * gamma - ring[1],
-        beta * beta + Dyadic.of(2.0) * alpha * gamma - ring[2],
-        Dyadic.of(2.0) * alpha * beta,
-        alpha * alpha,
-    ]
-    exponent = min(c.e for c in coefficients)
-    return np.stack([np.broadcast_to(c.to(exponent).n, len(q.n)) for c in coefficients], axis=1)
-
-
-def tori(row: Row, o: Dyadic, d: Dyadic) -> Crossings:
-    """Roots of the quartic, isolated and certified by FLINT (fmpz_poly_complex_roots)."""
-    q, e = in_local(row, o, d)
-    integers = torus_quartic(row, o, d)
-    # Rays that miss the bounding sphere miss the torus.
-    size = column(row, "major") + column(row, "minor")
-    ball, _, _ = roots(dot(e, e), dot(q, e), dot(q, q) - size * size)
-    t = np.full((len(q.n), 4), NEVER, dtype=object)
-    touching = np.zeros(len(q.n), bool)
-    for i in np.flatnonzero(ball > 0).tolist():
-        found = _real_roots(integers[i].tolist())
-        simple = [t for t, times in found if times % 2 == 1]
-        touching[i] = any(times > 1 for _, times in found)
-        t[i, : len(simple)] = sorted(simple)
-    ways = [np.array(k % 2 == 0) for k in range(4)]
-    return ordered([t[:, k] for k in range(4)], ways, [0] * 4, touching)
-
-
-def _real_roots(coefficients: list[int]) -> list[tuple[int, int]]:
-    """(t as fixed-point number, multiplicity) of the real roots;  coefficients: the constant term
-    first."""
-    precision = flint.ctx.prec
-    flint.ctx.prec = CERTAIN + 32
-    try:
-        found = flint.fmpz_poly(coefficients).complex_roots()
-        real = [(z.real, times) for z, times in found if z.imag == 0]
-        one = flint.arb(2) ** FRACTION
-        return [(int((x * one).mid().floor().unique_fmpz()), times) for x, times in real]
-    finally:
-        flint.ctx.prec = precision

@@ -107,7 +107,7 @@ def light_points(
     mi: Any, scene: Any, unlit: Collection[str] = (), boxes: Collection[str] = ()
 ) -> list[LightPoint]:
     """The points of all area lights of a scene, except shapes whose id is in `unlit`;  boxes: the
-    ids of boxes and rectangles, which may be meshes: see `translate.shapes.primitives`."""
+    ids of boxes and rectangles, which may be meshes: see `comparisons.shapes`."""
     points: list[LightPoint] = []
     for emitter in scene.emitters():
         shape = emitter.get_shape()

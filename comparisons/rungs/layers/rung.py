@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import Counterpart, trace
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.results.case import RungResult
 from comparisons.rungs.layers.seen import Centres, FilmPoints, Seen, centres, sensor_rays
 from comparisons.rungs.rays import arbiter

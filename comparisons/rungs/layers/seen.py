@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.cameras.translate import translate_filter
-from comparisons.geometry.sizes import LeafSizes, ShapeSizes
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.hits import MitsubaHits, rows_of
 from comparisons.mitsuba.scene import for_rays
+from comparisons.referee.sizes import LeafSizes, ShapeSizes
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.camera import camera_rays, ends
 from comparisons.rungs.rays.comparer import KINDS, Comparer

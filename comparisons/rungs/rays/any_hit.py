@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.geometry import affine
-from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.scene import for_rays
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays.rays import Rays, random_rays
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
-from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.hits import BoolArray, MitsubaHits, rows_of
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.comparer import DISCRETE, KINDS, Comparer
 from comparisons.rungs.rays.rays import Rays

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.hits import MitsubaHits
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.rays.resolution import slide
+from comparisons.shapes import type_of
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.query import Intersections
-from reference_rt.shapes import Cone, Cylinder, Disk, Sphere
 
 KINDS = (
     "hit",
@@ -30,12 +30,8 @@ class Comparer:
 
     def __init__(self, sizes: ShapeSizes) -> None:
         self.sizes = sizes
-        shapes = [leaf.shape for leaf in sizes.leaves]
         # A miss has leaf -1: the last entry.
-        shapes_and_none = [*shapes, None]
-        self._round = np.array([isinstance(s, Sphere) for s in shapes_and_none])
-        self._disk = np.array([isinstance(s, Disk) for s in shapes_and_none])
-        self._tube = np.array([isinstance(s, Cylinder | Cone) for s in shapes_and_none])
+        self._unwrapped = [*(type_of(leaf.shape).unwrapped for leaf in sizes.leaves), None]
 
     def ratios(self, rays: Rays, ours: Intersections, theirs: MitsubaHits) -> FloatArray:
         """(n, len(KINDS)): error over bound, infinite for a different shape, part or face.
@@ -75,27 +71,14 @@ class Comparer:
         )
 
     def _spot(self, hits: Intersections, ours: Intersections) -> FloatArray:
-        """uv as coordinates (n, 3) without seam or pole: of a sphere a unit vector, of a disk x and
-        y, of a cylinder or cone a point of the unit circle and v."""
+        """uv as coordinates (n, 3) without seam or pole, as far as the shape's faces have any."""
         leaf = self.sizes.leaf_of(ours)
-        u, v = hits.uv.T
-        on_sphere = np.column_stack([_circle(u, np.sin(np.pi * v)), np.cos(np.pi * v)])
-        on_disk = np.column_stack([_circle(v, u), np.zeros_like(u)])
-        on_tube = np.column_stack([_circle(u, np.ones_like(u)), v])
-        flat = np.column_stack([u, v, np.zeros_like(u)])
-        side = self._tube[leaf] & (ours.primitive == 0)
-        chosen = np.select(
-            [m[:, None] for m in (self._round[leaf], self._disk[leaf], side)],
-            [on_sphere, on_disk, on_tube],
-            flat,
-        )
-        return np.asarray(chosen)
-
-
-def _circle(turns: FloatArray, radius: FloatArray) -> FloatArray:
-    """x, y (n, 2)."""
-    phi = 2.0 * np.pi * turns
-    return np.column_stack([radius * np.cos(phi), radius * np.sin(phi)])
+        found = np.column_stack([hits.uv, np.zeros(len(leaf))])
+        for unwrapped in {function for function in self._unwrapped if function is not None}:
+            is_its = np.array([function is unwrapped for function in self._unwrapped])
+            rows = is_its[leaf] & (ours.primitive == 0)
+            found[rows] = unwrapped(hits.uv[rows])
+        return found
 
 
 __all__ = ["DISCRETE", "KINDS", "Comparer"]

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.geometry.frame import UNIT_ROUNDOFF
-from comparisons.geometry.sizes import ShapeSizes
 from comparisons.materials.coat import PASSED
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.hits import MitsubaHits, rows_of
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays.coincidence import is_steep, moved, slopes, turned
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.rays.resolution import slide

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from comparisons.geometry.frame import Frame, round32
-from comparisons.geometry.sizes import ShapeSizes
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays.camera import camera_rays, pixel_centres
 from reference_rt.cameras.film import Film
 from reference_rt.core.arrays import FloatArray, IntArray

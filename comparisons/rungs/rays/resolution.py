@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.hits import BoolArray, rows_of
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.rays import Rays, mixed_rays
 from reference_rt.core.arrays import FloatArray

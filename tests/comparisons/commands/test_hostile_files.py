@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import invoke
 
 import reference_rt as rt
 from comparisons.gate.baselines import used_in
@@ -21,7 +21,6 @@ from comparisons.results.stored_case import CASE, read_stored_case
 from comparisons.suites.keys import files_digest
 from comparisons.suites.run import read_stored_results
 from comparisons.suites.suite import load_suite
-from reference_rt.cli.main import app
 from reference_rt.core.exr import read_exr
 from reference_rt.scene.build import build_tables
 from reference_rt.shapes.meshes.files import other
@@ -229,7 +228,7 @@ def test_every_command_and_every_name(tmp_path, monkeypatch, command, name):
     monkeypatch.delenv("CI", raising=False)
     (tmp_path / "good.yaml").write_text("shapes: [{type: sphere}]\n")
     arguments = [word.format(NAMES[name]) if "{" in word else word for word in command]
-    result = CliRunner().invoke(app, arguments)
+    result = invoke(*arguments)
     assert result.exit_code in (2, 3, 4), result.output
     for told in (result.stdout, result.stderr):
         assert all(c.isprintable() or c in "\n" for c in told), told

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import pytest
+from command_line import invoke
 from suite_runs import run_in, scenes
-from typer.testing import CliRunner
 
 import comparisons.commands.register
 import comparisons.experiments.convergence.methods
@@ -22,9 +22,6 @@ import reference_rt.scene.build
 from reference_rt.cli.main import app
 
 SCENE = str(Path(__file__).parents[3] / "scenes" / "spheres_whitted.yaml")
-
-if not any(command.name == "compare" for command in app.registered_commands):
-    comparisons.commands.register.register(app)
 
 COMMANDS = {c.name or c.callback.__name__: c.callback for c in app.registered_commands}
 
@@ -173,7 +170,7 @@ def test_an_output_that_cannot_be_written_is_refused_before_work_begins(
     (tmp_path / "run" / "cases").mkdir(parents=True)  # for `report`
     before = set(tmp_path.rglob("*"))
     words = [command, *ARGUMENTS[command], *needed, f"--{option}", str(named)]
-    result = CliRunner().invoke(app, words, catch_exceptions=False)
+    result = invoke(*words, catch_exceptions=False)
     told = result.stderr.splitlines()
     assert [line for line in told if line.startswith("error: ")] == told, result.output
     assert len(told) == 1
@@ -189,7 +186,7 @@ def test_an_output_that_cannot_be_written_is_refused_before_work_begins(
 def test_so_is_the_summary_of_github(command, tmp_path, monkeypatch):
     monkeypatch.setenv("GITHUB_ACTIONS", "true")
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path))
-    result = CliRunner().invoke(app, [command, *ARGUMENTS[command]], catch_exceptions=False)
+    result = invoke(command, *ARGUMENTS[command], catch_exceptions=False)
     assert (result.exit_code, result.stderr) == (
         3, f"error: {tmp_path}: is a folder; expected the name of a file\n",
     )  # fmt: skip
@@ -199,7 +196,7 @@ def test_so_is_the_summary_of_github(command, tmp_path, monkeypatch):
 def test_a_baseline_is_not_written_over_a_file(tmp_path):
     (tmp_path / "baselines").mkdir()
     (tmp_path / "baselines" / "room").write_text("mine")
-    result = CliRunner().invoke(app, ["accept", *ARGUMENTS["accept"]])
+    result = invoke("accept", *ARGUMENTS["accept"])
     assert result.exit_code == 3
     assert "is a file; expected the folder of a baseline" in result.stderr
     assert (tmp_path / "baselines" / "room").read_text() == "mine"

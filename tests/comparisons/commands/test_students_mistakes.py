@@ -4,11 +4,8 @@ import re
 import warnings
 
 import pytest
-import typer
-from typer.testing import CliRunner
+from command_line import invoke
 
-from comparisons.commands.register import register
-from reference_rt.cli import main
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
 from reference_rt.scene.likely_mistakes import likely_mistakes
@@ -70,12 +67,8 @@ def message_of(text):
 
 @pytest.fixture
 def run():
-    app = typer.Typer(cls=main._Commands)
-    app.command()(main.render)
-    register(app)
-
     def said(*arguments):
-        lines = CliRunner().invoke(app, arguments).stderr.splitlines()
+        lines = invoke(*arguments).stderr.splitlines()
         return "\n".join(one for one in lines if re.search("warning: |error: |No such", one))
 
     return said

@@ -8,7 +8,8 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner, Result
+from command_line import invoke
+from typer.testing import Result
 
 import comparisons.commands.register
 import comparisons.compare.compare
@@ -19,18 +20,14 @@ from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.renderers import ReferenceSampler
 from comparisons.results.case import Case, exit_code
 from comparisons.translator import UntranslatableError, load
-from reference_rt.cli.main import app
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
 
 SCENES = Path(__file__).parents[3] / "scenes"
 
-if not any(command.name == "compare" for command in app.registered_commands):
-    comparisons.commands.register.register(app)
-
 
 def compare(out: Path, *arguments: str) -> tuple[Result, Any]:
-    result = CliRunner().invoke(app, ["compare", *arguments, "--out", str(out)])
+    result = invoke("compare", *arguments, "--out", out)
     path = out / "results.json"
     return result, json.loads(path.read_text()) if path.exists() else None
 

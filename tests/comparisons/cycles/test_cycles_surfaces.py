@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import reference_rt as rt
-from comparisons.cycles.surfaces import FINE, surface_of
+from comparisons.cycles.surfaces import placed_arrays, triangles_of
 from comparisons.geometry import affine
 from comparisons.renderers import NoCounterpartError
+from comparisons.shapes.fine import FINE
 from reference_rt.core.transform import Matrix, Rotate, Scale, Translate
 
 SHAPES = {
@@ -44,9 +45,9 @@ OFF = 4.0 * (1.0 - np.cos(np.pi / FINE))
 @pytest.mark.parametrize("name", SHAPES)
 def test_rays_hit_ours_where_the_triangles_are(name, steps):
     shape = SHAPES[name].model_copy(update={"transform": MAPS[steps]})
-    surface = surface_of(shape, Path())
+    surface = triangles_of(shape, Path())
     m = affine.of_steps(shape.transform)
-    placed = surface.placed(m)
+    placed = placed_arrays(surface, m)
     rng = np.random.default_rng(5)
     chosen = rng.integers(len(surface.faces), size=200)
     corners = placed["vertices"][placed["faces"][chosen]]
@@ -83,8 +84,8 @@ def test_rays_hit_ours_where_the_triangles_are(name, steps):
 )
 def test_volumes(name, volume):
     """By the divergence theorem: no triangle is missing, doubled or turned."""
-    surface = surface_of(SHAPES[name], Path())
-    a, b, c = (surface.vertices[surface.faces[:, k]] for k in range(3))
+    surface = triangles_of(SHAPES[name], Path())
+    a, b, c = (surface.positions[surface.faces[:, k]] for k in range(3))
     found = np.sum(a * np.cross(b, c)) / 6.0
     assert found == pytest.approx(volume, rel=3.0 * OFF)
 
@@ -94,4 +95,4 @@ def test_volumes(name, volume):
 )
 def test_others_do_not_vote(shape):
     with pytest.raises(NoCounterpartError, match=shape.type):
-        surface_of(shape, Path())
+        triangles_of(shape, Path())

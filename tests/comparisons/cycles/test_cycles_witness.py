@@ -5,13 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import invoke
 
 import reference_rt as rt
 from comparisons.cycles import backend
 from comparisons.renderers import NoCounterpartError, other
 from comparisons.rungs.witness import vote, witness_of
-from reference_rt.cli.main import app
 from reference_rt.util.errors import ReferenceUnavailableError, UsageError
 
 CYCLES = other("cycles")
@@ -170,6 +169,6 @@ def test_the_gate_hears_a_witness(monkeypatch):
 )
 def test_explain_says_who_may_vote(scene, witness, code, words):
     path = Path(__file__).parents[3] / "scenes" / f"{scene}.yaml"
-    done = CliRunner().invoke(app, ["explain", str(path), "--witness", witness])
+    done = invoke("explain", path, "--witness", witness)
     assert done.exit_code == code
     assert all(word in done.output for word in words)

@@ -10,6 +10,7 @@ import pytest
 from bench_rows import FIELDS, a_table, made_up
 
 from comparisons.experiments.bench import scenes
+from comparisons.experiments.bench.outputs import tables_of
 from comparisons.experiments.bench.row import (
     LIMIT,
     Row,
@@ -160,14 +161,14 @@ def test_no_scene_is_left_out_of_median_and_worst() -> None:
     assert [found[f"{k}_median"].ratio for k in scenes.KINDS] == [1.25, 1.25, 0.625]
     assert [found[f"{k}_worst"].ratio for k in scenes.KINDS] == [4.0, 4.0, 2.0]
     assert all("(s8)" in found[f"{kind}_worst"].title for kind in scenes.KINDS)
-    assert [line[0] for line in scenes.lines(rows)] == ["s8", "s3", "s2", "s1"]
+    assert [line[0] for line in tables_of(rows)[1].cells] == ["s8", "s3", "s2", "s1"]
     far = of_scene("far", 100.0, 2.0, 4.0)
     for row in far:
         row.details["difference_default"] = 0.6  # more than Mitsuba's noise
     again = {row.name: row for row in scenes.summary([*rows, *far])}
     assert [row.ratio for row in again.values()] == [row.ratio for row in found.values()]
     assert "4 scenes (not far: " in again["best_median"].title
-    assert scenes.lines([*rows, *far])[0][-1] == "multijitter, another picture"
+    assert tables_of([*rows, *far])[1].cells[0][-1] == "multijitter, another picture"
     text = a_table([*scenes.summary(rows), *rows])
     assert text.count("| s3 |") == 1
     assert scenes.summary([made_up()]) == []

@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 from bench_rows import FIELDS, made_up
-from typer.testing import CliRunner
+from command_line import invoke
 
 from comparisons.experiments.bench import run
+from comparisons.experiments.bench.outputs import Display
 from comparisons.experiments.bench.row import Row, Setting
-from comparisons.experiments.bench.run import Display, Group, all_groups, chosen
-from reference_rt.cli.main import _add_commands, app
+from comparisons.experiments.bench.run import Group, all_groups, chosen
 from reference_rt.util.errors import ReferenceUnavailableError, UsageError
 
 SCENES = Path(__file__).parents[3] / "scenes"
@@ -122,13 +122,6 @@ def test_names_of_rows_are_distinguished_and_choose_their_groups() -> None:
         chosen(("threads", "speed"), groups)
 
 
-@pytest.fixture(scope="module")
-def command() -> Any:
-    if not any(c.name == "bench" for c in app.registered_commands):
-        _add_commands()
-    return lambda *arguments: CliRunner().invoke(app, ["bench", *arguments])
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -138,9 +131,9 @@ def command() -> Any:
     ],
 )
 def test_wrong_usage_is_reported_before_anything_is_measured(
-    command: Any, arguments: tuple[str, ...], message: str, tmp_path: Path
+    arguments: tuple[str, ...], message: str, tmp_path: Path
 ) -> None:
-    result = command(*arguments, "--out", str(tmp_path / "out"))
+    result = invoke("bench", *arguments, "--out", tmp_path / "out")
     assert result.exit_code == 2
     assert message in result.stderr
     assert not (tmp_path / "out").exists()

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import invoke
 from convergence_fakes import EXACT, SHAPE, Fake, climbs
-from typer.testing import CliRunner
 
-import comparisons.commands.register
 from comparisons.experiments.convergence import run
 from comparisons.experiments.convergence.estimates import Estimate
 from comparisons.experiments.convergence.findings import (
@@ -31,12 +30,9 @@ from comparisons.experiments.convergence.methods import (
 from comparisons.experiments.convergence.outputs import lines_of, write_results
 from comparisons.experiments.convergence.page import write_page
 from comparisons.experiments.convergence.store import Settings, Store
-from reference_rt.cli.main import app
 from reference_rt.rendering.scene import Scene
 
 SCENES = Path(__file__).parents[3] / "scenes"
-if not any(command.name == "converge" for command in app.registered_commands):
-    comparisons.commands.register.register(app)
 
 BY_NAME = {c.name: c for c in METHODS}
 MEASURED, BEYOND = 0.55, 1e-3
@@ -290,14 +286,14 @@ def test_an_invalid_scene_does_not_cost_the_others(tmp_path, monkeypatch):
         (tmp_path / f"{name}.yaml").write_text(sphere)
     files = [tmp_path / f"{name}.yaml" for name in ("bad", "missing", "ball", "box")]
     out = tmp_path / "out"
-    result = CliRunner().invoke(app, ["converge", *map(str, files[:3]), "-o", str(out)])
+    result = invoke("converge", *files[:3], "-o", out)
     assert result.exit_code == 3, result.output
     scenes = json.loads((out / "results.json").read_text())["scenes"]
     assert scenes[0]["problem"].startswith(f"invalid: {tmp_path}/bad.yaml")
     assert scenes[1]["problem"].startswith(f"invalid: {missing}:2: shapes[0].file: ")
     assert list(scenes[2]["contestants"]) == ["ours"]
     assert f"missing: invalid: {missing}:2" in result.stdout
-    result = CliRunner().invoke(app, ["converge", *map(str, files[2:]), "-o", str(out)])
+    result = invoke("converge", *files[2:], "-o", out)
     assert result.exit_code == 130
     scenes = json.loads((out / "results.json").read_text())["scenes"]
     assert [scene["problem"] for scene in scenes] == [

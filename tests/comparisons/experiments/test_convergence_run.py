@@ -9,10 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import invoke
 from convergence_fakes import EXACT, TRUE, Fake
-from typer.testing import CliRunner
 
-import comparisons.commands.register
 from comparisons.experiments import convergence
 from comparisons.experiments.convergence.findings import Curves, findings_of
 from comparisons.experiments.convergence.methods import (
@@ -23,7 +22,7 @@ from comparisons.experiments.convergence.methods import (
     climb,
     with_sampler,
 )
-from comparisons.experiments.convergence.outputs import COLUMNS, write_results, write_table
+from comparisons.experiments.convergence.outputs import RUNGS, write_results, write_table
 from comparisons.experiments.convergence.page import write_page
 from comparisons.experiments.convergence.run import converge, prepared
 from comparisons.experiments.convergence.store import (
@@ -37,13 +36,10 @@ from comparisons.experiments.convergence.store import (
 )
 from comparisons.translator import to_mitsuba
 from reference_rt.cameras.film import BoxFilter, Film
-from reference_rt.cli.main import app
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import UsageError
 
 SCENES = Path(__file__).parents[3] / "scenes"
-if not any(command.name == "converge" for command in app.registered_commands):
-    comparisons.commands.register.register(app)
 
 
 # ---- the reference ------------------------------------------------------------------------------
@@ -74,7 +70,7 @@ def test_reference_is_kept_and_added_to(own_cache):
 
 
 def program(*arguments: object):
-    return CliRunner().invoke(app, ["converge", *map(str, arguments)])
+    return invoke("converge", *arguments)
 
 
 FAST = ("--size", "16x12", "--time-limit", "3600", "--max-spp", "16")
@@ -105,7 +101,7 @@ def test_scenes_with_chance_and_without(tmp_path, own_cache):
     assert grid["grids"]["mitsuba"][0]["relmse"] < 1e-4  # float32, here and there an edge
 
     rows = list(csv.DictReader((tmp_path / "results.csv").read_text().splitlines()))
-    assert tuple(rows[0]) == COLUMNS
+    assert list(rows[0]) == [column.key for column in RUNGS if column.key]
     told = {
         (scene["scene"], name, rung["asked_spp"]): rung
         for scene in found["scenes"]

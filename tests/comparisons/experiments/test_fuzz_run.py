@@ -8,10 +8,9 @@ from pathlib import Path
 
 import pytest
 from builders import HELPERS
+from command_line import invoke
 from junitparser import JUnitXml
-from typer.testing import CliRunner
 
-from comparisons.commands.trials import fuzz
 from comparisons.experiments.fuzz import results, summary
 from comparisons.experiments.fuzz import run as running
 from comparisons.experiments.fuzz.finding import Checked, Effort
@@ -119,17 +118,13 @@ def test_half_a_file_is_left_out(tmp_path):
 
 
 def test_the_command_refuses_what_it_does_not_know(tmp_path):
-    import typer
-
-    app = typer.Typer()
-    app.command()(fuzz)
     for words, said in (
-        (["--rungs", "geometri"], "--rungs: expected some of"),
+        (["--rungs", "geometri"], "--rungs: expected one of"),
         (["--time", "10"], "--time: expected a duration"),
         (["--features", "glas"], "did you mean 'glass'"),
         (["--planted", "nothing like it"], "no source fault matches"),
     ):
-        result = CliRunner().invoke(app, [*words, "--out", str(tmp_path)])
+        result = invoke("fuzz", *words, "--out", tmp_path)
         assert result.exit_code == 2
         assert said in " ".join(result.output.split())
 

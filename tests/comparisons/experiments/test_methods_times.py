@@ -5,9 +5,8 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import invoke
 
-from comparisons.commands import register
 from comparisons.experiments.methods import outputs, run
 from comparisons.experiments.methods.run import FAMILIES, SERIES, Draw, Effort, methods
 from reference_rt import textbook
@@ -28,9 +27,7 @@ def rows():
 def program(monkeypatch):
     """The command with a small effort."""
     monkeypatch.setattr(run, "QUICK", TINY)
-    app = register.typer.Typer()
-    register.register(app)
-    return lambda *words: CliRunner().invoke(app, ["methods", *words])
+    return lambda *words: invoke("methods", *words)
 
 
 @pytest.mark.cases(1)

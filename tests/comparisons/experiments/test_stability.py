@@ -9,11 +9,9 @@ import sys
 import numpy as np
 import pytest
 import stability_fakes
-import typer
 from builders import HELPERS
-from typer.testing import CliRunner
+from command_line import invoke
 
-from comparisons.commands import register
 from comparisons.experiments.stability.harness import outputs, run, series
 from comparisons.experiments.stability.harness.outcomes import OURS, Outcome, outcome
 from comparisons.experiments.stability.harness.points import Found, summarise
@@ -44,9 +42,7 @@ def fakes(alone, monkeypatch):
 
 def stability(out, *options):
     """The command's exit code and what it printed."""
-    app = typer.Typer()
-    register.register(app)
-    found = CliRunner().invoke(app, ["stability", "-o", str(out), "--jobs", "1", *options])
+    found = invoke("stability", "-o", out, "--jobs", "1", *options)
     return found.exit_code, found.output
 
 

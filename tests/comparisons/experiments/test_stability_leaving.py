@@ -12,7 +12,7 @@ from comparisons.experiments.stability.harness.shadows import bound
 from comparisons.experiments.stability.leaving.departures import depart, subjects
 from comparisons.experiments.stability.leaving.judge import Judge, Tally, row_of
 from comparisons.experiments.stability.leaving.shapes import KINDS, Extent, aim, place
-from comparisons.geometry.exact import first_hit
+from comparisons.referee import first_hit
 
 PLAIN = Extent.of(1.0, 2.0, 1.0, False)
 

@@ -16,7 +16,7 @@ from comparisons.experiments.stability.hierarchy import compared
 from comparisons.experiments.stability.slivers.judge import DISTANCES, RING, Judge, Question
 from comparisons.experiments.stability.watertight import seamed
 from comparisons.experiments.stability.watertight.tracers import crossings
-from comparisons.geometry.exact import columns_of
+from comparisons.referee import columns_of
 
 # Cases have triangles without area on purpose: what a mesh leaves out is no news here.
 pytestmark = pytest.mark.filterwarnings("ignore::reference_rt.util.errors.SceneWarning")

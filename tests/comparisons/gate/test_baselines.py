@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import typer
-from typer.testing import CliRunner, Result
+from command_line import invoke
+from typer.testing import Result
 
-from comparisons.commands.gate import accept
 from comparisons.gate import baselines
 from comparisons.gate.baselines import BaselineEditedError, BaselineMissingError
 from comparisons.gate.digest import scene_digest
@@ -52,9 +51,7 @@ def write(name: str, picture: FloatArray, header: dict[str, str] | None = None) 
 
 
 def run(*arguments: str) -> Result:
-    app = typer.Typer()
-    app.command()(accept)
-    return CliRunner().invoke(app, list(arguments))
+    return invoke("accept", *arguments)
 
 
 def accepted(files: list[str], *more: str) -> Result:

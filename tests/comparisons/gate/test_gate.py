@@ -6,12 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
+from command_line import invoke
 from gate_checks import SCENE, files, pictures, run, status, write
 from junitparser import JUnitXml
-from typer.testing import CliRunner
 
-from comparisons.commands.gate import accept
 from comparisons.gate import reference
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.image import srgb, write_png
@@ -141,16 +139,14 @@ def test_a_baseline_from_nothing_to_stale(right: FloatArray) -> None:
     assert found["cases"][0]["verdict"] == "not-comparable"
     assert not Path("baselines").exists()
 
-    app = typer.Typer()
-    app.command()(accept)
-    arguments = [*shlex.split(told)[2:], "--reason", "looked at it", "--scene", "ball.yaml"]
-    assert CliRunner().invoke(app, arguments).exit_code == 0
+    arguments = [*shlex.split(told)[1:], "--reason", "looked at it", "--scene", "ball.yaml"]
+    assert invoke(*arguments).exit_code == 0
     others = files(pictures(spp=512))
     result, found = run(*others, "--baseline", "ball")
     assert result.exit_code == 0, result.output
     assert found["provenance"]["baseline"] == "ball"
     assert found["cases"][0]["sides"]["reference"] == "the baseline's, ball"
-    assert CliRunner().invoke(app, ["--unused", "out"]).exit_code == 0
+    assert invoke("accept", "--unused", "out").exit_code == 0
     result, _ = run(*files(1.03 * right), "--baseline", "ball")
     assert result.exit_code == 1
     assert "ball: differ: " in result.output

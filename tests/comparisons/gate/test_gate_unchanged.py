@@ -6,12 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
+from command_line import invoke
 from gate_checks import files, run, status
 from junitparser import JUnitXml
-from typer.testing import CliRunner
 
-from comparisons.commands.gate import accept
 from comparisons.gate.baselines import MOST_KEPT
 from comparisons.gate.digest import Copies, fingerprint
 from comparisons.gate.gate import gate_pictures
@@ -32,10 +30,8 @@ def noisy(count: int, seed: int = 1) -> FloatArray:
 
 def accepted(pictures: FloatArray, *more: str) -> list[str]:
     """The files of a new baseline "ball"."""
-    app = typer.Typer()
-    app.command()(accept)
     names = files(pictures)
-    result = CliRunner().invoke(app, [*names, "--name", "ball", "--reason", "seen", *more])
+    result = invoke("accept", *names, "--name", "ball", "--reason", "seen", *more)
     assert result.exit_code == 0, result.output
     return names
 

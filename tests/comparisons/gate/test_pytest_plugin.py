@@ -6,11 +6,8 @@ import re
 
 import numpy as np
 import pytest
+from command_line import invoke
 from gate_checks import BALL
-from typer import Typer
-from typer.testing import CliRunner
-
-from comparisons.commands.gate import accept
 
 pytest_plugins = ["pytester"]
 
@@ -184,12 +181,10 @@ def test_ball(image_gate):
     assert not (project.path / "accepted").exists()
 
     # What it says, done.
-    app = Typer()
-    app.command()(accept)
     kept = sorted(str(path) for path in (project.path / "seen").glob("*/candidate-*.exr"))
     assert len(kept) == 8
     arguments = [*kept, "--name", "ball", "--baselines", "accepted", "--reason", "looked at it"]
-    result = CliRunner().invoke(app, [*arguments, "--scene", "scenes/ball.yaml"])
+    result = invoke("accept", *arguments, "--scene", "scenes/ball.yaml")
     assert result.exit_code == 0, result.output
 
     second = run(

@@ -4,7 +4,7 @@ import numpy as np
 from stiff_scenes import FOLDER, STIFF, scene
 
 from comparisons.geometry.frame import RAY_EPSILON, SHARE, Frame, frame_for
-from comparisons.geometry.sizes import ShapeSizes
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs import geometry
 from comparisons.rungs.rays.camera import camera_rays
 from comparisons.rungs.rays.rays import mixed_rays

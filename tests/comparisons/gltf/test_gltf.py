@@ -11,13 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-import typer
 from builders import SCENES
+from command_line import invoke
 from PIL import Image
-from typer.testing import CliRunner
 
 import reference_rt as rt
-from comparisons.commands.compare import convert
 from comparisons.gltf import write_gltf
 from comparisons.gltf.surfaces import Surfaces
 from reference_rt.core.transform import Matrix, Rotate, Scale, Translate
@@ -452,16 +450,12 @@ def test_what_gltf_cannot_say(tmp_path: Path) -> None:
         assert sum(part in note for note in notes) == (part not in ("float32", "8 bits")), notes
 
 
-APP = typer.Typer()
-APP.command()(convert)
-
-
 @pytest.mark.parametrize(
     "arguments", [["-o", "s.glb"], ["--to", "json", "--float32", "-o", "s.json"]]
 )
 def test_command(arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(APP, [str(SCENES / "cornell_box.yaml"), *arguments])
+    result = invoke("convert", SCENES / "cornell_box.yaml", *arguments)
     assert result.exit_code == 0, result.output
     if "--float32" in arguments:
         document = json.loads(Path("s.json").read_text())
@@ -475,8 +469,8 @@ def test_command(arguments: list[str], tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_float32_is_of_json(tmp_path: Path) -> None:
-    arguments = [str(SCENES / "cornell_box.yaml"), "--float32", "-o", f"{tmp_path}/s.glb"]
-    result = CliRunner().invoke(APP, arguments)
+    output = tmp_path / "s.glb"
+    result = invoke("convert", SCENES / "cornell_box.yaml", "--float32", "-o", output)
     assert result.exit_code == 2
     assert "--float32: is of --to json" in result.output
-    assert not (tmp_path / "s.glb").exists()
+    assert not output.exists()

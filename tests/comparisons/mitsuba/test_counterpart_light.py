@@ -24,7 +24,7 @@ from comparisons.mitsuba.plugins.exact_coordinates import (
 )
 from comparisons.mitsuba.scene import first_hits
 from comparisons.rungs import direct, layers, whitted
-from comparisons.shapes import meshes, stand_ins
+from comparisons.shapes import site, stand_ins
 from comparisons.shapes.stand_ins import coarser
 from comparisons.translator import UntranslatableError, load, to_mitsuba
 from reference_rt.core.arrays import FloatArray
@@ -291,7 +291,7 @@ def copies_of(shape: str, count: int) -> str:
 def test_copies_of_a_group(name: str, image_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Meshes, not instances, in which the place of a surface is not known: with fewer triangles
     each, so that there are as many in all.  Of very many there is no counterpart."""
-    for module in (stand_ins, meshes):
+    for module in (stand_ins, site):
         monkeypatch.setattr(module, "MOST_TRIANGLES", 60_000)
     scene = scene_of(image_folder, copies_of(name, 4))
     with scalar():
@@ -300,7 +300,7 @@ def test_copies_of_a_group(name: str, image_folder: Path, monkeypatch: pytest.Mo
     assert all(mi_shape.plugin.group is None for mi_shape in counterpart.mi_shapes.values())
     assert next(iter(counterpart.stand_ins().values()))[0].triangles < 17_000
     assert found.status == "agree", found.reason
-    for module in (stand_ins, meshes):
+    for module in (stand_ins, site):
         monkeypatch.setattr(module, "MOST_INSTANCES", 3)
     with quick(), pytest.raises(UntranslatableError, match="in a group with 4 copies"):
         load(scene)

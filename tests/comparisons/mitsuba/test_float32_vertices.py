@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs import whitted
 from comparisons.translator import load
 from comparisons.translator.moved import frame_of, with_float32_vertices

@@ -9,13 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-import typer
+from command_line import invoke
 from gltf_scenes import full_scene
 from mitsuba_dicts import hits_of, rays_at
 from PIL import Image
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
-from comparisons.commands.compare import convert
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.files import write_scene
 from comparisons.shapes import reading_meshes
@@ -120,9 +119,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def run(*arguments: object) -> Result:
-    app = typer.Typer()
-    app.command()(convert)
-    return CliRunner().invoke(app, [str(a) for a in arguments])
+    return invoke("convert", *arguments)
 
 
 def test_a_converted_scene_is_the_same(folder):

@@ -10,12 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 from builders import SCENES, every_law, every_light
-from typer.testing import CliRunner
+from command_line import invoke
 
 import reference_rt as rt
-from comparisons.commands.compare import convert
 from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.scene import for_rays, picture
 from comparisons.rungs.rays.camera import camera_rays
@@ -157,13 +155,11 @@ def test_mitsuba_renders_whitted_scenes_with_our_plugin(name, set_variant, tmp_p
 
 
 def test_the_command_writes_all_or_nothing(tmp_path):
-    app, main = CliRunner(), typer.Typer()
-    main.command()(convert)
-    found = app.invoke(main, [str(SCENES / "material_blend.yaml"), "-o", str(tmp_path / "a.xml")])
+    found = invoke("convert", SCENES / "material_blend.yaml", "-o", tmp_path / "a.xml")
     assert found.exit_code == 0, found.output
     assert (tmp_path / "a_files").is_dir()
     assert Scene.load(tmp_path / "a.xml").materials
-    found = app.invoke(main, [str(SCENES / "csg_dice.yaml"), "-o", str(tmp_path / "b.xml")])
+    found = invoke("convert", SCENES / "csg_dice.yaml", "-o", tmp_path / "b.xml")
     assert found.exit_code != 0
     assert [path.name for path in sorted(tmp_path.iterdir())] == ["a.xml", "a_files"]
 

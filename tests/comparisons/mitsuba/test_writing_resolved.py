@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-import typer
 from builders import SCENES, every_light, every_shape
-from typer.testing import CliRunner
+from command_line import invoke
 
 import reference_rt as rt
-from comparisons.commands.compare import convert
 from comparisons.rungs.rays.camera import camera_rays
 from comparisons.translator.resolved import FORMAT, is_closed, tessellated, write_resolved
 from reference_rt.rendering import query
@@ -103,13 +101,11 @@ def test_everything_is_there(tmp_path):
 
 
 def test_the_command(tmp_path):
-    main = typer.Typer()
-    main.command()(convert)
-    scene = str(SCENES / "cornell_box.yaml")
-    found = CliRunner().invoke(main, [scene, "--to", "json", "-o", str(tmp_path / "a.json")])
+    command = "convert", SCENES / "cornell_box.yaml", "--to", "json", "-o"
+    found = invoke(*command, tmp_path / "a.json")
     assert found.exit_code == 0, found.output
     assert (tmp_path / "a_files").is_dir()
-    found = CliRunner().invoke(main, [scene, "--to", "json", "-o", str(tmp_path / "a.yaml")])
+    found = invoke(*command, tmp_path / "a.yaml")
     assert found.exit_code != 0
 
 

@@ -7,13 +7,11 @@ import numpy as np
 import OpenEXR
 import pbrt_reader
 import pytest
-import typer
 from builders import SCENES
+from command_line import invoke
 from pbrt_reader import scene_of, written
-from typer.testing import CliRunner
 
 import reference_rt as rt
-from comparisons.commands.compare import convert
 from comparisons.pbrt import write_pbrt
 from reference_rt.core.vec3 import Vec3
 from reference_rt.lights.emitters import environment_map
@@ -335,12 +333,9 @@ def test_textures_are_ours(texture, tmp_path):
 
 # ---- the command, and what is refused ------------------------------------------------------------
 
-APP = typer.Typer()
-APP.command()(convert)
-
 
 def test_command(tmp_path):
-    found = CliRunner().invoke(APP, [str(SCENES / "cornell_box.yaml"), "-o", f"{tmp_path}/a.pbrt"])
+    found = invoke("convert", SCENES / "cornell_box.yaml", "-o", tmp_path / "a.pbrt")
     assert found.exit_code == 0, found.output
     file = pbrt_reader.read(tmp_path / "a.pbrt")
     assert sum(shape.light is not None for shape in file.shapes) == 1

@@ -151,7 +151,7 @@ def test_the_summary_has_every_case_the_worst_first(tmp_path):
     assert text.startswith("before\n## smoke\n")
     assert "8 cases: **1** invalid, **2** differ, **1** inconclusive" in text
     rows = re.findall(r"^\| ([\w-]+) \|", text, re.MULTILINE)
-    assert rows == ["case", "---", "scene-invalid", "scene-differ", "z", "scene-inconclusive",
+    assert rows == ["case", "scene-invalid", "scene-differ", "z", "scene-inconclusive",
                     "scene-not-comparable", "scene-reference-limited", "scene-agree",
                     "scene-unchanged", "left"]  # fmt: skip
     assert "likeliest cause: gain" in text
@@ -188,12 +188,18 @@ def test_a_summary_that_cannot_be_written_is_reported(tmp_path):
         ci.summarise(EVERY, tmp_path, "smoke")
 
 
-def test_github_is_known_by_its_environment(monkeypatch):
-    monkeypatch.delenv("GITHUB_ACTIONS", raising=False)
-    monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)
-    assert not ci.is_there()
-    assert ci.summary_path() is None
-    monkeypatch.setenv("GITHUB_ACTIONS", "true")
-    monkeypatch.setenv("GITHUB_STEP_SUMMARY", "/x/y")
-    assert ci.is_there()
-    assert str(ci.summary_path()) == "/x/y"
+@pytest.mark.parametrize("github", [True, False])
+@pytest.mark.parametrize("environment", [None, "true"])
+def test_github_is_known_by_its_environment_or_asked_for(
+    github, environment, tmp_path, monkeypatch, capsys
+):
+    summary = tmp_path / "summary.md"
+    for name, value in (("GITHUB_ACTIONS", environment), ("GITHUB_STEP_SUMMARY", str(summary))):
+        monkeypatch.setenv(name, value) if value else monkeypatch.delenv(name, raising=False)
+    formats = ci.Formats(tmp_path / "junit.xml", github)
+    formats.write("smoke", EVERY, {}, title="a title")
+    is_there = github or environment is not None
+    assert formats.files == [tmp_path / "junit.xml", *([summary] if is_there else [])]
+    assert all(path.exists() for path in formats.files)
+    assert ("::error" in capsys.readouterr().out) == summary.exists() == is_there
+    assert not is_there or "## a title" in summary.read_text()

@@ -11,10 +11,10 @@ from report_page import NASTY, PROVENANCE, Page, case, noise
 
 from comparisons.compare.one_scene import NotebookCase
 from comparisons.report import write_report
+from comparisons.report.biases import biases_of
 from comparisons.report.pictures_data import unpack
 from comparisons.report.values import shown
 from comparisons.results.case import Case, Cause, ImageRegion, Images
-from comparisons.results.headline import numbers_rows
 from comparisons.statistics import compare
 
 
@@ -116,7 +116,8 @@ def test_the_numbers_of_the_statistics_are_a_table_and_the_paragraph_is_the_rung
     told = Case("a", rung.status, reason, (rung,), None, {}, sides=("ours", "Mitsuba's"))
     _, text = page(told)
     notebook = NotebookCase("a", rung.status, rung.reason, (rung,), None, {})._repr_html_()
-    for cell in (cell for row in numbers_rows(told) for cell in row):
+    table = biases_of(told)
+    for cell in (cell for row in (table.head, *table.cells) for cell in row):
         assert f">{cell}</t" in notebook
         assert f">{cell.replace(' %', chr(160) + '%')}</t".lower() in text.lower()
     assert text.count(rung.reason) == 1

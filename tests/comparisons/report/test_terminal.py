@@ -4,12 +4,11 @@ import io
 import random
 
 import pytest
-from bench_rows import made_up
 from rich.console import Console
 from rich.text import Text
 
-from comparisons.experiments.bench import run as bench_table
-from comparisons.report.terminal import MOST_LINES, console, fitted
+from comparisons.report.table import table_of
+from comparisons.report.terminal import MOST_LINES, console
 from comparisons.results.case import Case, Cause, RungResult
 from comparisons.suites.run import summarise
 
@@ -37,7 +36,7 @@ def texts(seed, columns, rows):
 def test_every_word_is_there_and_no_cell_is_long(width, seed):
     rows = texts(seed, columns=2 + seed, rows=5)
     names = [f"name{j}" for j in range(2 + seed)]
-    lines = printed(fitted(width, names, rows), width)
+    lines = printed(table_of(names, rows).terminal(width), width)
     words = " ".join(lines).split()
     for row in rows:
         for cell in row:
@@ -53,22 +52,6 @@ def test_every_word_is_there_and_no_cell_is_long(width, seed):
     assert all(len(line) <= width for line in lines)
 
 
-def test_short_tables_are_on_one_line_per_row():
-    lines = printed(fitted(80, ("a", "b"), [("x", "1"), ("y", "22")], right=("b",)), 80)
-    assert [line.split() for line in lines] == [["a", "b"], ["x", "1"], ["y", "22"]]
-    assert lines[1].index("1") == lines[2].index("22") + 1
-
-
-def test_columns_without_text_are_left_out():
-    lines = printed(fitted(80, ("a", "b", "c"), [("x", "", "1"), ("y", Text(""), "2")]), 80)
-    assert lines[0].split() == ["a", "c"]
-
-
-def test_a_cell_is_text_and_no_markup():
-    lines = printed(fitted(80, ("a", "b"), [("[bold]x[/]", "[red]")]), 80)
-    assert lines[1].split() == ["[bold]x[/]", "[red]"]
-
-
 @pytest.mark.parametrize(("columns", "width"), [("72", 72), ("nonsense", 180), (None, 180)])
 def test_a_pipe_obeys_columns(columns, width, monkeypatch, capsys):
     monkeypatch.delenv("FORCE_COLOR", raising=False)
@@ -80,13 +63,6 @@ def test_a_pipe_obeys_columns(columns, width, monkeypatch, capsys):
     assert made.width == width
     made.print(Text("x" * 10, "bold red"))
     assert capsys.readouterr().out == "x" * 10 + "\n"
-
-
-def test_the_bench_at_80_columns():
-    rows = [made_up(name, ratio) for name, ratio in (("one", 0.5), ("another row", 3.0))]
-    lines = printed(bench_table.terminal_table(rows, 80), 80)
-    assert all(len(line) <= 80 for line in lines)
-    assert len(lines) <= MOST_LINES * (len(rows) + 1)
 
 
 CAUSE = Cause("half-pixel shift in x", "by 0.5, 0 pixels", 0.99)

@@ -5,7 +5,7 @@ import typing
 import pytest
 
 from comparisons.results.case import Case, Cause, RungResult, Status
-from comparisons.results.headline import headline, in_short, is_of_statistics, numbers_rows
+from comparisons.results.headline import headline, in_short
 from comparisons.results.rungs import RUNGS
 
 STATUSES = typing.get_args(Status)
@@ -144,29 +144,9 @@ def test_every_rung_may_differ_besides(verdict, other):
     assert "more" not in told
 
 
-def test_the_numbers_as_a_table():
-    lines = {"tested": 256, "differ": 0, "median_detectable_bias": 0.013, "worst_margin": 0.01}
-    modes = {"tested": 8, "differ": 1, "worst_bias": -0.02, "worst_half_width": 0.004}
-    rung = statistics(tiles=3, lines=lines, pixels=1, modes=modes)
-    told = list(zip(*numbers_rows(case("differ", rung)), strict=True))
-    assert told == [
-        ("bias", "measured", "would have been seen", "limit"),
-        ("image mean", "R +1.0, G +1.1, B +1.2 %", "0.35 %", "±0.50 %"),
-        ("64 tiles", "3 differ; worst -12 %", "", ""),
-        ("16,384 pixels", "1 differ; worst +200 %", "", ""),
-        ("8 smooth patterns", "1 differ; worst -2.0 ± 0.40 %", "", ""),
-    ]
-    assert numbers_rows(case("invalid", RungResult("input", "invalid", "why"))) == []
-    lines["differ"] = 1
-    unknown = numbers_rows(case("inconclusive", statistics(lines=lines, noise_known=False)))
-    assert unknown[2] == ("would have been seen", "unknown", "", "", "")
-
-
 def test_the_bias_that_would_have_been_seen_is_apart():
     agreed = case("agree", statistics("agree"), reason="input, statistics: numbers")
     assert in_short(agreed) == ("no difference was found", "0.35 %")
-    assert is_of_statistics(agreed)
-    assert not is_of_statistics(case("differ", reason="geometry: beyond the statistics: x"))
     assert in_short(case("agree", RungResult("images", "agree", "why"))) == (
         *("no difference was found", ""),
     )

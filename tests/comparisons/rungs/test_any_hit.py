@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from comparisons.geometry.sizes import ShapeSizes
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs import geometry
 from comparisons.rungs.rays import any_hit
 from comparisons.rungs.rays.rays import mixed_rays

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from comparisons.geometry.exact.referee import Referee
-from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.counterpart import trace
+from comparisons.referee.referee import Referee
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs import geometry
 from comparisons.rungs.geometry import MOST_JUDGED, aimed_rays, judged
 from comparisons.rungs.rays.rays import Rays, mixed_rays

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from counterparts import faulty_counterpart
 
-from comparisons.geometry.sizes import ShapeSizes
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.results.case import RungResult
 from comparisons.rungs import direct, whitted
 from comparisons.rungs import geometry as geometry_of_many

@@ -6,12 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
+from command_line import invoke
 from PIL import Image
-from typer.testing import CliRunner
 
-from comparisons.commands.gate import gate
-from comparisons.commands.truth import truth
 from comparisons.truth.case import AREAS, cases
 from comparisons.truth.outputs import Row, exit_code, markdown, scores
 from comparisons.truth.renderers import load, ours
@@ -38,15 +35,12 @@ np.save(output, factor * pixels * (1.0 + 1e-3 * rng.normal(size=pixels.shape)))
 @pytest.fixture
 def run(tmp_path, monkeypatch):
     """Run a command in a folder of its own; its exit code and its output."""
-    app = typer.Typer()
-    for command in (truth, gate):
-        app.command()(command)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scenes").mkdir()
     (tmp_path / "scenes" / "truth").symlink_to(SCENES)
 
     def call(*arguments):
-        found = CliRunner().invoke(app, [str(argument) for argument in arguments])
+        found = invoke(*arguments)
         return found.exit_code, " ".join(found.output.split())
 
     return call

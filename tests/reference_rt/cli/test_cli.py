@@ -9,23 +9,18 @@ from unittest import mock
 import numpy as np
 import pytest
 from builders import SCENES
-from typer.testing import CliRunner
+from command_line import invoke
 
-from reference_rt.cli.main import app
 from reference_rt.core.exr import read_exr
 
 SPHERES = str(SCENES / "spheres_whitted.yaml")
 SMALL = ("--size", "16x10")
 
 
-def run(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
-
-
 @pytest.mark.parametrize("suffix", ["exr", "png"])
 def test_render(suffix, tmp_path):
     out = tmp_path / "new" / "folder" / f"out.{suffix}"
-    result = run("render", SPHERES, "-o", out, *SMALL)
+    result = invoke("render", SPHERES, "-o", out, *SMALL)
     assert result.exit_code == 0
     assert result.stdout == ""
     assert list(out.parent.iterdir()) == [out]
@@ -34,7 +29,7 @@ def test_render(suffix, tmp_path):
 def test_same_scene_same_bytes(tmp_path):
     for suffix in ("exr", "png"):
         for name, threads in (("a", 1), ("b", 2)):
-            done = run("render", SPHERES, "-o", tmp_path / f"{name}.{suffix}", *SMALL,
+            done = invoke("render", SPHERES, "-o", tmp_path / f"{name}.{suffix}", *SMALL,
                        "--threads", threads)  # fmt: skip
             assert done.exit_code == 0
         assert (tmp_path / f"a.{suffix}").read_bytes() == (tmp_path / f"b.{suffix}").read_bytes()
@@ -42,14 +37,16 @@ def test_same_scene_same_bytes(tmp_path):
 
 def test_options_change_the_scene(tmp_path):
     box = SCENES / "cornell_box.yaml"
-    done = run(
+    done = invoke(
         "render", box, "-o", tmp_path / "a.exr", "--size", "7x5", "--spp", "3", "--seed", "9"
     )
     assert done.exit_code == 0
     channels, header = read_exr(tmp_path / "a.exr")
     assert channels["R"].shape == (5, 7)
     assert json.loads(header["sampler"]) == {"type": "sobol", "spp": 3, "seed": 9}
-    done = run("render", box, "-o", tmp_path / "b.exr", "--size", "7x5", "--integrator", "ray_cast")
+    done = invoke(
+        "render", box, "-o", tmp_path / "b.exr", "--size", "7x5", "--integrator", "ray_cast"
+    )
     assert done.exit_code == 0
     channels, header = read_exr(tmp_path / "b.exr")
     assert json.loads(header["integrator"])["type"] == "ray_cast"
@@ -89,7 +86,7 @@ def test_wrong_usage(arguments, said, refused, tmp_path):
 )  # fmt: skip
 def test_usage_that_the_parser_refuses(arguments, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    result = run(*arguments)
+    result = invoke(*arguments)
     assert result.exit_code == 2
     assert "Traceback" not in result.output
     assert list(tmp_path.iterdir()) == []
@@ -126,7 +123,7 @@ def test_pixels_that_are_not_finite(tmp_path):
         "materials: {sun: {type: emissive, radiance: 1.0e+308}}\n"
         "shapes: [{type: rectangle, material: sun, transform: [{scale: 5}]}]\n"
     )
-    result = run("render", scene, "-o", out)
+    result = invoke("render", scene, "-o", out)
     assert result.exit_code == 3
     assert result.stderr.splitlines()[-1] == (
         f"error: {out}: 16 pixels are not finite; "
@@ -137,7 +134,7 @@ def test_pixels_that_are_not_finite(tmp_path):
 
 @pytest.mark.parametrize("command", [[], ["render"], ["explain"], ["schema"]])
 def test_help(command):
-    result = run(*command, "--help")
+    result = invoke(*command, "--help")
     assert result.exit_code == 0
     assert "Usage" in result.stdout
     assert result.stderr == ""
@@ -145,7 +142,7 @@ def test_help(command):
 
 def test_an_internal_error_is_one_line(refused, monkeypatch, tmp_path):
     monkeypatch.setattr("reference_rt.rendering.scene.Scene.load", lambda *_: 1 / 0)
-    result = run("explain", SPHERES)
+    result = invoke("explain", SPHERES)
     assert result.exit_code == 5
     assert result.stderr == (
         "error: internal error: ZeroDivisionError: division by zero; please report it\n"
@@ -155,13 +152,13 @@ def test_an_internal_error_is_one_line(refused, monkeypatch, tmp_path):
 @pytest.mark.parametrize("error", [MemoryError(), OSError(errno.ENOMEM, "no memory")])
 def test_what_does_not_fit_into_memory(refused, monkeypatch, error):
     monkeypatch.setattr("reference_rt.rendering.scene.Scene.load", mock.Mock(side_effect=error))
-    result = run("explain", SPHERES)
+    result = invoke("explain", SPHERES)
     assert result.exit_code == 3
     assert "the scene does not fit into memory, which is limited to" in result.stderr
 
 
 def test_schema_is_json():
-    assert json.loads(run("schema").stdout)["title"] == "Scene"
+    assert json.loads(invoke("schema").stdout)["title"] == "Scene"
 
 
 def test_an_error_that_an_interruption_causes():

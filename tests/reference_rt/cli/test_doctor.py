@@ -3,18 +3,13 @@
 import importlib.metadata
 
 import pytest
-from typer.testing import CliRunner
+from command_line import invoke
 
 from comparisons.commands import doctor as of_comparisons
 from comparisons.mitsuba import backend
 from reference_rt.cli import doctor
 from reference_rt.cli.doctor import Check
-from reference_rt.cli.main import app
 from reference_rt.util.errors import ReferenceUnavailableError
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, arguments)
 
 
 def entry(name, function):
@@ -39,19 +34,19 @@ def others(monkeypatch):
 
 
 def test_version():
-    done = run("--version")
+    done = invoke("--version")
     assert done.exit_code == 0
     assert done.stdout == f"reference_rt {importlib.metadata.version('reference-rt')}\n"
 
 
 def test_help_keeps_the_exit_codes():
-    done = run("--help")
+    done = invoke("--help")
     assert "Exit codes" in done.stdout
     assert "doctor" in done.stdout
 
 
 def test_all_is_named():
-    done = run("doctor")
+    done = invoke("doctor")
     assert done.exit_code == 0
     for what in ("reference_rt", "machine", "compiler", "kernels", "Mitsuba"):
         assert f"  {what}: " in done.stdout
@@ -60,7 +55,7 @@ def test_all_is_named():
 
 def test_what_does_not_work_has_an_exit_code_and_advice(others):
     others(entry("x", lambda: [Check("engine", "stalled", "crank it", works=False)]))
-    done = run("doctor")
+    done = invoke("doctor")
     assert done.exit_code == 1
     assert "FAIL  engine: stalled\n      -> crank it\n" in done.stdout
 
@@ -70,7 +65,7 @@ def test_a_check_that_raises_hides_no_other(others):
         raise RuntimeError("no\nspark")
 
     others(entry("broken", fails), entry("x", lambda: [Check("engine", "runs")]))
-    done = run("doctor")
+    done = invoke("doctor")
     assert done.exit_code == 1
     assert "FAIL  broken: RuntimeError: no spark\n" in done.stdout
     assert "ok    engine: runs\n" in done.stdout

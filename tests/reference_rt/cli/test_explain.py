@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 from builders import SCENES, every_law, every_light, every_shape
-from typer.testing import CliRunner
+from command_line import invoke
 
 import reference_rt as rt
 from reference_rt.cli.explain import explain
-from reference_rt.cli.main import app
 from reference_rt.materials.bsdfs.tables import TABLES as LEAVES
 from reference_rt.scene import build_hierarchies
 from reference_rt.shapes import TABLES
@@ -121,7 +120,7 @@ def test_whitted_on_a_grid():
 def test_command(name):
     """Everything lands on standard output, whatever the width of the terminal."""
     file = SCENES / f"{name}.yaml"
-    result = CliRunner().invoke(app, ["explain", str(file)], env={"COLUMNS": "200"})
+    result = invoke("explain", file, COLUMNS="200")
     assert result.exit_code == 0
     assert result.stderr == ""
     scene = rt.Scene.load(file)

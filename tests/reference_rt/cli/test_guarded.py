@@ -4,10 +4,10 @@ import warnings
 
 import pytest
 import typer
+from command_line import invoke
 from typer.testing import CliRunner
 
 from reference_rt.cli.guarded import MOST_ALIKE, guarded, scene_warnings
-from reference_rt.cli.main import app
 from reference_rt.util.errors import SceneWarning
 
 FLAT = "scene.yaml:{}: shapes[{}]: mesh part{}.ply: {} of 1,260 triangles have no area"
@@ -67,7 +67,7 @@ def test_a_scene_of_many_damaged_meshes(tmp_path):
     )
     scene = tmp_path / "scene.yaml"
     scene.write_text("film: {width: 4, height: 4}\nshapes:\n" + 50 * mesh)
-    result = CliRunner().invoke(app, ["render", str(scene), "-o", str(tmp_path / "out.exr")])
+    result = invoke("render", scene, "-o", tmp_path / "out.exr")
     assert result.exit_code == 0, result.output
     lines = [line for line in result.stderr.splitlines() if "have no area" in line]
     assert len(lines) == MOST_ALIKE + 1

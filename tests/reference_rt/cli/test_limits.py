@@ -3,10 +3,9 @@
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
+from command_line import invoke
 
 from reference_rt.cli.limits import LAW, Limit, in_words, limits_of
-from reference_rt.cli.main import app
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
@@ -120,9 +119,9 @@ SOUND = "camera: {type: perspective, eye: [0, 0, 5]}\nlights: [{type: constant, 
 def test_explain_warns(tmp_path: Path) -> None:
     path = tmp_path / "scene.yaml"
     path.write_text("shapes:\n  - {type: sphere, center: [1.0e+17, 0, 0]}\n", encoding="utf-8")
-    shown = CliRunner().invoke(app, ["explain", str(path)]).output
+    shown = invoke("explain", path).output
     assert "warning: beyond float64" in shown
     path.write_text(f"{SOUND}shapes:\n  - {{type: sphere}}\n", encoding="utf-8")
-    shown = CliRunner().invoke(app, ["explain", str(path)]).output
+    shown = invoke("explain", path).output
     assert "nearest to float64's limits" in shown
     assert "warning" not in shown

@@ -9,19 +9,18 @@ import subprocess
 import numpy as np
 import pytest
 from builders import SCENES
+from command_line import invoke
 from PIL import Image, ImageGrab
-from typer.testing import CliRunner
 
 import reference_rt as rt
 from reference_rt.cli import preview as previews
-from reference_rt.cli.main import app
 
 BOX = str(SCENES / "cornell_box.yaml")
 SMALL = ("--size", "12x8", "--spp", "4")
 
 
 def run(*arguments):
-    return CliRunner().invoke(app, ["preview", BOX, *SMALL, *map(str, arguments)])
+    return invoke("preview", BOX, *SMALL, *arguments)
 
 
 def test_a_file_is_rewritten(tmp_path):
@@ -227,10 +226,8 @@ def test_a_window_shows_the_pixels(display):
 
 def test_the_pixels_are_those_of_render(tmp_path):
     """Of a scene without noise, so that both have the same picture."""
-    scene = str(SCENES / "spheres_whitted.yaml")
-    runner = CliRunner()
-    common = [scene, "--size", "9x6"]
+    common = SCENES / "spheres_whitted.yaml", "--size", "9x6"
     shown, rendered = tmp_path / "a.png", tmp_path / "b.png"
-    assert runner.invoke(app, ["preview", *common, "--to", str(shown)]).exit_code == 0
-    assert runner.invoke(app, ["render", *common, "-o", str(rendered)]).exit_code == 0
+    assert invoke("preview", *common, "--to", shown).exit_code == 0
+    assert invoke("render", *common, "-o", rendered).exit_code == 0
     assert (np.asarray(Image.open(shown)) == np.asarray(Image.open(rendered))).all()

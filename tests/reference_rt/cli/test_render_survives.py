@@ -9,9 +9,7 @@ import sys
 
 import pytest
 from builders import SCENES
-from typer.testing import CliRunner
-
-from reference_rt.cli.main import app
+from command_line import invoke
 
 PROGRAM = (
     # A shell's background jobs, and their children, are born deaf to Ctrl-C.
@@ -25,10 +23,6 @@ PROGRAM = (
     "from reference_rt.cli.main import main; main()"
 )
 BOX = str(SCENES / "cornell_box.yaml")
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
 
 
 def start(*arguments):
@@ -59,7 +53,7 @@ def killed(times, tmp_path, arguments, most):
 def test_killed_at_any_moment(times, size, most, tmp_path):
     out, expected = tmp_path / "out.exr", tmp_path / "expected.exr"
     options = ("--size", size, "--spp", 48)
-    assert run("render", BOX, "-o", expected, *options, "--no-checkpoint").exit_code == 0
+    assert invoke("render", BOX, "-o", expected, *options, "--no-checkpoint").exit_code == 0
     arguments = ("-o", out, *options, "--checkpoint", tmp_path / "stored")
     begun = killed(times, tmp_path, arguments, most)
     assert begun == sorted(begun)
@@ -75,7 +69,7 @@ def test_interrupted_and_resumed(tmp_path):
     """Ctrl-C stores what there is; --resume needs it."""
     out, expected, stored = tmp_path / "out.exr", tmp_path / "expected.exr", tmp_path / "stored"
     options = ("--size", "128x128", "--spp", 64, "--checkpoint", stored)
-    nothing = run("render", BOX, "-o", out, *options, "--resume")
+    nothing = invoke("render", BOX, "-o", out, *options, "--resume")
     assert nothing.exit_code == 2
     assert "has no samples of this scene" in nothing.stderr
     process, _ = start("-o", out, *options)
@@ -93,16 +87,16 @@ def test_interrupted_and_resumed(tmp_path):
     process.communicate(timeout=600)
     assert process.returncode == 0
     assert fraction == pytest.approx(int(found[1]) / 100, abs=0.006)
-    assert run("render", BOX, "-o", expected, *options[:-2], "--no-checkpoint").exit_code == 0
+    assert invoke("render", BOX, "-o", expected, *options[:-2], "--no-checkpoint").exit_code == 0
     assert out.read_bytes() == expected.read_bytes()
 
 
 def test_more_spp(tmp_path):
     out, expected = tmp_path / "out.exr", tmp_path / "expected.exr"
     options = ("--size", "40x30", "--checkpoint", tmp_path / "stored")
-    assert run("render", BOX, "-o", out, *options, "--spp", 10).exit_code == 0
-    assert run("render", BOX, "-o", out, *options, "--more-spp", 23).exit_code == 0
-    assert run("render", BOX, "-o", expected, *options[:2], "--spp", 33).exit_code == 0
+    assert invoke("render", BOX, "-o", out, *options, "--spp", 10).exit_code == 0
+    assert invoke("render", BOX, "-o", out, *options, "--more-spp", 23).exit_code == 0
+    assert invoke("render", BOX, "-o", expected, *options[:2], "--spp", 33).exit_code == 0
     assert out.read_bytes() == expected.read_bytes()
 
 
@@ -110,15 +104,17 @@ def test_more_spp(tmp_path):
 def test_limits_and_previews(tmp_path):
     out, preview = tmp_path / "out.exr", tmp_path / "preview.png"
     options = ("--size", "32x32", "--spp", 100000)
-    done = run("render", BOX, "-o", out, *options, "--target-error", "20%")
+    done = invoke("render", BOX, "-o", out, *options, "--target-error", "20%")
     assert done.exit_code == 0
     assert re.search(r"; target error reached: \d+ of 100000 .*; relative error \d", done.stderr)
     options = ("--size", "32x32", "--spp", 10**7)
-    done = run("render", BOX, "-o", out, *options, "--time-limit", "5s", "--preview", preview)
+    done = invoke("render", BOX, "-o", out, *options, "--time-limit", "5s", "--preview", preview)
     assert done.exit_code == 0
     assert re.search(r"; time limit reached: .* of 10000000 samples per pixel", done.stderr)
     assert preview.read_bytes().startswith(b"\x89PNG")
-    done = run("render", BOX, "-o", out, "--size", "32x32", "--spp", 32, "--target-error", "0.1%")
+    done = invoke(
+        "render", BOX, "-o", out, "--size", "32x32", "--spp", 32, "--target-error", "0.1%"
+    )
     assert re.search(r"relative error .*, not 0.1 %: that takes about .* times", done.stderr)
 
 
@@ -176,6 +172,6 @@ def test_a_disk_that_is_full(tmp_path):
     assert "warning: the checkpoint is not complete: " in done.stderr
     assert "File too large" in done.stderr
     assert list(tmp_path.rglob("*.samples")) == []
-    assert run(*arguments[:3], tmp_path / "other.png", *arguments[4:6]).exit_code == 0
+    assert invoke(*arguments[:3], tmp_path / "other.png", *arguments[4:6]).exit_code == 0
     assert out.read_bytes() == (tmp_path / "other.png").read_bytes()
     shutil.rmtree(stored)

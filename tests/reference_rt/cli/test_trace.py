@@ -6,9 +6,7 @@ from html.parser import HTMLParser
 
 import pytest
 from builders import SCENES
-from typer.testing import CliRunner
-
-from reference_rt.cli.main import app
+from command_line import invoke
 
 BALLS = str(SCENES / "whitted_classic.yaml")
 """Pixel 10, 12 of 32 x 24 has rays of a glass ball: mirrored, refracted and shadow rays."""
@@ -38,9 +36,9 @@ class Page(HTMLParser):
 
 def test_text_json_and_page_show_the_same_rays(tmp_path):
     page = tmp_path / "rays.html"
-    said = CliRunner().invoke(app, ["trace", *PLACE, "--out", str(page)])
+    said = invoke("trace", *PLACE, "--out", page)
     assert said.exit_code == 0, said.stderr
-    stored = CliRunner().invoke(app, ["trace", *PLACE, "--json"])
+    stored = invoke("trace", *PLACE, "--json")
     tree = json.loads(stored.stdout, parse_constant=pytest.fail)
     kinds = [ray["kind"] for ray in tree["rays"]]
     assert {"camera", "mirrored", "refracted", "shadow"} <= set(kinds)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from builders import random_turn
 from chi_square import chi_square, integrate, sidak
 from PIL import Image
 
@@ -74,7 +75,7 @@ def random_map(rng, height, width, dark=0.3):
     """Texels of very different brightness, some black, turned at random."""
     texels = rng.random((height, width, 3)) ** 4 * (rng.random((height, width, 1)) > dark)
     texels[-1, -1] = 1.0
-    turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    turn = random_turn(rng)
     return tabulate(texels, turn)
 
 

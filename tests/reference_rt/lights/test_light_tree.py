@@ -9,10 +9,12 @@ from scipy.stats import chi2
 
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel
+from reference_rt.lights.emitters import point as points
+from reference_rt.lights.emitters import spot as spots
 from reference_rt.lights.emitters.point import Point
 from reference_rt.lights.emitters.spot import Spot
 from reference_rt.lights.selection import choice as light_tree
-from reference_rt.lights.selection.bounds import LightBounds, of_points, of_spots
+from reference_rt.lights.selection.bounds import LightBounds
 from reference_rt.lights.selection.choice import build
 
 U = 2.0**-53
@@ -182,7 +184,7 @@ def test_unbiased_and_better_than_by_power():
 def test_lights_that_share_a_place():
     """Duplicates are equally likely, but for rounding; a thousand of them make a tree."""
     point = Point(position=(1, 2, 3), intensity=(1, 1, 1)).tabulate()
-    many = of_points(
+    many = points.bounds(
         point._replace(**{f: np.repeat(getattr(point, f), 1000, 0) for f in point._fields})
     )
     tree = build(many, np.arange(1000), 1000)
@@ -208,7 +210,7 @@ def test_lights_at_powers_of_two():
 def test_a_spot_in_the_tree_lights_its_cone_alone():
     spot = Spot(origin=(0, 0, 5), target=(0, 0, 0), intensity=(1, 1, 1), cutoff_angle=30)
     point = Point(position=(50, 0, 5), intensity=(1, 1, 1))
-    parts = (of_spots(spot.tabulate()), of_points(point.tabulate()))
+    parts = (spots.bounds(spot.tabulate()), points.bounds(point.tabulate()))
     bounds = LightBounds(*(np.concatenate(c) for c in zip(*parts, strict=True)))
     tree = build(bounds, np.array([3, 1]), 5)
     assert list(tree.trail >= 0) == [False, True, False, True, False]

@@ -19,7 +19,8 @@ from reference_rt.textures.checker import Checkers
 from reference_rt.textures.image_file import Texels
 from reference_rt.textures.lookup import At, Textures, lookup, lookup_gradient
 from reference_rt.textures.parameter import Palette
-from reference_rt.textures.texture import BITMAP, CHECKER, UvMap
+from reference_rt.textures.tables import BITMAP, CHECKER
+from reference_rt.textures.texture import UvMap
 
 PALETTE = Palette({"t": 0}, [5.0])
 PLAIN = UvMap()

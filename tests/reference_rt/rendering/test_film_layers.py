@@ -6,11 +6,10 @@ Scenes have all layers, and the same kinds of shapes and materials, so that they
 import numpy as np
 import pytest
 from builders import SCENES
-from typer.testing import CliRunner
+from command_line import invoke
 
 import reference_rt as rt
 from reference_rt.cameras.film import Film, LanczosFilter
-from reference_rt.cli.main import app
 from reference_rt.core import transform
 from reference_rt.core.exr import read_exr
 from reference_rt.textures import Checker
@@ -175,7 +174,7 @@ def test_files(tmp_path):
         scene.write_text(text.replace(film, film.rstrip("} ") + layers + "}"))
         for suffix in ("exr", "png"):
             arguments = ("-o", tmp_path / name / f"out.{suffix}", "--size", "16x10")
-            done = CliRunner().invoke(app, ["render", str(scene), *map(str, arguments)])
+            done = invoke("render", scene, *arguments)
             assert done.exit_code == 0, done.stderr
     plain, _ = read_exr(tmp_path / "plain" / "out.exr")
     channels, _ = read_exr(tmp_path / "layers" / "out.exr")

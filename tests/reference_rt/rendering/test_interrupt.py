@@ -9,10 +9,9 @@ import sys
 import numpy as np
 import pytest
 from builders import SCENES
-from typer.testing import CliRunner
+from command_line import invoke
 
 import reference_rt as rt
-from reference_rt.cli.main import app
 from reference_rt.core.exr import read_exr
 
 SPP = 100000
@@ -80,9 +79,8 @@ def test_kill(tmp_path):
 
 def test_progress_without_a_terminal_is_lines(tmp_path):
     """No control characters, no carriage returns."""
-    arguments = ["render", str(SCENES / "spheres_whitted.yaml"), "-o", str(tmp_path / "out.png"),
-                 "--size", "32x20"]  # fmt: skip
-    done = CliRunner().invoke(app, arguments)
+    scene, output = SCENES / "spheres_whitted.yaml", tmp_path / "out.png"
+    done = invoke("render", scene, "-o", output, "--size", "32x20")
     assert (done.exit_code, done.stdout) == (0, "")
     assert done.stderr.splitlines()[-1].startswith(f"{tmp_path}/out.png: 32 x 20, ")
     assert "\x1b" not in done.stderr

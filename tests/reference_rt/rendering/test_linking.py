@@ -3,7 +3,6 @@ code of kernels.  An operation that is forgotten would end the process where it 
 """
 
 import dis
-import sys
 import types
 from collections.abc import Iterator
 from functools import cache
@@ -15,39 +14,21 @@ from builders import SCENES, every_law, every_shape, import_everything
 
 import reference_rt as rt
 from reference_rt.accel.geometry import geometries
-from reference_rt.integrators import INTEGRATORS
-from reference_rt.integrators.scene_tables import LinkedScene
-from reference_rt.jit.kernel import ByClass
-from reference_rt.jit.links import Group, Link, Linkable, Linker, Operation
-from reference_rt.lights import LinkedLights
+from reference_rt.integrators import SETUPS
+from reference_rt.jit import called
+from reference_rt.jit.links import Link, Linker, Operation
 from reference_rt.rendering import query, tiles
-from reference_rt.rendering.linking import linked_scene
-from reference_rt.rendering.query.tracing import geometry_of
+from reference_rt.rendering.linking import calls_of, calls_of_geometry, geometry_of, linked_scene
 
 import_everything()
 
-GROUP = {
-    operation: group
-    for name, module in list(sys.modules.items())
-    if name.startswith("reference_rt.")
-    for group in vars(module).values()
-    if isinstance(group, Group)
-    for operation in group.operations.values()
-}
-OPERATION = {getattr(sys.modules[one.module], one.name): one for one in GROUP}
-"""By the function that kernels call."""
-
-KERNELS = dict.fromkeys(INTEGRATORS.values(), tiles.render_tile) | {
-    "ray_cast": tiles.aov_tile,
-    "first_hits": tiles.first_hits_tile,
-    "cost": tiles.cost_tile,
+KERNELS = {setup.__name__: (tiles.render_tile, setup) for setup in SETUPS} | {
+    kernel.__name__: (kernel, None)
+    for kernel in (tiles.aov_tile, tiles.first_hits_tile, tiles.cost_tile)
 }
 
-NEVER = {
-    # Blocks of rays without a hierarchy are traced together: `nearest_of_block`.
-    **{name: {"nearest_of_type"} for name in ("path", "direct", "closest_hits", "any_hits")},
-}
-"""Operations that are in the code of an integrator or a query, and that no scene makes it call."""
+QUERIES = "".join(path.read_text("utf-8") for path in Path(query.__file__).parent.glob("*.py"))
+OF_QUERIES = [name for name in geometries.operations if f'"{name}"' in QUERIES]
 
 
 def named(function: types.FunctionType) -> Iterator[Any]:
@@ -65,41 +46,22 @@ def named(function: types.FunctionType) -> Iterator[Any]:
         yield cell.cell_contents
 
 
-def choices(choice: ByClass, integrator: str) -> list[Any]:
-    """The kernels that a linked scene comes to."""
-    kernels = choice._kernels
-    for cls in (LinkedScene, tiles.LinkedView, LinkedLights):
-        if cls in kernels:
-            return [kernels[cls]]
-    own = [cls for cls in kernels if INTEGRATORS.get(cls, integrator) == integrator]
-    return [kernels[cls] for cls in own]
-
-
-def called(root: Any, integrator: str = "", within: Group | None = None) -> set[Operation]:
-    """The operations that a kernel calls through links, and those that these call.  Within an
-    operation on one table the others of its group are called on the table itself."""
-    found, seen, left = set(), set(), [(root, within)]
-    while left:
-        function, inside = left.pop()
-        function = getattr(function, "py_func", function)  # of an entry kernel
-        if isinstance(function, ByClass):
-            left += [(one, inside) for one in choices(function, integrator)]
-        if not isinstance(function, types.FunctionType) or (function, inside) in seen:
-            continue
-        if not function.__module__.startswith("reference_rt."):
-            continue
-        seen.add((function, inside))
-        operation = OPERATION.get(function)
-        if operation is None:
-            left += [(one, inside) for one in named(function)]
-            continue
-        group = GROUP[operation]
-        if group is not inside:
-            found.add(operation)
-        left += [(row, group) for row in operation.rows.values()]
-        if not isinstance(group, Linkable):  # the body is for all codes without a kernel
-            left.append((operation._function, inside))
-    return found
+def test_names_are_those_that_the_code_loads(monkeypatch):
+    """To read them off the code, one instruction after another, finds the same operations; of some
+    queries, which ask for it anyway, one less."""
+    cases = [lambda case=case: calls_of(*case) for case in KERNELS.values()]
+    cases += [lambda name=name: calls_of_geometry([name]) for name in OF_QUERIES]
+    quickly = [case() for case in cases]
+    assert min(map(len, quickly)) > 1
+    assert max(map(len, quickly)) > 35
+    monkeypatch.setattr(called, "_named", cache(lambda function: (*named(function),)))
+    called.called.cache_clear()
+    exactly = [case() for case in cases]
+    called.called.cache_clear()
+    assert exactly[: len(KERNELS)] == quickly[: len(KERNELS)]
+    more = [quick - exact for quick, exact in zip(quickly, exactly, strict=True)]
+    assert all(exact <= quick for quick, exact in zip(quickly, exactly, strict=True))
+    assert set().union(*map(names, more)) <= {"face"}
 
 
 class Asked:
@@ -133,34 +95,32 @@ def names(operations: set[Operation]) -> set[str]:
     return {operation.name for operation in operations}
 
 
-@pytest.mark.parametrize("integrator", KERNELS)
-def test_a_scene_is_linked_to_all_that_its_integrator_calls(integrator, tables):
+NEVER = {"nearest_of_type"}
+"""Of blocks of rays without a hierarchy, which are traced together: `nearest_of_block`."""
+
+
+@pytest.mark.parametrize("case", KERNELS)
+def test_nothing_is_left_out_that_some_scene_needs(case, tables):
     asked = Asked()
     for one in tables:
-        linked_scene(asked, one, integrator)
-    groups = {GROUP[operation] for operation in asked.operations}
-    needed = {one for one in called(KERNELS[integrator], integrator) if GROUP[one] in groups}
+        linked_scene(asked, one, calls_of(*KERNELS[case]))
+    groups = {operation.group for operation in asked.operations}
+    needed = {one for one in calls_of(*KERNELS[case]) if one.group in groups}
     assert len(needed) > 5
-    assert names(needed - asked.operations) == NEVER.get(integrator, set())
-    assert names(asked.operations - needed) == set()  # each would be compiled
+    assert names(needed - asked.operations) <= NEVER
+
+
+@pytest.mark.parametrize("name", OF_QUERIES)
+def test_a_query_is_linked_to_all_that_its_operation_calls(name, tables):
+    asked = Asked()
+    for one in tables:
+        geometry_of(asked, one.geometry, [name])
+    assert names(calls_of_geometry([name]) - asked.operations) <= NEVER
 
 
 def test_only_shapes_that_are_lights_are_sampled(tables):
     """A sphere in the light of a rectangle."""
     linker = Linker()
-    linked_scene(linker, tables[0], "path")
+    linked_scene(linker, tables[0], calls_of(tiles.render_tile, rt.Path().setup().__class__))
     sampled = {kernel.__name__ for kernel, _ in linker.calls if kernel.__name__.startswith("pdf")}
     assert sampled == {f"pdf_{tables[0].lights.areas.kind[0]}"}
-
-
-QUERIES = "".join(path.read_text("utf-8") for path in Path(query.__file__).parent.glob("*.py"))
-
-
-@pytest.mark.parametrize("name", [n for n in geometries.operations if f'"{n}"' in QUERIES])
-def test_a_query_is_linked_to_all_that_its_operation_calls(name, tables):
-    asked, (row,) = Asked(), geometries.operations[name].rows.values()
-    for one in tables:
-        geometry_of(asked, one.geometry, [name])
-    groups = {GROUP[operation] for operation in asked.operations} - {geometries}
-    needed = {one for one in called(row, "", geometries) if GROUP[one] in groups}
-    assert names(needed - asked.operations) == NEVER.get(name, set())

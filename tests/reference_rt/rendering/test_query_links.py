@@ -9,12 +9,13 @@ from unittest import mock
 import numpy as np
 import pytest
 from builders import SCENES, cube, same_in_plain_python, unit_vectors, write_obj
-from every_shape import GROUPS, kinds, tilted
+from every_shape import every_shape, tilted
 
 import reference_rt as rt
 from reference_rt.rendering.query import bsdf, direct_light, hits, light, tracing
 from reference_rt.rendering.query.hits import solid_crossings
 from reference_rt.rendering.query.radiance import cast_kernel
+from reference_rt.scene.examples import NAMED
 
 FEW = rt.Scene(shapes=(rt.Sphere(radius=0.7), rt.Box(), rt.Torus(), rt.Cylinder(radius=0.9)))
 SOLID = rt.Scene(
@@ -23,14 +24,17 @@ SOLID = rt.Scene(
 N = 24
 """Rays: the last 16 are a packet."""
 
-PLACED = rt.Scene(shapes=(rt.Instance(group="pair"), rt.Sphere(radius=0.2)), groups=GROUPS)
+GROUPS = NAMED["groups"]
+PLACED = rt.Scene(shapes=(rt.Instance(group="group"), rt.Sphere(radius=0.2)), groups=GROUPS)
 
 
 def everything(folder):
     """Every kind of shape, a mesh, a solid and instances."""
     rng = np.random.default_rng(1)
-    made = enumerate(kinds(folder))
-    shapes = [make(transform=tilted(rng, k, k % 2 == 0)) for k, make in made]
+    shapes = [
+        shape.model_copy(update={"transform": tilted(rng, k, k % 2 == 0)})
+        for k, shape in enumerate(every_shape(0))
+    ]
     mesh = rt.Mesh(file=str(write_obj(folder / "cube.obj", *cube(3))))
     return rt.Scene(shapes=(*shapes, mesh), groups=GROUPS)
 

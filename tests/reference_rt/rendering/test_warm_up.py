@@ -16,7 +16,7 @@ import reference_rt as rt
 from reference_rt.accel.geometry import Geometry, geometries
 from reference_rt.cameras import views
 from reference_rt.cameras.film import film_filters
-from reference_rt.integrators import INTEGRATORS
+from reference_rt.integrators import SETUPS
 from reference_rt.jit.links import LINK
 from reference_rt.lights.dispatch import by_code as lights
 from reference_rt.lights.selection.choice import light_trees
@@ -39,7 +39,8 @@ from reference_rt.rendering.warm_up import (
 )
 from reference_rt.shapes.meshes.triangle_table import Triangles
 from reference_rt.shapes.tables import by_code as shapes
-from reference_rt.textures.lookup import Textures, textures_operations
+from reference_rt.textures import Textures
+from reference_rt.textures.lookup import lookups
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
@@ -125,7 +126,7 @@ def test_every_type_of_every_operation(known):
     compiled = {kernel for kernel, _ in known}
     for group in (
         *(shapes.operations, bsdfs.operations, lights.operations, geometries.operations),
-        *(flattened_materials.operations, light_trees.operations, textures_operations),
+        *(flattened_materials.operations, light_trees.operations, lookups.operations),
         *(views.operations, film_filters.operations),
     ):
         for name, operation in group.items():
@@ -179,7 +180,7 @@ def leaves(numba_types):
 
 def optional(table):
     """The fields of a table that a scene may lack."""
-    hints = typing.get_type_hints(table, include_extras=True)
+    hints = typing.get_type_hints(table)
     return [name for name in table._fields if type(None) in typing.get_args(hints[name])]
 
 
@@ -238,7 +239,7 @@ def test_every_integrator_with_every_sampler(known):
     }
     expected = {
         (setup.__name__, "LinkedScene", "LinkedView", "Link", sampler)
-        for setup in INTEGRATORS
+        for setup in SETUPS
         for sampler in ("SobolSetup", "IndependentSetup", "GridSetup")
         if setup.__name__ in ("WhittedSetup", "DirectSetup") or sampler != "GridSetup"
     }

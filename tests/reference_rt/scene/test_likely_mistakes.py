@@ -2,10 +2,9 @@
 
 import pytest
 from builders import SCENES
-from typer.testing import CliRunner
+from command_line import invoke
 
 import reference_rt as rt
-from reference_rt.cli.main import app
 from reference_rt.scene.likely_mistakes import likely_mistakes
 
 CAMERA = "camera: {type: perspective, eye: [0, 0, 5]}\n"
@@ -112,11 +111,10 @@ def test_render_warns(tmp_path):
     file.write_text(CAST + "film: {width: 2, height: 2}\n" + BALL)
     with pytest.warns(rt.SceneWarning, match="no camera"):
         rt.render(rt.Scene.load(file))
-    run = CliRunner().invoke
-    result = run(app, ["render", str(file), "-o", str(tmp_path / "out.png")])
+    result = invoke("render", file, "-o", tmp_path / "out.png")
     assert result.exit_code == 0
     assert result.stderr.startswith(f"warning: {file}:1: the scene has no camera")
-    told = run(app, ["explain", str(file)])
+    told = invoke("explain", file)
     assert "probably a mistake" in told.stdout
 
 
@@ -125,6 +123,6 @@ def test_a_black_picture_is_reported(tmp_path):
     file = tmp_path / "scene.yaml"
     away = "camera: {type: perspective, eye: [0, 0, 5], target: [0, 0, 9]}\n"
     file.write_text(CAST + away + "film: {width: 2, height: 2}\n" + BALL)
-    result = CliRunner().invoke(app, ["render", str(file), "-o", str(tmp_path / "out.png")])
+    result = invoke("render", file, "-o", tmp_path / "out.png")
     assert result.exit_code == 0
     assert "the picture is black: no light reaches" in result.stderr

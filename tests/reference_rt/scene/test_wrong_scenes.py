@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
+from command_line import invoke
 from PIL import Image
-from typer.testing import CliRunner
 
 import reference_rt as rt
-from reference_rt.cli.main import app
 from reference_rt.core.diagnosis import MOST
 from reference_rt.core.exr import write_exr
 from reference_rt.scene import yaml_text
@@ -448,7 +447,7 @@ def test_every_problem_with_its_line(wording, tmp_path):
     assert sorted(one.line for one in problems) == [1, 3, 4, 6, 8, 9]
     for one in problems:
         wording(str(one).replace(f"{tmp_path}/", ""))
-    done = CliRunner().invoke(app, ["explain", str(tmp_path / "x.yaml")])
+    done = invoke("explain", tmp_path / "x.yaml")
     assert done.exit_code == 3
     assert done.stderr.splitlines() == [f"error: {one}" for one in problems]
 

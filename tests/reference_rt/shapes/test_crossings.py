@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 from builders import U, cube, unit_vectors, write_obj
-from every_shape import GROUPS, kinds, tilted
+from every_shape import every_shape, tilted
 
 import reference_rt as rt
 from comparisons.geometry.exact.dyadic import Dyadic, nearest
-from comparisons.geometry.exact.referee import crossings_of
-from comparisons.geometry.sizes import ShapeSizes
+from comparisons.referee.referee import crossings_of
+from comparisons.referee.sizes import ShapeSizes
 from reference_rt.core.transform import affine
+from reference_rt.scene.examples import NAMED, write_files
+from reference_rt.shapes.csg import Solid
 
 CUBE = np.array([-3.0, -4.0, 0.0])
 """Where a mesh is whose edges and vertices rays are aimed at."""
@@ -25,15 +27,21 @@ def forms(tmp_path_factory):
     """The scene, and the middle of each of its shapes."""
     rng = np.random.default_rng(3)
     folder = tmp_path_factory.mktemp("shapes")
-    made = [*kinds(folder), *kinds(folder)]
+    write_files(folder)
+    made = [*every_shape(0), *every_shape(-1)]
     steps = [tilted(rng, k, k >= len(made) // 2) for k in range(len(made))]
-    shapes = [make(transform=step) for make, step in zip(made, steps, strict=True)]
+    shapes = [
+        shape.model_copy(update={"transform": step})
+        for shape, step in zip(made, steps, strict=True)
+    ]
     cube_file = write_obj(folder / "cube.obj", *cube(3))
     shapes.append(rt.Mesh(file=str(cube_file), transform=({"translate": tuple(CUBE.tolist())},)))
     # Of a map that keeps angles a sphere stays one.
     shapes.append(rt.Sphere(radius=0.8, center=(-2.5, 0.0, 0.0)))
     middles = [*(affine(step)[:, 3] for step in steps), CUBE, [-2.5, 0.0, 0.0]]
-    return rt.Scene(shapes=tuple(shapes), groups=GROUPS), np.array(middles)
+    scene = rt.Scene(shapes=tuple(shapes), groups=NAMED["groups"])
+    scene._folder = folder
+    return scene, np.array(middles)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +65,7 @@ def test_every_shape_is_crossed_where_exact_arithmetic_says(forms, rays):
             lists, _ = crossings_of(leaf, local, tuple(map(Dyadic.of, local)))
             for k, ray in enumerate(lists):
                 expected += [(copy.shape, k, t) for t, _, _ in ray if t > 0]
-    solids = [k for k, shape in enumerate(scene.shapes) if shape.type == "difference"]
+    solids = [k for k, shape in enumerate(scene.shapes) if isinstance(shape, Solid)]
     shape, ray = (np.array([row[k] for row in expected]) for k in (0, 1))
     t = nearest(np.array([row[2] for row in expected], object))
     mine, of = ~np.isin(found.shape, solids), ~np.isin(shape, solids)

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from builders import U, unit_vectors
+from builders import U, random_turn, unit_vectors
 from placed_shapes import Placed, put
 from quadric_kinds import KINDS, TURNED
 
@@ -81,7 +81,7 @@ def test_the_apex(capped):
     """Met from all around, within rounding and exactly: a point, a unit normal, no other nappe."""
     rng = np.random.default_rng(7)
     upright = rt.Cone(capped=capped)
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn = random_turn(rng)
     for shape in (upright, put(upright, turn @ np.diag([1, 2, 0.5]), (1.0, -2.0, 3.0))):
         apex, linear = apex_of(shape), transform.affine(shape.transform)[:, :3]
         v = rng.normal(size=(3000, 3))

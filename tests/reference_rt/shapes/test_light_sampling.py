@@ -1,4 +1,6 @@
-"""Shapes as lights: their densities against the solid angles that they subtend."""
+"""Shapes as lights: their densities against the solid angles that they subtend.
+
+Samples against densities, of every shape: `test_every_light`."""
 
 import math
 
@@ -11,9 +13,6 @@ from reference_rt import shapes as any_shape
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.shapes import BOX, RECTANGLE, SPHERE, TRIANGLE
-
-CHI2 = {15: 56.49, 95: 175.44, 199: 308.60}
-"""Quantiles 1 - 1e-6 of chi-square by degrees of freedom: scipy.stats.chi2.ppf."""
 
 
 @entry_kernel
@@ -103,10 +102,10 @@ def test_flat_lights_integrate_to_their_solid_angle(lights, kind):
 
 def test_sphere_light_is_a_cone(lights):
     """The density is one over the cone's solid angle, even for tiny and for huge cones; points lie
-    on the near side; directions fill the cone evenly."""
+    on the near side."""
     spheres = lights.geometry.shapes.spheres
     c, r = spheres.center[0], spheres.radius[0]
-    u = np.random.default_rng(83).uniform(0, 1, (200_000, 2))
+    u = np.random.default_rng(83).uniform(0, 1, (2000, 2))
     for distance in (1.0001, 2.0, 1e5):
         axis = np.array([1.0, 2.0, -2.0]) / 3
         p = c + axis * r * distance
@@ -120,59 +119,12 @@ def test_sphere_light_is_a_cone(lights):
         w = q - p
         # Points at the rim are seen edge-on, to within rounding of the distance.
         assert (np.sum(w * n, axis=1) <= 1e-7 * np.linalg.norm(w, axis=1)).all()
-        if distance > 10:
-            continue  # the cone is too thin to measure heights in it from q
-        w /= np.linalg.norm(w, axis=1, keepdims=True)
-        cosine = w @ -axis
-        side = np.cross(axis, [0.0, 0.0, 1.0])
-        side /= np.linalg.norm(side)
-        phi = np.arctan2(w @ np.cross(axis, side), w @ side) / (2 * math.pi) % 1.0
-        height = np.clip((1 - cosine) / one_minus_cos, 0, 1)
-        counts, _, _ = np.histogram2d(height, phi, bins=(10, 20), range=[[0, 1], [0, 1]])
-        assert np.sum((counts - 1000) ** 2) / 1000 < CHI2[199]
 
 
 def test_a_sphere_gives_nothing_to_points_inside(lights):
     c = lights.geometry.shapes.spheres.center[0]
     _, _, pdf = sample(lights, SPHERE, c, midpoints(4))
     assert not pdf.any()
-
-
-def test_triangle_points_are_uniform(lights):
-    """Split twice at the middles of its edges: sixteen triangles of equal area."""
-    v = lights.geometry.shapes.triangles.vertices[0].reshape(3, 3)
-    q, _, _ = sample(
-        lights, TRIANGLE, v[0] + [9, 9, 9], np.random.default_rng(84).random((160_000, 2))
-    )
-    b = np.linalg.lstsq((v[1:] - v[0]).T, (q - v[0]).T, rcond=None)[0].T
-    b = np.column_stack([1 - b.sum(axis=1), b])
-    cell = np.zeros(len(b), int)
-    for _ in range(2):
-        big = b.max(axis=1) > 0.5
-        corner = np.argmax(b, axis=1)
-        cell = 4 * cell + np.where(big, corner, 3)
-        outer = 2 * b - np.eye(3)[corner]
-        b = np.where(big[:, None], outer, 1 - 2 * b)
-    counts = np.bincount(cell, minlength=16)
-    assert np.sum((counts - 10_000) ** 2) / 10_000 < CHI2[15]
-
-
-def test_box_points_are_uniform(lights):
-    """Over 4 x 4 cells of each face, as its share of the area says."""
-    boxes = lights.geometry.shapes.boxes
-    q, n, _ = sample(lights, BOX, [50, 0, 0], np.random.default_rng(85).random((200_000, 2)))
-    local = (q - boxes.center[0]) @ boxes.to_local[0].reshape(3, 3).T
-    axis = np.argmax(np.abs(local), axis=1)
-    side = np.take_along_axis(local, axis[:, None], axis=1)[:, 0] > 0
-    a = np.take_along_axis(local, ((axis + 1) % 3)[:, None], axis=1)[:, 0]
-    b = np.take_along_axis(local, ((axis + 2) % 3)[:, None], axis=1)[:, 0]
-    square = [np.clip((2 * (x + 1)).astype(int), 0, 3) for x in (a, b)]
-    counts = np.bincount(((axis * 2 + side) * 4 + square[0]) * 4 + square[1], minlength=96)
-    share = np.repeat(boxes.face_areas[0] / boxes.face_areas[0].sum() / 2, 32)
-    expected = 200_000 * share / 16
-    assert np.sum((counts - expected) ** 2 / expected) < CHI2[95]
-    # Normals point out.
-    assert (np.sum((q - boxes.center[0]) * n, axis=1) > 0).all()
 
 
 def test_rectangle_points_fill_it(lights):

@@ -4,12 +4,11 @@ is told."""
 import numpy as np
 import pytest
 from builders import cube, write_obj
+from command_line import invoke
 from mesh_writers import FACES, FORMS, XYZ, Gltf, ascii_stl, binary_stl, ply
-from typer.testing import CliRunner
 
 import reference_rt as rt
 from reference_rt.cli.explain import explain
-from reference_rt.cli.main import app
 
 COUNT = 12
 SIDE = 4
@@ -184,7 +183,7 @@ def test_explain_and_the_command_line_report(tmp_path):
         "of groups.g[0]",
     ]
     assert "smooth groups.g[0]" in dict(used)
-    result = CliRunner().invoke(app, ["explain", str(tmp_path / "scene.yaml")])
+    result = invoke("explain", tmp_path / "scene.yaml")
     assert result.exit_code == 0
     assert f"warning: {tmp_path}/scene.yaml:4: shapes[1]: mesh {tmp_path}/mesh.obj: 6 of " in (
         result.stderr

@@ -3,6 +3,7 @@ what others have."""
 
 import numpy as np
 import pytest
+from builders import random_turn
 from mesh_writers import written
 
 from reference_rt.shapes.meshes.files import obj, read_mesh
@@ -25,7 +26,7 @@ POLYGONS = {"arrow": ARROW, "comb": COMB, "spiral": spiral(60)}
 def placed(polygon, seed):
     """In some plane of space."""
     rng = np.random.default_rng(seed)
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn = random_turn(rng)
     return polygon @ turn[:2] * 10.0 ** rng.integers(-3, 4) + rng.uniform(-1.0, 1.0, 3)
 
 

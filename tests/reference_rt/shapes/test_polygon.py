@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from builders import U
+from builders import U, random_turn
 from placed_shapes import plane_points, random_map, rays_at
 from polygon_checks import count, edges_of, regular, seen_from_above, square, winding
 
@@ -22,7 +22,7 @@ def random_rings(rng, flat):
     rings = [rng.uniform(-1, 1, (rng.integers(3, 9), 2)), 0.3 * np.array(regular(7))]
     if flat:
         return tuple(tuple(map(tuple, r.tolist())) for r in rings)
-    m = np.linalg.qr(rng.normal(size=(3, 3)))[0] * 10.0 ** rng.uniform(-2, 2)
+    m = random_turn(rng) * 10.0 ** rng.uniform(-2, 2)
     at = m[:, :1].T * rng.uniform(-5, 5)
     return tuple(tuple(map(tuple, (r @ m[:, :2].T + at).tolist())) for r in rings)
 

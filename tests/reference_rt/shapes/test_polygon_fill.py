@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from builders import U
+from builders import U, random_turn
 from placed_shapes import random_map
 from polygon_checks import EIGHT, regular, seen_from_above, square
 
@@ -151,7 +151,7 @@ def test_points_off_the_plane_by_their_rounding():
     """A polygon turned by a matrix is still flat; one point off by a thousand times that is not."""
     rng = np.random.default_rng(11)
     for _ in range(100):
-        rotation = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        rotation = random_turn(rng)
         points = np.array(regular(12)) @ rotation[:, :2].T + rng.uniform(-1, 1, 3) * 100
         table = rt.Polygon(rings=(points.tolist(),)).tabulate(TabulationContext())
         assert abs(abs(table.normal[0] @ rotation[:, 2]) - 1) < 1e-12

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from builders import cube, unit_vectors, write_obj
+from builders import cube, random_turn, unit_vectors, write_obj
 
 import reference_rt as rt
 from reference_rt import shapes as any_shape
@@ -31,7 +31,7 @@ KINDS = ("sphere", "rectangle", "box", "triangle", "disk", "mesh")
 def random_map(rng, similar, size, offset):
     """(3, 4): rotated, sheared in two of three cases unless `similar`, mirrored every other time;
     of this size, `offset` sizes away from the origin."""
-    left, right = (np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(2))
+    left, right = (random_turn(rng) for _ in range(2))
     stretch = np.ones(3) if similar or rng.random() < 1 / 3 else 10.0 ** rng.uniform(-1, 0, 3)
     mirrored = rng.choice([-1.0, 1.0])
     linear = size * mirrored * (left * np.linalg.det(left)) @ np.diag(stretch)

@@ -5,14 +5,14 @@ import math
 
 import numpy as np
 import pytest
-from builders import U, unit_vectors
+from builders import U, random_turn, unit_vectors
 from drivers import probe_one, spans_of
 from placed_shapes import Placed, anywhere, lattice_rays, put, random_map
 from quadric_kinds import KINDS as QUADRICS
 
 import reference_rt as rt
-from comparisons.geometry.exact import all_hits
 from comparisons.geometry.exact.dyadic import NEVER, nearest
+from comparisons.referee import all_hits
 from reference_rt.core import transform
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3
@@ -95,7 +95,7 @@ def test_hits_of_the_stretched(name, sizes):
     """Points stay where the ray meets them, though the surface is 1e6 times as long as thin."""
     rng = seeded(name, 17)
     for shape in SHAPES[name]:
-        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        turn = random_turn(rng)
         placed = Placed(put(shape, turn @ np.diag(sizes), rng.uniform(-3.0, 3.0, 3)))
         check_hits(name, placed, *placed.rays(rng, 60, (0.0, 1.0)), bend=1e9)
 

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from builders import U
+from builders import U, random_turn
 from method_checks import first, mixed_lengths, off
 from rational import cross, dot, q, sub
 
@@ -114,7 +114,7 @@ def test_turned_and_distant_polygons_count_as_planar():
     thin = flat * (1, 1e-6, 1)
     for figure, offset in itertools.product((flat, thin), (0, 10, 1e4)):
         for _ in range(50):
-            turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+            turn = random_turn(rng)
             move = offset * rng.uniform(-1, 1, 3)
             shape = textbook.PolygonParameters([figure @ turn.T + move])
             o, d = [(turn[:, 2] + move).tolist()], [(-turn[:, 2]).tolist()]

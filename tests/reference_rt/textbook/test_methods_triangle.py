@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from builders import U
+from builders import U, random_turn
 from method_checks import DIRECTIONS, TRIANGLE, first, off
 from rational import cross, dot, q, sub
 
@@ -90,7 +90,7 @@ def solid(rng, offset):
     from trimesh.creation import icosphere
 
     ball = icosphere(subdivisions=0)
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn = random_turn(rng)
     inside = rng.uniform(-0.3, 0.3, (6000, 3)) + offset
     return (ball.vertices @ turn.T + offset)[ball.faces], inside
 

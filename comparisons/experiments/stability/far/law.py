@@ -11,7 +11,6 @@ from comparisons.experiments.stability.harness.outcomes import (
     plain,
 )
 from comparisons.experiments.stability.harness.rays import Rays
-from comparisons.geometry.exact import KINDS, first_of
 from comparisons.geometry.exact.dyadic import (
     FRACTION,
     NEVER,
@@ -21,6 +20,7 @@ from comparisons.geometry.exact.dyadic import (
     dot,
     nearest,
 )
+from comparisons.referee import KINDS, first_of
 
 BAND = 5.0
 """u r: a line that passes the rim of a sphere by less is undecidable.

@@ -11,9 +11,9 @@ import reference_rt as rt
 from comparisons.experiments.stability.harness.meshes import BALL
 from comparisons.experiments.stability.harness.outcomes import OURS, FloatArray
 from comparisons.geometry.exact.dyadic import Dyadic, nearest
-from comparisons.geometry.exact.referee import crossings_of, evaluated
 from comparisons.geometry.flatten import Tree, member_of
-from comparisons.geometry.sizes import LeafSizes
+from comparisons.referee.referee import crossings_of, evaluated
+from comparisons.referee.sizes import LeafSizes
 from reference_rt import textbook
 from reference_rt.core.arrays import IntArray
 from reference_rt.integrators.scene_tables import SceneTables

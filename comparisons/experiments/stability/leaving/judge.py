@@ -10,10 +10,10 @@ from comparisons.experiments.stability.harness.outcomes import EXAMPLES, Outcome
 from comparisons.experiments.stability.harness.shadows import CONTACT
 from comparisons.experiments.stability.leaving.departures import Departures, Subject
 from comparisons.experiments.stability.leaving.shapes import KINDS, Placed, Rays, scene_of
-from comparisons.geometry.exact import all_hits, columns_of, first_of
 from comparisons.geometry.exact.dyadic import NEVER, BoolArray, nearest
-from comparisons.geometry.exact.referee import Referee
-from comparisons.geometry.sizes import ShapeSizes
+from comparisons.referee import all_hits, columns_of, first_of
+from comparisons.referee.referee import Referee
+from comparisons.referee.sizes import ShapeSizes
 from reference_rt.core.arrays import FloatArray, IntArray
 
 CLOSE = 0.01

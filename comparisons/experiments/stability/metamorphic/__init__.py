@@ -4,7 +4,7 @@ Law, ids.  Rays moved with the scene hit the same (shape, copy, part, face or tr
 transformed numbers are exact - whole-number offsets, factors 2^k, another order - t is the same to
 the last bit, up to the factor.  Where they are rounded - factors 10^k, turns, offsets beyond 2^53 -
 a ray that differs is a failure unless both answers are right, each in its own scene as it is in
-float64, by exact arithmetic (`comparisons.geometry.exact.referee`), for a ray as near as rounding
+float64, by exact arithmetic (`comparisons.referee.referee`), for a ray as near as rounding
 moves it; of solids, whose crossings count as one where rounding cannot tell them apart, by the law
 of F7.  A third of the rays goes anywhere, a third towards edges at 2^-4 to 2^-14 of the way, a
 third towards edges down to float64's rounding, which Mitsuba is not asked.

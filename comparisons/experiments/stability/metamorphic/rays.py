@@ -23,11 +23,11 @@ from comparisons.experiments.stability.harness.scenes import GRID
 from comparisons.experiments.stability.harness.solids import Truth, truths
 from comparisons.geometry.affine import unit_rows
 from comparisons.geometry.exact.dyadic import BoolArray, nearest
-from comparisons.geometry.exact.referee import Referee
-from comparisons.geometry.exact.referee import Truth as First
 from comparisons.geometry.frame import round32
-from comparisons.geometry.sizes import ShapeSizes
 from comparisons.mitsuba.backend import scalar
+from comparisons.referee.referee import Referee
+from comparisons.referee.referee import Truth as First
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays.arbiter import directions
 from reference_rt.core.arrays import IntArray
 from reference_rt.core.ray import UNIT_ROUNDOFF

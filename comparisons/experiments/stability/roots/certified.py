@@ -8,8 +8,8 @@ import numpy as np
 
 from comparisons.experiments.stability.harness.outcomes import FloatArray, Outcome, U, outcome
 from comparisons.experiments.stability.harness.rays import Rays
-from comparisons.geometry.exact.crossings import torus_quartic
 from comparisons.geometry.exact.dyadic import CERTAIN, BoolArray, Dyadic
+from comparisons.shapes.torus import torus_quartic
 
 ROUNDINGS = 16.0
 """u times the sum of the terms' sizes, by which rounding may move a polynomial at a point: its

@@ -47,8 +47,8 @@ from comparisons.experiments.stability.slivers.trials import (
     grazing_directions,
     thin_triangle,
 )
-from comparisons.geometry.exact import columns_of
 from comparisons.geometry.frame import round32
+from comparisons.referee import columns_of
 from reference_rt import textbook
 from reference_rt.rendering import query
 

@@ -27,8 +27,8 @@ from comparisons.experiments.stability.harness.outcomes import (
     outcome,
 )
 from comparisons.geometry.affine import unit_rows
-from comparisons.geometry.exact import first_hit
 from comparisons.geometry.exact.dyadic import BoolArray, Dyadic, cross
+from comparisons.referee import first_hit
 
 PIXEL = 1e-3
 """A hit is misplaced if it is off by more than this share of the shape's size: a pixel, where the
@@ -45,7 +45,7 @@ Extended = npt.NDArray[np.longdouble]
 @dataclass(frozen=True)
 class Question:
     """Rays o, d (n, 3) at one shape: row (its columns, of one row), kind as
-    `comparisons.geometry.exact` names it, size its largest extent."""
+    `comparisons.referee` names it, size its largest extent."""
 
     kind: str
     row: Mapping[str, Any]

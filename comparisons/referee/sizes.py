@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from comparisons import shapes
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import Copy, copies_of, place_of
 from comparisons.geometry.frame import OURS, Frame
@@ -15,11 +16,12 @@ from reference_rt.shapes.shape import Shape
 
 
 class LeafSizes:
-    """Lengths of one primitive shape, in its group's coordinates: `feature_at` is the smallest
-    length over which its uv or its normal change.
+    """Lengths of one primitive shape, in its group's coordinates: `feature_at` points (n, 3) of its
+    faces (n,) is the smallest length over which its uv or its normal change.
 
     shape: the description;  material: its name;  table: its rows;  field: the field of `Shapes`
-    that they belong to;  bounds: lower and upper, (3,) each, infinite for a plane.
+    that they belong to;  known: that table's type;  bounds: lower and upper, (3,) each,
+    infinite for a plane.
     """
 
     def __init__(self, shape: Shape, material: str | None, table: Any) -> None:
@@ -28,13 +30,8 @@ class LeafSizes:
         lower, upper = module.bounds(table)
         self.bounds: Bounds = lower.min(axis=0), upper.max(axis=0)
         self.is_finite = bool(np.isfinite(self.bounds).all())
-        self._faces = None if self.field == "quadrics" else _features(self.field, table)
-
-    def feature_at(self, p: FloatArray, primitive: IntArray) -> FloatArray:
-        """(n,): the feature size at points p (n, 3) of the faces `primitive` (n,)."""
-        if self._faces is None:
-            return _quadric_features(self.table, p, primitive)
-        return np.asarray(self._faces[np.clip(self.row_of(primitive), 0, len(self._faces) - 1)])
+        self.known = shapes.TABLES[self.field]
+        self.feature_at = self.known.features(table)
 
     def row_of(self, primitive: IntArray | IdArray) -> IntArray | IdArray:
         """The rows (n,) of the table for the faces `primitive`: faces of a mesh are numbered as in
@@ -177,49 +174,3 @@ def corners_of(bounds: Bounds, m: affine.Affine) -> FloatArray:
     ends = np.stack(bounds)
     pick = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
     return affine.apply_points(m, ends[pick, [0, 1, 2]])
-
-
-def _features(field: str, table: Any) -> FloatArray:
-    """(faces,): the smallest length of each face; one entry if all faces are alike."""
-    if field == "spheres":
-        return np.asarray(table.radius)
-    if field in ("rectangles", "disks", "planes"):
-        heights = [1.0 / np.linalg.norm(getattr(table, k)[0]) for k in ("x_of", "y_of")]
-        return np.array([2.0 * min(heights) if field == "rectangles" else min(heights)])
-    if field == "polygons":
-        sides = (table.upper - table.lower)[0]
-        heights = [
-            side / np.linalg.norm(covector[0])
-            for side, covector in zip(sides, (table.x_of, table.y_of), strict=True)
-        ]
-        return np.array([min(heights)])
-    if field == "triangles":
-        return heights_of(table.vertices.reshape(-1, 3, 3))
-    least = np.linalg.norm(table.to_local.reshape(3, 3), axis=1).max()  # of a box, a torus
-    if field == "tori":
-        return np.asarray(table.minor / np.linalg.norm(table.to_local.reshape(3, 3), 2))
-    return np.array([2.0 / least])
-
-
-def heights_of(corners: FloatArray) -> FloatArray:
-    """(n,): the smallest height of each triangle;  corners: (n, 3, 3)."""
-    v = corners
-    edges = np.linalg.norm(v - np.roll(v, 1, axis=1), axis=2).max(axis=1)
-    double_area = np.linalg.norm(np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]), axis=1)
-    return np.asarray(np.divide(double_area, edges, out=np.zeros_like(edges), where=edges > 0.0))
-
-
-def _quadric_features(table: Any, p: FloatArray, primitive: IntArray) -> FloatArray:
-    """(n,): the length over which f's gradient turns, |grad f| / |Hessian|, in the group's
-    coordinates; for a cap the smallest height of the clip box."""
-    m = table.to_local[0].reshape(3, 3)
-    k = table.coefficients[0]
-    hessian = np.array([[2 * k[0], k[3], k[5]], [k[3], 2 * k[1], k[4]], [k[5], k[4], 2 * k[2]]])
-    q = (p - table.center[0]) @ m.T
-    gradient = (q @ hessian + k[6:9]) @ m
-    bend = np.linalg.norm(m.T @ hessian @ m, 2)
-    with np.errstate(divide="ignore"):
-        feature = np.linalg.norm(gradient, axis=1) / bend
-    heights = (table.upper - table.lower)[0] / np.linalg.norm(m, axis=1)
-    least = heights.min()
-    return np.asarray(np.where(primitive > 0, least, np.minimum(feature, least)))

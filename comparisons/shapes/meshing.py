@@ -1,14 +1,13 @@
 """Triangles of parametric surfaces, clipped to boxes, and of a quadric's caps on a box's faces."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
 from comparisons.geometry import affine
-from comparisons.geometry.sizes import heights_of
-from comparisons.shapes.meshes import Soup
+from comparisons.shapes.soup import Soup, heights_of
+from comparisons.shapes.surface import Limits, Surface
 from reference_rt.core.arrays import FloatArray, IntArray
 
 # ---- triangles clipped along the zeros of a function ---------------------------------------------
@@ -67,51 +66,27 @@ def _zero(at0: FloatArray, middle: FloatArray, at1: FloatArray) -> FloatArray:
 # ---- parametric surfaces -------------------------------------------------------------------------
 
 
-Limits = tuple[FloatArray, FloatArray]
-
-
 FEWEST = 4
 """Fewest cells along the side of a patch, unless it asks for less itself: hits slide along
-triangles that are long and thin (see `primitives.SIDE`)."""
+triangles that are long and thin (see `tubes.SIDE`)."""
 
 
-class Patch(NamedTuple):
-    """A parametric patch of a surface, with u, v in [0, 1].
-
-    point(u, v): arrays of one shape -> (..., 3);  cells: their numbers along u and v;  has_uv:
-    whether u and v are the texture coordinates of our shape.
-    """
-
-    point: Callable[[FloatArray, FloatArray], FloatArray]
-    cells: tuple[int, int]
-    has_uv: bool = False
-
-
-class Implicit(NamedTuple):
-    """The surface f = 0: f of points (..., 3) -> (...), and its gradient (..., 3)."""
-
-    value: Callable[[FloatArray], FloatArray]
-    gradient: Callable[[FloatArray], FloatArray]
-
-
-def meshed(
-    patches: Sequence[Patch], surface: Implicit, box: Limits | None, fineness: float
-) -> Soup:
-    """Patches as triangles that face where f grows, with f's normals, clipped to a box;  fineness:
-    factor on the numbers of cells."""
+def meshed(surface: Surface, fineness: float) -> Soup:
+    """A surface as triangles that face where f grows, with f's normals, clipped to its ends unless
+    its patches have our uv;  fineness: factor on the numbers of cells."""
     positions, normals, uvs, faces = [], [], [], []
     count = 0
-    for patch in patches:
+    for patch in surface.patches():
         cells = tuple(max(min(n, FEWEST), round(n * fineness)) for n in patch.cells)
         u, v = np.meshgrid(*(np.linspace(0.0, 1.0, n + 1) for n in cells), indexing="ij")
         grid = patch.point(u, v)
         n = _grid_normals(surface.gradient(grid))
         flat_grid, flat_normals = grid.reshape(-1, 3), n.reshape(-1, 3)
         some = _grid_faces(*cells)
-        if box is not None:
-            flat_grid, flat_normals, some = clipped(flat_grid, flat_normals, some, box)
-        elif patch.has_uv:
+        if patch.has_uv:
             uvs.append(np.column_stack([u.ravel(), v.ravel()]))
+        elif surface.ends is not None:
+            flat_grid, flat_normals, some = clipped(flat_grid, flat_normals, some, surface.ends)
         corners = flat_grid[some]
         winding = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         front = flat_normals[some].sum(axis=1)

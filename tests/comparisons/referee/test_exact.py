@@ -5,9 +5,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from comparisons.geometry.exact import all_hits, columns_of, first_hit
 from comparisons.geometry.exact.dyadic import NEVER, Dyadic, dot, nearest, quotient, roots, tied
-from comparisons.geometry.sizes import LeafSizes, ShapeSizes
+from comparisons.referee import all_hits, columns_of, first_hit
+from comparisons.referee.sizes import LeafSizes, ShapeSizes
 from reference_rt.rendering.scene import Scene
 
 ODD = ["rotate: {axis: [1, 2, 3], degrees: 40}", "scale: [1, 0.7, 1.2]"]

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from comparisons.geometry.exact import KINDS, columns_of
 from comparisons.geometry.exact.crossings import Crossings, IntArray
 from comparisons.geometry.exact.dyadic import (
     CERTAIN,
@@ -20,7 +19,8 @@ from comparisons.geometry.exact.dyadic import (
     nearest,
 )
 from comparisons.geometry.flatten import Copy, Member, Tree
-from comparisons.geometry.sizes import LeafSizes, ShapeSizes, corners_of
+from comparisons.referee import KINDS, columns_of
+from comparisons.referee.sizes import LeafSizes, ShapeSizes, corners_of
 from reference_rt.rendering.query import Intersections
 
 MARGIN = 1e-9
@@ -155,7 +155,7 @@ def crossings_of(
     n = len(rays[0])
     lists: list[list[tuple[int, int, bool]]] = [[] for _ in range(n)]
     touching = np.zeros(n, bool)
-    if leaf.field != "triangles":
+    if leaf.known.near is None:
         found = KINDS[leaf.field](row, *exact)
         for k, t, code, enters in _entries(found):
             lists[k].append((t, code, enters))
@@ -163,11 +163,11 @@ def crossings_of(
         along = [leaf.field == "planes" and not some for some in lists]
         return lists, found.touching | along
     for k in range(n):
-        near = _near_triangles(row["vertices"], rays[0][k], rays[1][k])
+        near = leaf.known.near(row, rays[0][k], rays[1][k])
         if len(near) == 0:
             continue
-        some = {"vertices": row["vertices"][near], "face": row["face"][near]}
-        found = KINDS["triangles"](some, exact[0][k : k + 1], exact[1][k : k + 1])
+        some = {name: np.asarray(row[name])[near] for name in ("vertices", "face")}
+        found = KINDS[leaf.field](some, exact[0][k : k + 1], exact[1][k : k + 1])
         lists[k] = sorted((t, code, enters) for _, t, code, enters in _entries(found))
         touching[k] = found.touching.any()
     return lists, touching
@@ -176,18 +176,6 @@ def crossings_of(
 def _entries(found: Crossings) -> Iterator[tuple[int, int, int, bool]]:
     for k, j in zip(*np.nonzero(found.t != NEVER), strict=True):
         yield int(k), int(found.t[k, j]), int(found.code[k, j]), bool(found.enters[k, j])
-
-
-def _near_triangles(vertices: FloatArray, o: FloatArray, d: FloatArray) -> IntArray:
-    """Indices of the triangles that a line may pass through: conservative, in floats."""
-    v = vertices.reshape(-1, 3, 3) - o
-    size = np.linalg.norm(v, axis=2) + np.abs(o).max()
-    volumes, slack = np.empty((2, 3, len(v)))
-    for k in range(3):
-        a, b = v[:, k], v[:, (k + 1) % 3]
-        volumes[k] = np.cross(a, b) @ d
-        slack[k] = 1e-13 * np.linalg.norm(d) * size[:, k] * size[:, (k + 1) % 3]
-    return np.flatnonzero((volumes >= -slack).all(axis=0) | (volumes <= slack).all(axis=0))
 
 
 def _first(member: Member, found: list[list[Crossing]], slack: int) -> tuple[int, list[Identity]]:
