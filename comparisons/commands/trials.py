@@ -290,7 +290,8 @@ def fuzz(
         from comparisons.experiments.fuzz.schema import features as known
         from comparisons.experiments.fuzz.summary import Display, write_page
         from comparisons.runs.provenance import provenance
-    from reference_rt.cli.options import Where, seconds_of
+    from reference_rt.cli.options import Where
+    from reference_rt.cli.quantities import seconds_of
     from reference_rt.util.workers import Threads
 
     where = Where(workers, scheduler, cluster)

@@ -25,11 +25,11 @@ from comparisons.cycles.surfaces import placed_arrays, triangles_of, type_name
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import copies_of, place_of
 from comparisons.geometry.frame import SHARE, round32
-from comparisons.materials import type_of
+from comparisons.materials import type_of as type_of_material
 from comparisons.renderers import NoCounterpartError
 from comparisons.renderers.vocabulary import Data, plain_rgb
 from comparisons.shapes.soup import Soup
-from comparisons.textures import BY_DESCRIPTION
+from comparisons.textures import type_of as type_of_texture
 from comparisons.translator.moved import frame_of, moved
 from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
 from reference_rt.cameras.film import BoxFilter
@@ -80,10 +80,9 @@ class Writing:
         if not isinstance(value, str):
             return plain_rgb(value)
         texture = self.scene.textures[value]
-        known = BY_DESCRIPTION.get(type(texture))
-        if known is None or known.to_cycles is None:
+        if (to_cycles := type_of_texture(texture).to_cycles) is None:
             raise NoCounterpartError(f"the texture {texture.type}")
-        return known.to_cycles(texture, self)
+        return to_cycles(texture, self)
 
     def number(self, value: Any) -> Any:
         """A number, or the texture of this name.  Raises NoCounterpartError."""
@@ -93,10 +92,9 @@ class Writing:
         """The shader of a material: black from behind where the material is.  Raises
         NoCounterpartError."""
         material = rt.Diffuse() if name is None else self.scene.materials[name]
-        known = type_of(material)
-        if known is None or known.to_cycles is None:
+        if (to_cycles := type_of_material(material).to_cycles) is None:
             raise NoCounterpartError(f"the material {material.type}")
-        return known.to_cycles(material, self)
+        return to_cycles(material, self)
 
     def save(self, array: FloatArray | None = None, **arrays: Any) -> str:
         """The name of a new file that holds an array, or arrays by name."""

@@ -1,7 +1,7 @@
 """A scene as glTF 2.0 (ISO/IEC 12113), .glb or .gltf: what that format can say of it.
 
 Contract: shapes are triangles, instances of a group are nodes of one mesh, all numbers of vertices
-are float32.  Matte surfaces and `gltf_pbr` scatter light as ours do; notes name what is only nearly
+are float32.  Matte surfaces and glTF's own scatter light as ours do; notes name what is only nearly
 the same and what is left out, and what cannot be written raises SceneError with all reasons.
 Radiant intensities and irradiances stand where glTF has candelas and lux: the factor is 1.
 """

@@ -12,7 +12,7 @@ from PIL import Image
 from comparisons.materials import type_of
 from comparisons.mitsuba.files import Losses, UnwritableError
 from comparisons.renderers.vocabulary import GltfImage, Look, matte
-from comparisons.textures import BY_DESCRIPTION
+from comparisons.textures import type_of as type_of_texture
 from comparisons.textures.texture import grey
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.image import srgb
@@ -92,8 +92,8 @@ class Surfaces(Losses):
             scale = np.prod([one.scale for one in rgb])
             codes, tint = self.coded(colour * tint, tint * scale, 1.0, name)
             if alpha:
-                grey = np.prod([grey(one.texels) for one in alpha], axis=0)
-                shares = self.rounded(grey * opacity.factor[0], name)
+                opacities = np.prod([grey(one.texels) for one in alpha], axis=0)
+                shares = self.rounded(opacities * opacity.factor[0], name)
                 codes = np.concatenate([codes, shares[..., None]], axis=2)
             pbr["baseColorTexture"] = self.texture(codes, sampler, uv, maps)
         share = 1.0 if opacity.images else float(opacity.factor[0])
@@ -112,10 +112,10 @@ class Surfaces(Losses):
             codes = np.full(shape, 255, np.uint8)
             for k, (key, some) in enumerate(planes.items(), 1):
                 if some:
-                    grey = np.prod([grey(one.texels) for one in some], axis=0)
-                    grey = grey * values[key].factor[0]
+                    numbers = np.prod([grey(one.texels) for one in some], axis=0)
+                    numbers = numbers * values[key].factor[0]
                     root = look.of_alpha and key == "roughnessFactor"
-                    codes[..., k] = self.rounded(np.sqrt(grey) if root else grey, name)
+                    codes[..., k] = self.rounded(np.sqrt(numbers) if root else numbers, name)
             pbr["metallicRoughnessTexture"] = self.texture(codes, sampler, uv, maps)
         for key, part in values.items():
             number = float(part.factor[0])
@@ -193,9 +193,7 @@ class Surfaces(Losses):
         if name is None:
             return matte(Look().base)
         material = self.scene.materials[name]
-        known = type_of(material)
-        to_gltf = None if known is None else known.to_gltf
-        if to_gltf is None:
+        if (to_gltf := type_of(material).to_gltf) is None:
             raise UnwritableError(f"a material '{material.type}'")
         if to_gltf.nearly:
             what = f"the material '{name}' ({material.type})"
@@ -204,10 +202,9 @@ class Surfaces(Losses):
 
     def image(self, name: str) -> GltfImage:
         texture = self.scene.textures[name]
-        known = BY_DESCRIPTION.get(type(texture))
-        if known is None or known.to_gltf is None:
+        if (to_gltf := type_of_texture(texture).to_gltf) is None:
             raise UnwritableError(f"a texture '{texture.type}'")
-        return known.to_gltf(texture, name, self)
+        return to_gltf(texture, name, self)
 
     def coded(
         self, values: FloatArray, scale: FloatArray, most: float, name: str

@@ -25,6 +25,7 @@ from comparisons.materials.rough_dielectric import ROUGH_DIELECTRIC
 from comparisons.materials.rough_plastic import ROUGH_PLASTIC
 from comparisons.materials.thin_dielectric import THIN_DIELECTRIC
 from comparisons.materials.two_sided import TWO_SIDED
+from comparisons.mitsuba.context import UntranslatableError
 from reference_rt.materials import Material
 
 MATERIALS = (
@@ -40,9 +41,11 @@ READERS = {plugin: read for one in MATERIALS for plugin, read in one.from_mitsub
 """By Mitsuba's plugin, what reads it."""
 
 
-def type_of(material: Material) -> MaterialType | None:
-    """What is known of a material's type; None for one that the comparison does not know."""
-    return _BY_DESCRIPTION.get(type(material))
+def type_of(material: Material) -> MaterialType:
+    """What is known of a material's type.  Raises UntranslatableError for one not in MATERIALS."""
+    if type(material) not in _BY_DESCRIPTION:
+        raise UntranslatableError(material, "material")
+    return _BY_DESCRIPTION[type(material)]
 
 
 __all__ = ["MATERIALS", "READERS", "MaterialType", "type_of"]

@@ -11,7 +11,7 @@ from comparisons.textures.kinds import NUMBER_OR_TEXTURE
 from comparisons.textures.texture import Nested
 from reference_rt.materials import Blend
 
-TABLE = PluginTable("blendbsdf", Blend, (Row("weight", "weight", NUMBER_OR_TEXTURE, None),))
+TABLE = PluginTable("blendbsdf", (Row("weight", "weight", NUMBER_OR_TEXTURE, None),))
 
 
 def _to_mitsuba(material: Blend, context: TranslationContext) -> dict[str, Any]:
@@ -54,6 +54,7 @@ def _to_pbrt(material: Blend, writing: PbrtWriter, both_sides: bool) -> Params:
 
 BLEND = MaterialType(
     description=Blend,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"blendbsdf": _from_mitsuba},
     note=_note,

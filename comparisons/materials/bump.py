@@ -16,7 +16,7 @@ from reference_rt.materials import Bump
 from reference_rt.textures import Bitmap
 from reference_rt.textures.texture import UvMap
 
-TABLE = PluginTable("bumpmap", Bump, (Row("scale", "scale", NUMBER, 1.0), *TILT))
+TABLE = PluginTable("bumpmap", (Row("scale", "scale", NUMBER, 1.0), *TILT))
 
 
 def _to_mitsuba(material: Bump, context: TranslationContext) -> dict[str, Any] | Nested:
@@ -64,6 +64,7 @@ def _note(material: Bump, context: TranslationContext) -> str:
 
 BUMP = MaterialType(
     description=Bump,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"bumpmap": _from_mitsuba},
     note=_note,

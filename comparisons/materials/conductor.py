@@ -22,7 +22,7 @@ from comparisons.renderers.vocabulary import (
 )
 from reference_rt.materials import Conductor, Material, Mirror
 
-TABLE = PluginTable("conductor", Conductor, METAL)
+TABLE = PluginTable("conductor", METAL)
 
 
 def _from_mitsuba(reading: Reading, node: Node) -> Material:
@@ -45,6 +45,7 @@ def _to_pbrt(material: Conductor, writing: PbrtWriter, both_sides: bool) -> Para
 
 CONDUCTOR = MaterialType(
     description=Conductor,
+    table=TABLE,
     to_mitsuba=TABLE.write,
     from_mitsuba={"conductor": _from_mitsuba},
     note=None,

@@ -6,7 +6,7 @@ from comparisons.mitsuba.plugin_table import PluginTable
 from comparisons.renderers.vocabulary import CyclesWriter, Data, only
 from reference_rt.materials import Dielectric
 
-TABLE = PluginTable("dielectric", Dielectric, GLASS)
+TABLE = PluginTable("dielectric", GLASS)
 
 
 def _to_cycles(material: Dielectric, writing: CyclesWriter) -> Data:
@@ -16,8 +16,9 @@ def _to_cycles(material: Dielectric, writing: CyclesWriter) -> Data:
 
 DIELECTRIC = MaterialType(
     description=Dielectric,
+    table=TABLE,
     to_mitsuba=TABLE.write,
-    from_mitsuba={"dielectric": TABLE.make},
+    from_mitsuba={"dielectric": TABLE.reader(Dielectric)},
     note=None,
     errors=None,
     to_cycles=_to_cycles,

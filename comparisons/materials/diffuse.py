@@ -6,9 +6,7 @@ from comparisons.renderers.vocabulary import CyclesWriter, Data, Params, PbrtWri
 from comparisons.textures.kinds import COLOUR_OR_TEXTURE
 from reference_rt.materials import Diffuse
 
-TABLE = PluginTable(
-    "diffuse", Diffuse, (Row("reflectance", "reflectance", COLOUR_OR_TEXTURE, 0.5),)
-)
+TABLE = PluginTable("diffuse", (Row("reflectance", "reflectance", COLOUR_OR_TEXTURE, 0.5),))
 
 
 def _to_cycles(material: Diffuse, writing: CyclesWriter) -> Data:
@@ -22,8 +20,9 @@ def _to_pbrt(material: Diffuse, writing: PbrtWriter, both_sides: bool) -> Params
 
 DIFFUSE = MaterialType(
     description=Diffuse,
+    table=TABLE,
     to_mitsuba=TABLE.write,
-    from_mitsuba={"diffuse": TABLE.make},
+    from_mitsuba={"diffuse": TABLE.reader(Diffuse)},
     note=None,
     errors=None,
     to_cycles=_to_cycles,

@@ -43,6 +43,7 @@ def _look(material: Emissive, name: str, writing: GltfWriter) -> Look:
 
 EMISSIVE = MaterialType(
     description=Emissive,
+    table=None,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={},  # `lights.reading` has a shape's emitter
     note=None,

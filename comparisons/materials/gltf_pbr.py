@@ -10,7 +10,6 @@ from reference_rt.materials import GltfPbr
 
 TABLE = PluginTable(
     "gltf_pbr",
-    GltfPbr,
     (
         Row("ior", "ior", NUMBER, 1.5),
         *(Row(name, name, COLOUR_OR_TEXTURE, 1.0) for name in GLTF_COLOURS),
@@ -34,8 +33,9 @@ def _look(material: GltfPbr, name: str, writing: GltfWriter) -> Look:
 
 GLTF_PBR = MaterialType(
     description=GltfPbr,
+    table=TABLE,
     to_mitsuba=TABLE.write,
-    from_mitsuba={"gltf_pbr": TABLE.make},
+    from_mitsuba={"gltf_pbr": TABLE.reader(GltfPbr)},
     note=lambda material, context: "Mitsuba has no glTF material: our plugin is used instead",
     errors=None,
     to_cycles=None,

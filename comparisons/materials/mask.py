@@ -11,7 +11,7 @@ from comparisons.textures.kinds import NUMBER_OR_TEXTURE
 from comparisons.textures.texture import Nested
 from reference_rt.materials import Diffuse, Mask
 
-TABLE = PluginTable("mask", Mask, (Row("opacity", "opacity", NUMBER_OR_TEXTURE, 0.5),))
+TABLE = PluginTable("mask", (Row("opacity", "opacity", NUMBER_OR_TEXTURE, 0.5),))
 
 
 def _to_mitsuba(material: Mask, context: TranslationContext) -> dict[str, Any]:
@@ -45,6 +45,7 @@ def _look(material: Mask, name: str, writing: GltfWriter) -> Look:
 
 MASK = MaterialType(
     description=Mask,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"mask": _from_mitsuba, "null": _null},
     note=lambda material, context: "shadow rays treat masks as opaque, in both renderers",

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.node import Node, Reading
+from comparisons.mitsuba.plugin_table import PluginTable
 from comparisons.renderers.vocabulary import (
     CyclesWriter,
     Data,
@@ -43,14 +44,16 @@ MOST = 5e-3
 class MaterialType:
     """What the comparison knows of a type of materials; None where a renderer has none.
 
-    to_mitsuba: a dictionary, in which a `Nested` stands for another material (it may be one);
-    from_mitsuba: a material of an element, by Mitsuba's plugin;  note: on a material whose
-    counterpart is not simply Mitsuba's own, empty without one;  errors: None for exact materials;
-    to_cycles: where Cycles computes the same to 0.1 %;  to_pbrt: with whether both sides look
-    alike.  Those of `to_` raise UntranslatableError, NoCounterpartError and UnwritableError.
+    table: of Mitsuba's plugin;  to_mitsuba: a dictionary, in which a `Nested` stands for another
+    material (it may be one);  from_mitsuba: a material of an element, by Mitsuba's plugin;  note:
+    on a material whose counterpart is not simply Mitsuba's own, empty without one;  errors: None
+    for exact materials;  to_cycles: where Cycles computes the same to 0.1 %;  to_pbrt: with whether
+    both sides look alike.  They raise UntranslatableError, SceneError, NoCounterpartError and
+    UnwritableError.
     """
 
     description: type[Material]
+    table: PluginTable | None
     to_mitsuba: Callable[[Any, TranslationContext], dict[str, Any] | Nested]
     from_mitsuba: Mapping[str, Callable[[Reading, Node], Material]]
     note: Callable[[Any, TranslationContext], str] | None

@@ -13,7 +13,7 @@ from comparisons.renderers.vocabulary import (
 )
 from reference_rt.materials import Mirror
 
-TABLE = PluginTable("conductor", Mirror, (REFLECTANCE,))
+TABLE = PluginTable("conductor", (REFLECTANCE,))
 """Without a material Mitsuba's conductor has eta = 0, k = 1, and reflects everything."""
 
 
@@ -33,6 +33,7 @@ def _to_pbrt(material: Mirror, writing: PbrtWriter, both_sides: bool) -> Params:
 
 MIRROR = MaterialType(
     description=Mirror,
+    table=TABLE,
     to_mitsuba=TABLE.write,
     from_mitsuba={},
     note=None,

@@ -18,7 +18,7 @@ from comparisons.textures.translate import colour
 from reference_rt.materials import Material, NormalMap
 from reference_rt.textures import Bitmap
 
-TABLE = PluginTable("normalmap", NormalMap, TILT)
+TABLE = PluginTable("normalmap", TILT)
 
 
 def _to_mitsuba(material: NormalMap, context: TranslationContext) -> dict[str, Any]:
@@ -67,6 +67,7 @@ def _look(material: NormalMap, name: str, writing: GltfWriter) -> Look:
 
 NORMAL_MAP = MaterialType(
     description=NormalMap,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"normalmap": _from_mitsuba},
     note=_note,

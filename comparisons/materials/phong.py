@@ -11,7 +11,6 @@ from reference_rt.materials import Phong
 
 TABLE = PluginTable(
     "textbook_phong",
-    Phong,
     (
         *(
             Row(name, name, COLOUR_OR_TEXTURE, 0.0)
@@ -32,8 +31,9 @@ def _look(material: Phong, name: str, writing: GltfWriter) -> Look:
 
 PHONG = MaterialType(
     description=Phong,
+    table=TABLE,
     to_mitsuba=TABLE.write,
-    from_mitsuba={"textbook_phong": TABLE.make},
+    from_mitsuba={"textbook_phong": TABLE.reader(Phong)},
     note=lambda material, context: "Mitsuba has no Phong material: our plugin is used instead",
     errors=None,
     to_cycles=None,

@@ -16,7 +16,7 @@ from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.plugin_table import PluginTable
 from reference_rt.materials import Plastic
 
-TABLE = PluginTable("plastic", Plastic, COAT)
+TABLE = PluginTable("plastic", COAT)
 
 
 def _to_mitsuba(material: Plastic, context: TranslationContext) -> dict[str, Any]:
@@ -34,8 +34,9 @@ def _note(material: Plastic, context: TranslationContext) -> str:
 
 PLASTIC = MaterialType(
     description=Plastic,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
-    from_mitsuba={"plastic": TABLE.make},
+    from_mitsuba={"plastic": TABLE.reader(Plastic)},
     note=_note,
     errors=Errors(relative=lambda material: 0.0, absolute=lambda material: PASSED),
     to_cycles=None,

@@ -24,7 +24,6 @@ def numbers(*names: str) -> tuple[Row, ...]:
 
 TABLE = PluginTable(
     "principled",
-    Principled,
     (
         BASE,
         *numbers("roughness", "metallic", "spec_tint", "anisotropic", "sheen", "sheen_tint"),
@@ -104,6 +103,7 @@ def _look(material: Principled, name: str, writing: GltfWriter) -> Look:
 
 PRINCIPLED = MaterialType(
     description=Principled,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"principled": _from_mitsuba},
     note=None,

@@ -8,7 +8,6 @@ from reference_rt.materials import PrincipledThin
 
 TABLE = PluginTable(
     "principledthin",
-    PrincipledThin,
     (
         BASE,
         Row("eta", "eta", NUMBER, 1.5),
@@ -25,8 +24,9 @@ TABLE = PluginTable(
 
 PRINCIPLED_THIN = MaterialType(
     description=PrincipledThin,
+    table=TABLE,
     to_mitsuba=TABLE.write,
-    from_mitsuba={"principledthin": TABLE.make},
+    from_mitsuba={"principledthin": TABLE.reader(PrincipledThin)},
     note=None,
     errors=Errors(errors_of_shares, lambda material: 0.0),
     to_cycles=None,

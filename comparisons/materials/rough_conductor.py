@@ -34,7 +34,7 @@ from comparisons.renderers.vocabulary import (
 )
 from reference_rt.materials import RoughConductor
 
-TABLE = PluginTable("roughconductor", RoughConductor, (DISTRIBUTION, *METAL), SAMPLING)
+TABLE = PluginTable("roughconductor", (DISTRIBUTION, *METAL), SAMPLING)
 
 
 def _to_mitsuba(material: RoughConductor, context: TranslationContext) -> dict[str, Any]:
@@ -70,6 +70,7 @@ def _to_pbrt(material: RoughConductor, writing: PbrtWriter, both_sides: bool) ->
 
 ROUGH_CONDUCTOR = MaterialType(
     description=RoughConductor,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"roughconductor": _from_mitsuba},
     note=note_of_beckmann,

@@ -18,7 +18,7 @@ from comparisons.mitsuba.plugin_table import PluginTable
 from comparisons.renderers.vocabulary import Params, PbrtWriter
 from reference_rt.materials import RoughDielectric
 
-TABLE = PluginTable("roughdielectric", RoughDielectric, (DISTRIBUTION, *GLASS), SAMPLING)
+TABLE = PluginTable("roughdielectric", (DISTRIBUTION, *GLASS), SAMPLING)
 
 
 def _to_mitsuba(material: RoughDielectric, context: TranslationContext) -> dict[str, Any]:
@@ -35,6 +35,7 @@ def _to_pbrt(material: RoughDielectric, writing: PbrtWriter, both_sides: bool) -
 
 ROUGH_DIELECTRIC = MaterialType(
     description=RoughDielectric,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"roughdielectric": _from_mitsuba},
     note=note_of_beckmann,

@@ -25,7 +25,7 @@ from reference_rt.materials import RoughPlastic
 from reference_rt.materials.microfacet.ggx_and_smith import MIN_ALPHA
 
 WIDTH = Row("alpha", "alpha", NUMBER, ALPHA)
-TABLE = PluginTable("roughplastic", RoughPlastic, (*COAT, DISTRIBUTION, WIDTH), SAMPLING)
+TABLE = PluginTable("roughplastic", (*COAT, DISTRIBUTION, WIDTH), SAMPLING)
 
 
 def _to_mitsuba(material: RoughPlastic, context: TranslationContext) -> dict[str, Any]:
@@ -97,6 +97,7 @@ def _absolute(material: RoughPlastic) -> float:
 
 ROUGH_PLASTIC = MaterialType(
     description=RoughPlastic,
+    table=TABLE,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"roughplastic": _from_mitsuba},
     note=_note,

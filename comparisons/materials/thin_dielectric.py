@@ -5,12 +5,13 @@ from comparisons.materials.material import Gltf, MaterialType
 from comparisons.mitsuba.plugin_table import PluginTable
 from reference_rt.materials import ThinDielectric
 
-TABLE = PluginTable("thindielectric", ThinDielectric, GLASS)
+TABLE = PluginTable("thindielectric", GLASS)
 
 THIN_DIELECTRIC = MaterialType(
     description=ThinDielectric,
+    table=TABLE,
     to_mitsuba=TABLE.write,
-    from_mitsuba={"thindielectric": TABLE.make},
+    from_mitsuba={"thindielectric": TABLE.reader(ThinDielectric)},
     note=None,
     errors=None,
     to_cycles=None,

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from comparisons.materials import type_of
-from comparisons.mitsuba.context import TranslationContext, UntranslatableError
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.textures.texture import Nested
 from comparisons.textures.translate import colour, depends_on_uv
 from reference_rt.materials import Diffuse, Emissive, Material
@@ -15,10 +15,7 @@ from reference_rt.textures import VertexColours, texture_names
 def translate_material(material: Material, context: TranslationContext) -> dict[str, Any]:
     """A BSDF's dictionary, with those of the materials that it is made of.  Raises
     UntranslatableError, ValueError for a file that cannot be used."""
-    known = type_of(material)
-    if known is None:
-        raise UntranslatableError(material, "material")
-    translated = known.to_mitsuba(material, context)
+    translated = type_of(material).to_mitsuba(material, context)
     if isinstance(translated, Nested):
         return translate_material(context.materials[translated.name], context)
     return {

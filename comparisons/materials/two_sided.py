@@ -60,6 +60,7 @@ def _look(material: TwoSided, name: str, writing: GltfWriter) -> Look:
 
 TWO_SIDED = MaterialType(
     description=TwoSided,
+    table=None,
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"twosided": _from_mitsuba},
     note=None,

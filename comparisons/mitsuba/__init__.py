@@ -3,6 +3,8 @@
 - `backend`, `llvm_libraries`: which variant of Mitsuba runs, with which LLVM.
 - `plugins`: materials and an integrator that Mitsuba lacks.
 - `parse`, `included`, `node`: what its own parser reads of its scene files; `files`: written ones.
+- `plugin_table`: plugins as tables that are read both ways; `colours`: spectra and indices of
+  refraction as it has them; `context`: what a translation knows of its scene.
 - `counterpart`: the loaded scene (`Counterpart`) and `trace`, its first hits; `csg`: those of
   solids.
 - `hits`: how each Mitsuba shape represents ours, and its hits in our numbering; `scene`: rays and

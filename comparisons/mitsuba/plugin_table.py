@@ -7,11 +7,13 @@ are in `comparisons.textures`.
 
 from collections.abc import Callable, Container
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from comparisons.mitsuba.colours import colour, index_of_refraction
 from comparisons.mitsuba.context import TranslationContext, rgb
 from comparisons.mitsuba.node import Node, Reading
+
+T = TypeVar("T")
 
 
 class Kind(NamedTuple):
@@ -70,11 +72,9 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True)
 class PluginTable:
-    """A plugin of Mitsuba, and our description.  ignored: its parameters that do not change the
-    picture."""
+    """A plugin of Mitsuba.  ignored: its parameters that do not change the picture."""
 
     plugin: str
-    description: Callable[..., Any]
     rows: tuple[Row, ...] = ()
     ignored: tuple[str, ...] = ()
 
@@ -91,9 +91,9 @@ class PluginTable:
             row.field: self._value(row, reading, node) for row in self.rows if row.field not in but
         }
 
-    def make(self, reading: Reading, node: Node) -> Any:
-        """Our description.  Raises SceneError."""
-        return self.description(**self.read(reading, node))
+    def reader(self, description: Callable[..., T]) -> Callable[[Reading, Node], T]:
+        """What reads an element that the rows alone describe."""
+        return lambda reading, node: description(**self.read(reading, node))
 
     def _value(self, row: Row, reading: Reading, node: Node) -> Any:
         if row.default is None and not node.has(row.name):

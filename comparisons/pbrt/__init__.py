@@ -1,13 +1,14 @@
 """Scene -> a scene file of pbrt-v4, .pbrt, with its meshes and images in a folder beside it.
 
-`surfaces` has the format's words, materials and textures.
+`surfaces` has the format's words, and names of materials and textures, which have their own files
+(`comparisons.materials`, `comparisons.textures`).
 
 Contract: pbrt is given what the scene describes, in world coordinates, in linear sRGB.  Where pbrt
 computes almost the same, notes say so; what it cannot express raises SceneError with all reasons.
 pbrt itself is not needed, and nothing here was ever run by it: the tests check the grammar, and
 evaluate what is written.
 
-To write another type: a case here or there; the tables of the tests say what pbrt accepts.
+To write another light or shape: a case here; the tables of the tests say what pbrt accepts.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""The words of pbrt-v4's file format, and materials and textures in them."""
+"""The words of pbrt-v4's file format, and the names of materials and textures in a file."""
 
 import re
 from collections.abc import Iterable
@@ -10,7 +10,7 @@ import numpy as np
 from comparisons.materials import type_of
 from comparisons.mitsuba.files import Files, Losses, UnwritableError
 from comparisons.renderers.vocabulary import ALONG, BLACK_PARAMS, Params
-from comparisons.textures import BY_DESCRIPTION
+from comparisons.textures import type_of as type_of_texture
 from reference_rt import materials
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.exr import write_exr
@@ -90,7 +90,9 @@ class Writing(Losses):
         if path not in self.names:
             params = BLACK_PARAMS
             with self.collected(*path):
-                params = self._params(material, both_sides)
+                if (to_pbrt := type_of(material).to_pbrt) is None:
+                    raise UnwritableError(f"a material '{material.type}'")
+                params = to_pbrt(material, self, both_sides)
             self.define(params, *path)
         return self.names[path]
 
@@ -106,13 +108,6 @@ class Writing(Losses):
     def black(self) -> str:
         return self.names.get(("", "black")) or self.define(BLACK_PARAMS, "", "black")
 
-    def _params(self, material: Any, both_sides: bool) -> Params:
-        """pbrt's parameters of a material."""
-        known = type_of(material)
-        if known is None or known.to_pbrt is None:
-            raise UnwritableError(f"a material '{material.type}'")
-        return known.to_pbrt(material, self, both_sides)
-
     # ---- textures -------------------------------------------------------------------------------
 
     def parameter(self, kind: str, key: str, value: Any) -> Params:
@@ -125,20 +120,14 @@ class Writing(Losses):
         """The name of a texture in the file.  kind: "rgb", or "float" for its luminance."""
         part = ("textures", kind, name)
         if part not in self.names:
-            plugin, params = "constant", Params()
+            texture, plugin, params = self.scene.textures[name], "constant", Params()
             with self.collected("textures", name):
-                plugin, params = self._texture(name, kind)
+                if (to_pbrt := type_of_texture(texture).to_pbrt) is None:
+                    raise UnwritableError(f"a texture '{texture.type}'")
+                plugin, params = to_pbrt(texture, name, kind, self)
             names = (self.name_for(*part), "spectrum" if kind == "rgb" else kind, plugin)
             self.lines.append(words("Texture", *names, params=params))
         return self.names[part]
-
-    def _texture(self, name: str, kind: str) -> tuple[str, Params]:
-        """pbrt's plugin and parameters of a texture."""
-        texture = self.scene.textures[name]
-        known = BY_DESCRIPTION.get(type(texture))
-        if known is None or known.to_pbrt is None:
-            raise UnwritableError(f"a texture '{texture.type}'")
-        return known.to_pbrt(texture, name, kind, self)
 
     def image(self, stem: str, texels: FloatArray) -> str:
         """The name of an image file of linear values (h, w, 3)."""

@@ -8,8 +8,8 @@ from rich.padding import Padding
 
 from comparisons.report.table import Table, table_of
 from comparisons.results.case import Case
-from comparisons.results.files import named
 from comparisons.results.headline import detectable, percent
+from comparisons.results.naming import named
 from reference_rt.util.errors import printable
 
 _FAMILIES = (

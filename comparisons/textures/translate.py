@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from comparisons.mitsuba.context import TranslationContext, UntranslatableError, rgb
-from comparisons.textures import BY_DESCRIPTION
+from comparisons.mitsuba.context import TranslationContext, rgb
+from comparisons.textures import type_of
 from comparisons.textures.texture import Nested, Use
 from reference_rt.textures import Texture, VertexColours
 
@@ -42,9 +42,7 @@ def translate_texture(
     texture: Texture, name: str, context: TranslationContext, use: Use
 ) -> dict[str, Any]:
     """The dictionary of a texture.  Raises as `colour` does."""
-    if type(texture) not in BY_DESCRIPTION:
-        raise UntranslatableError(texture, "texture")
-    translated = BY_DESCRIPTION[type(texture)].to_mitsuba(texture, name, context, use)
+    translated = type_of(texture).to_mitsuba(texture, name, context, use)
     nested = Use(projected=use.projected)
     return {
         key: _colour(part.name, context, nested) if isinstance(part, Nested) else part

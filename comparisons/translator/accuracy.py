@@ -12,20 +12,19 @@ from reference_rt.rendering.scene import Scene
 def accuracy(scene: Scene, name: str | None) -> float:
     """The relative error of the light that material `name` scatters, by our tables or in Mitsuba; 0
     for exact materials, and for None."""
-    errors = ((m, e) for m in _leaves(scene, name) if (e := _errors(m)) is not None)
-    return max((e.relative(m) for m, e in errors), default=0.0)
+    return max((errors.relative(m) for m, errors in _errors(scene, name)), default=0.0)
 
 
 def coat_error(scene: Scene, name: str | None) -> float:
     """The absolute error of light that passes a coat, as a fraction of the brightest such light; 0
     for materials without a coat, and for None."""
-    errors = ((m, e) for m in _leaves(scene, name) if (e := _errors(m)) is not None)
-    return max((e.absolute(m) for m, e in errors), default=0.0)
+    return max((errors.absolute(m) for m, errors in _errors(scene, name)), default=0.0)
 
 
-def _errors(material: Material) -> Errors | None:
-    known = type_of(material)
-    return None if known is None else known.errors
+def _errors(scene: Scene, name: str | None) -> list[tuple[Material, Errors]]:
+    """Of the materials that material `name` is made of, those that are not exact."""
+    both = ((material, type_of(material).errors) for material in _leaves(scene, name))
+    return [(material, errors) for material, errors in both if errors is not None]
 
 
 def is_tilted(scene: Scene, name: str | None) -> bool:

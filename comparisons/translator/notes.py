@@ -82,5 +82,5 @@ def note_of_samples(scene: Scene) -> str:
 
 def note_of(material: Material, context: TranslationContext) -> str:
     """The note on a material; empty if Mitsuba's own material is its exact counterpart."""
-    known = type_of(material)
-    return known.note(material, context) if known is not None and known.note is not None else ""
+    note = type_of(material).note
+    return "" if note is None else note(material, context)

@@ -3,10 +3,10 @@
 Contract: Mitsuba's own parser (`parse`) gives elements (`node.Node`); a function for each plugin
 takes its parameters one by one, with Mitsuba's defaults.  What is not taken, and every plugin
 without a function, is a `SceneError` with file, line, column and plugin: nothing is left out
-silently.  Shapes get Mitsuba's texture coordinates (`textures` says why).
+silently.  Shapes get Mitsuba's texture coordinates (`textures.texture` says why).
 
-To read another plugin: a function in the file of its kind, a line in that file's `_READERS`, and a
-row in `tests/comparisons/mitsuba/test_reading_plugins.py`."""
+To read another plugin: a function in the file of our type, and a row in
+`tests/comparisons/mitsuba/test_reading_plugins.py`."""
 
 import warnings
 from collections.abc import Callable, Mapping

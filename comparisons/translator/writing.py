@@ -5,8 +5,8 @@ reads it to a scene with the same picture, to the same bits where Mitsuba has th
 materials.  Numbers have all their digits; transforms are the steps that the scene has.  Where
 Mitsuba has no plugin, ours is named, or a mesh stands in: notes say so.
 
-To write another type: a case in `elements` (cameras, lights, textures) or in `Shapes`; materials
-are those of `comparisons.translator`.
+Materials and textures are the dictionaries that Mitsuba gets in memory, printed by `elements`.  To
+write another camera or light: a case there; another shape: one in `Shapes`.
 """
 
 from pathlib import Path

@@ -41,7 +41,6 @@ GREY = bitmap("grey.png", raw=True)
 
 BSDFS: dict[str, Any] = {
     "default": None,
-    "diffuse": {"type": "diffuse"},
     "diffuse_rgb": {"type": "diffuse", "reflectance": rgb(0.8, 0.3, 0.1)},
     "diffuse_bitmap": {"type": "diffuse", "reflectance": bitmap("colour.png", to_uv=to_uv)},
     "diffuse_nearest": {
@@ -83,7 +82,6 @@ BSDFS: dict[str, Any] = {
     },
     "pane": {"type": "thindielectric", "specular_reflectance": 0.7},
     "frosted": {"type": "roughdielectric", "distribution": "ggx", "alpha": 0.2},
-    "frosted_default": {"type": "roughdielectric"},
     "plastic": {"type": "plastic", "diffuse_reflectance": rgb(0.8, 0.3, 0.1)},
     "plastic_nonlinear": {
         "type": "plastic",
@@ -112,7 +110,6 @@ BSDFS: dict[str, Any] = {
         "flatness": 0.2,
         "anisotropic": 0.5,
     },
-    "principled_default": {"type": "principled"},
     "principled_glass": {
         "type": "principled",
         "base_color": bitmap("colour.png"),
@@ -134,7 +131,6 @@ BSDFS: dict[str, Any] = {
     },
     "mask": {"type": "mask", "opacity": 0.6, "inside": CLAY},
     "mask_textured": {"type": "mask", "opacity": GREY, "inside": CLAY},
-    "mask_default": {"type": "mask", "inside": CLAY},
     "two_sided": {"type": "twosided", "inside": CLAY},
     "two_sides": {"type": "twosided", "front": CLAY, "inside": {"type": "plastic"}},
     "null": {"type": "null"},
@@ -211,7 +207,6 @@ BSDFS: dict[str, Any] = {
         "alpha_u": 0.4,
         "alpha_v": GREY,
     },
-    "thin_default": THIN,
     "thin": {
         "type": "principledthin",
         "base_color": rgb(0.8, 0.3, 0.1),
@@ -229,7 +224,7 @@ BSDFS: dict[str, Any] = {
     "thin_pane": {**THIN, "spec_trans": 1.0, "eta": 0.7, "roughness": GREY},
 }
 
-WIDE = ("rough_plastic", "rough_plastic_ggx", "rough_metal", "frosted_default")
+WIDE = ("rough_plastic", "rough_plastic_ggx", "rough_metal")
 
 
 def place() -> Any:

@@ -13,9 +13,10 @@ from comparisons.compare.compare import Say
 from comparisons.compare.looks import level_of
 from comparisons.experiments.selftest.fault import CAUGHT
 from comparisons.experiments.selftest.right import CASES, RightCase
-from comparisons.gate.digest import fingerprint
-from comparisons.gate.gate import LIMIT, gate_pictures, look
+from comparisons.gate.copies import fingerprint
+from comparisons.gate.gate import gate_pictures, look
 from comparisons.gate.pictures_in import Picture
+from comparisons.gate.question import LIMIT
 from comparisons.gate.reference import Reference
 from comparisons.runs.elsewhere import run_elsewhere
 from reference_rt.core.arrays import FloatArray

@@ -20,7 +20,7 @@ The diffuse base under a coat is rho / (1 - c R) T(wi) T(wo) / (eta² pi), with 
 reflectance and T its transmittance.  Mitsuba takes R of smooth plastic from a fit made for indices
 up to 2; of rough plastic as the mean over 64 cosines from 0 to 1, both ends included, which is
 about R / 64 below the integral; and T by linear interpolation between these 64 cosines.  Here both
-are integrals in float64: `comparisons.translator.notes` measures the error of Mitsuba's base.
+are integrals in float64: `comparisons.materials.coat` measures the error of Mitsuba's base.
 The specular reflection is Mitsuba's, with the exact masking of the former.
 
 Mitsuba's plastics choose between coat and base by the means of their colours.  Colours of vertices

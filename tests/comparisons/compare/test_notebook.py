@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import comparisons
-from comparisons.compare.one_scene import NotebookCase, difference
+from comparisons.compare.notebook import NotebookCase, difference
 from comparisons.report.thumbnails import BLUE, RED
 from comparisons.results.case import Images, Metrics, RungResult
 from reference_rt import Scene, SceneError

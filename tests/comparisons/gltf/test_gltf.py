@@ -385,8 +385,8 @@ def test_gltf_pbr_is_written_as_it_is(tmp_path: Path) -> None:
     """Its textures of numbers share an image."""
     values = {"base_color": "product", "metallic": "grey", "roughness": 0.25, "ior": 1.4}
     values |= {"specular": 0.5, "specular_color": (1.0, 0.5, 1.0)}
-    material = SimpleNamespace(type="gltf_pbr", **values)
-    product = SimpleNamespace(type="product", of=("vertices",), factor=(0.1, 0.2, 0.3))
+    material = rt.GltfPbr(**values)
+    product = rt.Product(of=("vertices",), factor=(0.1, 0.2, 0.3))
     textures = {"grey": rt.Checker(first=(0.2,) * 3, second=(1.0,) * 3), "product": product}
     textures["vertices"] = rt.VertexColours()
     surfaces = Surfaces(SimpleNamespace(materials={"m": material}, textures=textures))

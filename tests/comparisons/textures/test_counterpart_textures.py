@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,8 +12,10 @@ from comparisons.materials.translate import translate_material
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.context import TranslationContext, UntranslatableError
 from comparisons.mitsuba.scene import for_rays
+from comparisons.textures.texture import Use
 from comparisons.textures.translate import translate_texture
 from comparisons.translator import load
+from reference_rt.core.model import types_of
 from reference_rt.core.vec3 import Vec3, luminance
 from reference_rt.lights import EnvironmentMap
 from reference_rt.lights.emitters import environment_map
@@ -66,8 +68,8 @@ def test_textures(texture: Texture, image_folder: Path) -> None:
     ]
     ours = np.array([tuple(lookup(0, a)) for a in at])
     load_dict = mitsuba().load_dict
-    colours = load_dict(translate_texture(texture, "t", context, False))
-    numbers = load_dict(translate_texture(texture, "t", context, True))
+    colours = load_dict(translate_texture(texture, "t", context, Use()))
+    numbers = load_dict(translate_texture(texture, "t", context, Use(as_number=True)))
     theirs = for_rays(lambda a, b: (colours.eval(interaction(a, b)),), u, v)[0]
     one = for_rays(lambda a, b: (numbers.eval_1(interaction(a, b)),), u, v)[0]
     # uv round by 2^-23 each; from one texel to the next is a step of 1 at most, over 1/24.  An
@@ -111,7 +113,7 @@ def slots() -> list[tuple[type[Material], str]]:
     """All fields of materials that may name a texture."""
     return [
         (cls, field)
-        for cls in get_args(get_args(AnyMaterial)[0])
+        for cls in types_of(AnyMaterial)
         for field, info in cls.model_fields.items()
         if any(isinstance(data, MayBeTexture) for data in info.metadata)
     ]
@@ -175,7 +177,7 @@ def test_normal_maps_that_follow_v(image_folder: Path) -> None:
 def test_vertex_colours_where_there_are_none() -> None:
     texture = VertexColours(without=(0.1, 0.2, 0.3))
     context = TranslationContext({}, {"t": texture}, Path())
-    assert translate_texture(texture, "t", context, False)["value"] == [0.1, 0.2, 0.3]
+    assert translate_texture(texture, "t", context, Use())["value"] == [0.1, 0.2, 0.3]
 
 
 @pytest.mark.parametrize(

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from comparisons import translator
+from comparisons.materials.coat import COSINES, base_error
 from comparisons.materials.translate import translate_material
 from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.scene import for_rays, picture
 from comparisons.translator import load
-from comparisons.translator.notes import COSINES, base_error, notes_of
+from comparisons.translator.notes import notes_of
 from reference_rt.materials import Plastic, RoughPlastic
 from reference_rt.rendering.scene import Scene
 
@@ -97,7 +98,7 @@ QUICK = {(1.5, 0.01), (1.9, 0.1), (1.3, 0.5)}
     ],
 )
 def test_documented_coats(index, alpha, ggx, beckmann, monkeypatch):
-    monkeypatch.setattr("comparisons.translator.notes.COSINES", (1.0,))
+    monkeypatch.setattr("comparisons.materials.coat.COSINES", (1.0,))
     for distribution, told in (("ggx", ggx), ("beckmann", beckmann)):
         low, high = base_error(index, distribution, alpha)
         assert low == high
