@@ -188,7 +188,7 @@ def answer(rays: Rays) -> FloatArray:
 
 
 _intersect = ByClass("intersect")
-for _, _, _table, _module in TABLES:
+for _code, _field, _table, _module in TABLES:
     _intersect.register(_table, _module.intersect)
 _intersect_row = _intersect.function
 
