@@ -142,14 +142,15 @@ def stability(
     with compare_extra():
         from comparisons.commands.outputs import Outputs
         from comparisons.experiments.stability.harness import outputs, page
-        from comparisons.experiments.stability.harness.core import MODULES, Effort, summaries
-        from comparisons.experiments.stability.harness.core import family as family_of
+        from comparisons.experiments.stability.harness.points import summaries
         from comparisons.experiments.stability.harness.run import (
             Choice,
             mitsuba_is_there,
             run,
             shoot,
         )
+        from comparisons.experiments.stability.harness.series import MODULES, Effort
+        from comparisons.experiments.stability.harness.series import family as family_of
         from comparisons.report import terminal
         from comparisons.runs.provenance import ours, provenance
 
@@ -274,9 +275,10 @@ def fuzz(
     with compare_extra("fuzzing"):
         from comparisons.commands.outputs import Outputs
         from comparisons.experiments.fuzz import summary
-        from comparisons.experiments.fuzz.fields import features as known
-        from comparisons.experiments.fuzz.finding import RUNGS, Effort, Grammar, remove
+        from comparisons.experiments.fuzz.finding import RUNGS, Effort, Grammar
+        from comparisons.experiments.fuzz.results import remove
         from comparisons.experiments.fuzz.run import Plan, run
+        from comparisons.experiments.fuzz.schema import features as known
         from comparisons.experiments.fuzz.summary import Display, write_page
         from comparisons.runs.provenance import provenance
     from reference_rt.cli.options import Where
