@@ -102,12 +102,12 @@ def gather(
     if not _has_many_instances(subject.reference or subject.scene):
         return _gather(subject, budget, say, threads, only)
     with scalar():
-        found = _gather(subject, budget, say, threads, only)
+        evidence = _gather(subject, budget, say, threads, only)
     note = (
         "Mitsuba renders in its scalar variant: its fast ones compile code for each of the many "
         "instances"
     )
-    return replace(found, lights=None, notes=(note, *found.notes))
+    return replace(evidence, lights=None, notes=(note, *evidence.notes))
 
 
 def _has_many_instances(scene: Scene) -> bool:
@@ -159,17 +159,17 @@ def _gather(
             f"move by at most {moved:.2g}"
         )
     films = (subject.scene.film, (subject.reference or subject.scene).film)
-    found = _deterministic_rungs(
+    rungs = _deterministic_rungs(
         subject.scene, scene, tables, counterpart, films, budget, only, say
     )
     pictured = not only or not {"statistics", "images"}.isdisjoint(only)
     reason = _no_pictures(counterpart, scene)
     if reason:
-        found += [RungResult(name, "not-comparable", reason) for name in ("statistics", "images")]
+        rungs += [RungResult(name, "not-comparable", reason) for name in ("statistics", "images")]
         pictured = False
     if not pictured:
-        return Evidence(scene.name, tuple(found), None, seconds, tuple(notes), left_out)
-    decided = any(rung.status == "differ" for rung in found)
+        return Evidence(scene.name, tuple(rungs), None, seconds, tuple(notes), left_out)
+    decided = any(rung.status == "differ" for rung in rungs)
     shown = counterpart if own is None else Counterpart(own, counterpart.mi_shapes)
     rendered, looked = _pictures(scene, tables, shown, budget, threads, say, decided)
     shapes = pictures.layers(scene, tables, counterpart)
@@ -179,7 +179,7 @@ def _gather(
     notes.extend(rendered.notes)
     return Evidence(
         scene.name,
-        tuple(found),
+        tuple(rungs),
         rendered,
         seconds,
         tuple(notes),
@@ -252,11 +252,11 @@ def _deterministic_rungs(
     climbs = {"files": lambda: ladder.files(written), **climbs}
     if applies(scene, films[0]):
         climbs["layers"] = lambda: ladder.layers(scene, tables, counterpart, films)
-    found: list[RungResult] = []
+    rungs: list[RungResult] = []
     for name, climb in climbs.items():
         if only and name not in only:
             continue
-        broken = next((t for t in found if t.status == "differ"), None)
+        broken = next((t for t in rungs if t.status == "differ"), None)
         of_light = name in ("direct", "whitted")
         if broken is not None:
             rung = RungResult(name, "not-applicable", f"the {broken.name} rung below is broken")
@@ -268,8 +268,8 @@ def _deterministic_rungs(
             start = time.perf_counter()
             rung = climb()
             say(f"{name}: {rung.status} ({time.perf_counter() - start:.1f} s)")
-        found.append(rung)
-    return found
+        rungs.append(rung)
+    return rungs
 
 
 def _pictures(
@@ -308,13 +308,13 @@ def _pictures(
             rendered = replace(rendered, checked=check(rendered))
         return at_look(rendered, budget.limit, level)
 
-    found = looks.until_decided(
+    looked = looks.until_decided(
         of_both.grow,
         look,
         seconds=budget.seconds,
         first=first,
-        step=lambda count: looks.group_of(count, most),
+        most=most,
         say=lambda line: say(f"{line} ({time.perf_counter() - start:.1f} s)"),
     )
     assert rendered is not None
-    return rendered, found
+    return rendered, looked

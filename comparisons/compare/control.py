@@ -31,7 +31,7 @@ def control(scene: Scene, budget: Budget, say: Callable[[str], None]) -> Case:
         scene = _smaller(scene)
     chosen = backend.backend().variant
     variants = {"candidate": backend.SCALAR, "reference": chosen}
-    found: list[FloatArray] = []
+    replicates: list[FloatArray] = []
     seconds: dict[str, dict[str, float]] = {}
     sides = (f"Mitsuba's {backend.SCALAR}", f"Mitsuba's {chosen}")
     rungs: tuple[RungResult, ...] = ()
@@ -41,16 +41,16 @@ def control(scene: Scene, budget: Budget, say: Callable[[str], None]) -> Case:
             start = time.perf_counter()
             with backend.variant(variant):
                 # The candidate's seeds must not overlap the reference's.
-                found.append(_of_seeds(scene, budget, (1 - number) * 100_000))
+                replicates.append(_of_seeds(scene, budget, (1 - number) * 100_000))
             seconds[side] = {"render": time.perf_counter() - start}
             say(f"{variant}: {seconds[side]['render']:.1f} s")
     except (UntranslatableError, _NoLightError) as error:
         rungs = (RungResult("statistics", "not-comparable", str(error)),)
     else:
         if scene.integrator.deterministic:
-            rendered = Rendered(Images(found[0][0], found[1][0]))
+            rendered = Rendered(Images(replicates[0][0], replicates[1][0]))
         else:
-            rendered = of_replicates(found[0], found[1], seconds)
+            rendered = of_replicates(replicates[0], replicates[1], seconds)
     return judge(
         Evidence(f"{scene.name} (control)", rungs, rendered, seconds, sides=sides), budget.limit
     )

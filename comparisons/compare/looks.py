@@ -98,7 +98,7 @@ def until_decided(
     *,
     seconds: float,
     first: int = FIRST,
-    step: Callable[[int], int] = lambda count: 1,
+    most: int | None = None,
     say: Callable[[str], None] = lambda line: None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> Looks:
@@ -106,8 +106,8 @@ def until_decided(
 
     grow: makes replicates until there are as many of each side;  judge: the result of a look at
     them with this share of the levels;  seconds: no replicates are begun that would probably end
-    later;  first: replicates of the first look, which is taken in any case;  step: of how many
-    replicates each kept picture is the mean, if there are so many;  say: is told of each look.
+    later;  first: replicates of the first look, which is taken in any case;  most: of the `Pool`
+    that keeps them, whose groups a look has as a whole;  say: is told of each look.
     """
     counts: list[int] = []
     start, count = clock(), first
@@ -118,17 +118,17 @@ def until_decided(
         each = (clock() - begun) / (count - before)
         look = len(counts)
         rung = judge(level_of(look))
-        found = f"look {look}, {count} replicates: {rung.status}"
+        told = f"look {look}, {count} replicates: {rung.status}"
         if rung.status != "inconclusive":
-            say(found)
+            say(told)
             return Looks(tuple(counts), level_of(look), rung)
         left = seconds - (clock() - start)
         fits = 2 * count if each <= 0.0 else min(2 * count, count + int(max(left, 0.0) / each))
-        fits -= fits % step(fits)
+        fits -= fits % (1 if most is None else group_of(fits, most))
         if fits < WORTH * count:
-            say(f"{found}; the time limit of {seconds:g} s is reached")
+            say(f"{told}; the time limit of {seconds:g} s is reached")
             return Looks(tuple(counts), level_of(look), rung, out_of_time=True)
-        say(f"{found}; goes on to {fits}, about {each * (fits - count):.0f} s")
+        say(f"{told}; goes on to {fits}, about {each * (fits - count):.0f} s")
         count = fits
 
 

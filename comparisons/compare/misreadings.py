@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.compare.diagnosis.misfit import Hypothesis
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.path_length import Lengths
 from reference_rt.cameras import Orthographic
 from reference_rt.cameras.view_rectangle import CentralCamera
@@ -131,9 +131,9 @@ def _changes(scene: Scene, place: Path) -> Iterator[tuple[str, _Update]]:
     for parts, changes in (("materials", MATERIALS), ("textures", TEXTURES)):
         of: dict[str, Any] = getattr(scene, parts)
         for name, change in changes.items():
-            found = {key: part.model_copy(update=change(part)) for key, part in of.items()}
-            if found != of:
-                yield name, {parts: found}
+            others_of = {key: part.model_copy(update=change(part)) for key, part in of.items()}
+            if others_of != of:
+                yield name, {parts: others_of}
     maps = {m.normals for m in scene.materials.values() if isinstance(m, NormalMap)}
     if maps:
         plain = {

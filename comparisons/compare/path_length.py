@@ -8,7 +8,7 @@ the same noise but for that of the paths that one of them lacks.
 
 from collections.abc import Callable, Iterator
 
-from comparisons.compare.diagnosis.misfit import Hypothesis
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.results.case import FloatArray
 from reference_rt.integrators import Path
 from reference_rt.rendering.render import render

@@ -69,14 +69,14 @@ def layers(
     y, x = np.mgrid[0 : film.height, 0 : film.width]
     o, d = camera_rays(scene, x.ravel() + 0.5, y.ravel() + 0.5)
     sides = query.intersect(tables, o, d), trace(counterpart, o, d)
-    found = {}
+    pairs = {}
     for name, values in (("distance", [h.t for h in sides]), ("normal", [h.ns for h in sides])):
         pair = [np.zeros((len(o), 3)), np.zeros((len(o), 3))]
         for picture, hits, some in zip(pair, sides, values, strict=True):
             hit = hits.shape >= 0
             picture[hit] = some.reshape(len(o), -1)[hit]
-        found[name] = pair[0].reshape(*y.shape, 3), pair[1].reshape(*y.shape, 3)
-    return found
+        pairs[name] = pair[0].reshape(*y.shape, 3), pair[1].reshape(*y.shape, 3)
+    return pairs
 
 
 def whitted(scene: Scene, tables: SceneTables, counterpart: Counterpart) -> Rendered:
@@ -147,16 +147,16 @@ class Replicates:
             ours.add(picture.colour)
             self._times.append(picture.seconds)
         for begun in range(made, count, _BATCH):
-            found = mitsuba_scene.render(
+            rendered = mitsuba_scene.render(
                 self._counterpart.mi_scene,
                 min(_BATCH, count - begun),
                 self._reference_spp,
                 first + begun - made,
                 self._reference_sampler,
             )
-            for other in found.pictures:
+            for other in rendered.pictures:
                 theirs.add(other)
-            self._mitsuba_times += found.seconds.tolist()
+            self._mitsuba_times += rendered.seconds.tolist()
 
     def rendered(self) -> Rendered:
         """What there is so far; the images are its means.  seconds["render"] is the median time of

@@ -29,15 +29,15 @@ def single_lights(
     sampler = scene.resolved_sampler
     if hasattr(sampler, "seed"):
         sampler = sampler.model_copy(update={"spp": spp})
-    found = {}
+    pictures = {}
     for name in shining:
         one = scene.changed(lights=(), materials=_only(scene, name), sampler=sampler)
-        found[f"the material '{name}'"] = render(one, threads=threads).colour
+        pictures[f"the material '{name}'"] = render(one, threads=threads).colour
     for k in lights:
         light = scene.lights[k]
         one = scene.changed(lights=(light,), materials=_only(scene, None), sampler=sampler)
-        found[f"lights[{k}] ({light.type})"] = render(one, threads=threads).colour
-    return found
+        pictures[f"lights[{k}] ({light.type})"] = render(one, threads=threads).colour
+    return pictures
 
 
 def _only(scene: Scene, name: str | None) -> dict[str, AnyMaterial]:

@@ -8,8 +8,9 @@ This package can be called: see `request.gate`.
 
 `pictures_in` reads candidates, `driver` runs a renderer to make them, `request` finds what they are
 compared with (`reference`: our rendering or files; `baselines`: accepted pictures), `copies` finds
-those that are unchanged, `gate` returns a `comparisons.results.case.Case`, `outputs` writes it.
-`edges` judges the pixels of pictures without noise, `tone_curves` displays our own like theirs.
+those that are unchanged, `gate` hands the evidence to the one judge (`comparisons.compare.judge`),
+`outputs` writes the `comparisons.results.case.Case`.  `edges` judges the pixels of pictures without
+noise; `tone_curves` and `displayed` show our own like theirs.
 `rounds` drives a renderer until the question is decided (see `comparisons.compare.looks`).
 `pytest_plugin` is the fixture `image_gate`.
 

@@ -19,7 +19,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from comparisons.gate.digest import fingerprint
+from comparisons.gate.copies import fingerprint
 from comparisons.gate.pictures_in import Picture, read_candidate
 from comparisons.gate.reference import Reference, stacked, usable
 from comparisons.results.files import sealed, unsealed
@@ -265,12 +265,12 @@ def scene_of(record: Record, folder: Path) -> Scene | None:
 
 def used_in(results: Path) -> set[str]:
     """The names of the baselines that any `results.json` in or below a folder names."""
-    found = set()
+    names = set()
     for path in results.rglob("results.json"):
         with suppress(OSError, ValueError, AttributeError, KeyError, TypeError, RecursionError):
             document = json.loads(read_text(path))
-            found.add(document["provenance"].get("baseline"))
-    return {name for name in found if isinstance(name, str)}
+            names.add(document["provenance"].get("baseline"))
+    return {name for name in names if isinstance(name, str)}
 
 
 def _source(picture: Picture) -> dict[str, Any]:

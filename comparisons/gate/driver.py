@@ -224,12 +224,12 @@ def _run(arguments: list[str], said: Path, seconds: float, which: str, name: str
             f"with its children; a longer --time-limit would let it run on{_last_lines(said)}"
         )
     try:
-        found = json.loads(answer)
+        answered = json.loads(answer)
     except ValueError:
         raise RendererError(f"{name}: the process that watches it was killed") from None
-    if "error" in found:
-        raise RendererError(f"{arguments[0]}: cannot be started: {found['error']}")
-    code = found["code"]
+    if "error" in answered:
+        raise RendererError(f"{arguments[0]}: cannot be started: {answered['error']}")
+    code = answered["code"]
     if code < 0:
         with suppress(ValueError):
             raise RendererError(
@@ -254,13 +254,13 @@ def _last_lines(said: Path) -> str:
 def _pictures_here() -> set[tuple[str, int]]:
     """Names and times of the pictures in the working folder, where a renderer that ignores {output}
     may write."""
-    found = set()
+    names = set()
     with suppress(OSError), os.scandir() as entries:
         for entry in entries:
             if Path(entry.name).suffix.lower() in _PICTURES:
                 with suppress(OSError):
-                    found.add((entry.name, entry.stat().st_mtime_ns))
-    return found
+                    names.add((entry.name, entry.stat().st_mtime_ns))
+    return names
 
 
 def _check_written(output: Path, before: set[tuple[str, int]], which: str) -> None:
@@ -269,10 +269,10 @@ def _check_written(output: Path, before: set[tuple[str, int]], which: str) -> No
     others = sorted(path.name for path in output.parent.iterdir())
     here = sorted(name for name, _ in _pictures_here() - before)
     if others or here:
-        found = [f"{name} in the same folder" for name in others[:3]]
-        found += [f"{name} in the working folder" for name in here[:3]]
+        places = [f"{name} in the same folder" for name in others[:3]]
+        places += [f"{name} in the working folder" for name in here[:3]]
         raise RendererError(
-            f"the renderer wrote another file with {which}: {', '.join(found)}; expected "
+            f"the renderer wrote another file with {which}: {', '.join(places)}; expected "
             f"{output.name}, at the path given by {{output}}"
         )
     raise RendererError(

@@ -38,7 +38,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from comparisons.gate.reference import is_noise_free
 from comparisons.results.case import FloatArray, RungResult
-from comparisons.statistics.scales import CHANNELS
+from comparisons.statistics.cells import CHANNELS
 from reference_rt.cameras.film import BoxFilter
 from reference_rt.integrators import Direct, RayCast
 from reference_rt.rendering.image import srgb
@@ -190,22 +190,22 @@ class _Law(NamedTuple):
     def by_rules(self, radiance: FloatArray, shown: FloatArray) -> tuple[list[FloatArray], ...]:
         """The least and the largest (n, 3) that each of RULES gives to nodes, in each of SPACES,
         where each sample is within SNAP of its place."""
-        found: tuple[list[FloatArray], ...] = [], []
+        bounds: tuple[list[FloatArray], ...] = [], []
         nodes = [(at + REACH).T for at in RULES.values()]
         curve = self.curve
         if curve is not None:  # all samples are moved alike: single ones would mix channels
             around = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
             for x, y in nodes:
                 moved = [curve(radiance[:, y + i, x + j].mean(axis=1)) for i, j in around]
-                found[0].append(np.min(moved, axis=0))
-                found[1].append(np.max(moved, axis=0))
+                bounds[0].append(np.min(moved, axis=0))
+                bounds[1].append(np.max(moved, axis=0))
         for encode, decode in [(None, None), (srgb, linear)][: 1 if curve is None else 2]:
             values = shown if encode is None else encode(shown)
-            for f, of in zip((minimum_filter1d, maximum_filter1d), found, strict=True):
+            for f, of in zip((minimum_filter1d, maximum_filter1d), bounds, strict=True):
                 moved = f(f(values, 3, axis=1), 3, axis=2)
                 means = (moved[:, y, x].mean(axis=1) for x, y in nodes)
                 of += means if decode is None else map(decode, means)
-        return found
+        return bounds
 
     def widened(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What candidates may have whose values are within low and high."""
@@ -293,9 +293,9 @@ def _crossed(look: Look, law: _Law, shape: tuple[int, ...]) -> BoolArray:
     """Which pixels seem to have an edge, by their corners, sides and centre (height, width)."""
     height, width = shape
     x, y = np.meshgrid(0.5 * np.arange(2 * width + 1), 0.5 * np.arange(2 * height + 1))
-    found = law.shown(look(np.stack([x, y], axis=-1))[0])
+    radiance = law.shown(look(np.stack([x, y], axis=-1))[0])
     nine = np.stack([
-        found[i : i + 2 * height - 1 : 2, j : j + 2 * width - 1 : 2]
+        radiance[i : i + 2 * height - 1 : 2, j : j + 2 * width - 1 : 2]
         for i in range(3)
         for j in range(3)
     ], axis=2).reshape(-1, 3, 3, 3)  # fmt: skip

@@ -2,25 +2,28 @@
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from comparisons.compare.diagnosis.misfit import Hypothesis
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.looks import Looks
 from comparisons.compare.misreadings import misreadings
-from comparisons.compare.one_scene import NotebookCase
+from comparisons.compare.notebook import NotebookCase
 from comparisons.compare.path_length import Lengths, path_lengths
 from comparisons.compare.single_lights import single_lights
 from comparisons.gate import baselines, reference
 from comparisons.gate.digest import scene_digest
 from comparisons.gate.edges import DARK, TOLERANCE, Edges, look_at
-from comparisons.gate.gate import LIMIT, Question, gate_pictures
+from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture, pictures_of
+from comparisons.gate.question import LIMIT, Question
 from comparisons.gate.reference import Reference, check_sizes, size_of
 from comparisons.gate.rim import check_rim
+from comparisons.gate.shown_curve import estimated
 from comparisons.gate.terms import is_sure, missing_terms
-from comparisons.gate.tone_curves import ESTIMATE, ToneCurve, curve_of, estimated
+from comparisons.gate.tone_curves import ESTIMATE, ToneCurve, curve_of
 from comparisons.renderers import WitnessName
 from comparisons.results.case import Case, Cause, FloatArray
 from comparisons.results.headline import UP_TO
@@ -94,7 +97,7 @@ def gated(
     """The verdict.  Raises ImageError, SceneError, UsageError, BaselineMissingError,
     BaselineEditedError."""
     judge = prepared(request, candidates, say)
-    return judge.case(partial(gate_pictures, candidates, judge.reference))
+    return judge.case(candidates)
 
 
 def gate(
@@ -126,7 +129,7 @@ def gate(
     settings: dict[str, Any] = {"limit": limit, "noise_free": noise_free, "tone_curve": tone_curve}
     request = Request(known, others, threads=threads, rim=rim, **settings)
     case = gated(request, pictures_of(pictures))
-    return NotebookCase(**{field.name: getattr(case, field.name) for field in fields(case)})
+    return NotebookCase.of(case)
 
 
 @dataclass(frozen=True)
@@ -153,29 +156,31 @@ class Judge:
         shown = self.curve(self.linear.pictures)
         return replace(self.linear, pictures=shown, notes=(*self.linear.notes, note))
 
-    def case(self, gate: "partial[Case]") -> Case:
-        """The verdict by `gate_pictures` or `judged`, whose candidates and reference are given
-        already; a difference from our own pictures may be of terms that the renderer lacks."""
-        request, candidates = self.request, gate.args[0]
-        found = self._case(gate)
+    def case(
+        self, candidates: Sequence[Picture], notes: Sequence[str] = (), looks: Looks | None = None
+    ) -> Case:
+        """The verdict by `gate_pictures`; a difference from our own pictures may be of terms that
+        the renderer lacks."""
+        request = self.request
+        case = self._case(candidates, notes, looks)
         if request.tone_curve == ESTIMATE and self.curve is not None:
             where = str(self.curve).replace(":", " at exposure ")
-            reason = f"{UP_TO}the tone curve {where}, estimated: {found.reason}"
-            found = replace(found, reason=reason)
-        if found.verdict != "differ":
-            return found
-        toned = None if request.tone_curve == ESTIMATE else self._toned(candidates, found)
+            reason = f"{UP_TO}the tone curve {where}, estimated: {case.reason}"
+            case = replace(case, reason=reason)
+        if case.verdict != "differ":
+            return case
+        toned = None if request.tone_curve == ESTIMATE else self._toned(candidates, case)
         if toned is not None or request.references or request.baseline:
-            return found if toned is None else replace(found, cause=toned)
+            return case if toned is None else replace(case, cause=toned)
         assert self.scene is not None
 
         def judged(scene: Scene) -> Case:
             ours = reference.of_scene(scene, request.limit, threads=request.threads)
             plain = Judge(replace(request, witness=None), ours, scene, self.curve)
-            return plain._case(partial(gate_pictures, candidates, plain.reference), diagnosed=False)
+            return plain._case(candidates, diagnosed=False)
 
-        cause = missing_terms(self.scene, found, request.rim, request.threads, judged, self.curve)
-        return found if cause is None else replace(found, cause=cause)
+        cause = missing_terms(self.scene, case, request.rim, request.threads, judged, self.curve)
+        return case if cause is None else replace(case, cause=cause)
 
     def _toned(self, candidates: Sequence[Picture], found: Case) -> Cause | None:
         """That the candidate of a case that differs went through another tone curve, or the same at
@@ -185,7 +190,7 @@ class Judge:
         if curve is None or str(curve) == str(own or "linear"):
             return None
         other = replace(self, curve=curve, request=replace(self.request, tone_curve=str(curve)))
-        case = other.case(partial(gate_pictures, candidates, other.reference))
+        case = other.case(candidates)
         is_gain = curve.name == ("linear" if own is None else own.name)
         if is_sure(found.cause) and (case.verdict != "agree" or (is_gain and own is None)):
             return None
@@ -203,7 +208,13 @@ class Judge:
         )
         return Cause(name, evidence, 1.0 - after / before)
 
-    def _case(self, gate: "partial[Case]", diagnosed: bool = True) -> Case:
+    def _case(
+        self,
+        candidates: Sequence[Picture],
+        notes: Sequence[str] = (),
+        looks: Looks | None = None,
+        diagnosed: bool = True,
+    ) -> Case:
         """The verdict.  diagnosed: whether the cause of a difference is sought by rendering."""
         request, scene, curve = self.request, self.scene, self.curve
         known = scene if diagnosed else None
@@ -226,7 +237,7 @@ class Judge:
         question = Question(
             request.limit, request.name, lights, lengths, edges, self._witness(), request.rim
         )
-        return gate(question=question)
+        return gate_pictures(candidates, self.reference, question, notes, looks)
 
     def _through(self, curve: ToneCurve, lengths: Lengths) -> Lengths:
         """Hypotheses about linear pictures, as the curve shows them."""
@@ -257,20 +268,20 @@ def prepared(
     if scene is not None:
         expected = f"{scene.film.width} x {scene.film.height}"
         check_sizes(candidates, expected, f"the size of the scene '{scene.name}'")
-    found, scene = _judge(request, scene, [picture.name for picture in candidates], say)
-    check_rim(found.pictures.shape, request.rim)
+    judge, scene = _judge(request, scene, [picture.name for picture in candidates], say)
+    check_rim(judge.pictures.shape, request.rim)
     if not request.tone_curve:
-        return Judge(request, found, scene)
-    if not found.noise_free:
+        return Judge(request, judge, scene)
+    if not judge.noise_free:
         raise UsageError("--tone-curve: the pictures have noise; expected those of a scene without")
     if request.tone_curve != ESTIMATE:
-        return Judge(request, found, scene, curve_of(request.tone_curve))
-    check_sizes(candidates, size_of(found.pictures[0]), "as the reference")
-    curve = estimated(candidates[0].radiance, found.pictures[0])
+        return Judge(request, judge, scene, curve_of(request.tone_curve))
+    check_sizes(candidates, size_of(judge.pictures[0]), "as the reference")
+    curve = estimated(candidates[0].radiance, judge.pictures[0])
     if curve is None or str(curve) == "linear":
         curve = None
-        found = replace(found, notes=(*found.notes, "no tone curve was recognised"))
-    return Judge(request, found, scene, curve)
+        judge = replace(judge, notes=(*judge.notes, "no tone curve was recognised"))
+    return Judge(request, judge, scene, curve)
 
 
 def _judge(
@@ -279,8 +290,8 @@ def _judge(
     """The reference, and the scene if it is known."""
     noise_free = request.noise_free or (scene is not None and reference.is_noise_free(scene))
     if request.references:
-        found = reference.of_files(request.references, request.variance, noise_free)
-        return found, scene
+        judge = reference.of_files(request.references, request.variance, noise_free)
+        return judge, scene
     if request.baseline:
         return _baseline(request, scene, files)
     assert scene is not None
@@ -290,11 +301,11 @@ def _judge(
 def _baseline(
     request: Request, scene: Scene | None, files: Sequence[str]
 ) -> tuple[Reference, Scene | None]:
-    found = baselines.load(request.baselines, request.baseline, files)
-    scene = scene or baselines.scene_of(found.record, request.baselines)
+    baseline = baselines.load(request.baselines, request.baseline, files)
+    scene = scene or baselines.scene_of(baseline.record, request.baselines)
     if scene is not None:
-        baselines.check_fresh(found, scene_digest(scene), f"the scene '{scene.name}'")
-    judge = found.reference()
+        baselines.check_fresh(baseline, scene_digest(scene), f"the scene '{scene.name}'")
+    judge = baseline.reference()
     if request.noise_free and len(judge.pictures) == 1:
         judge = replace(judge, noise_free=True)
     return judge, scene

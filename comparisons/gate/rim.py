@@ -10,10 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from comparisons.compare.diagnosis.misfit import Hypothesis
-from comparisons.compare.judge import Lights
-from comparisons.compare.path_length import Lengths
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.gate.pictures_in import Picture
+from comparisons.gate.question import Question
 from comparisons.gate.reference import Reference
 from reference_rt.core.arrays import FloatArray
 from reference_rt.util.errors import UsageError
@@ -57,10 +56,9 @@ def without_rim(
     return cropped, judge
 
 
-def without_rim_later(
-    lights: Lights | None, lengths: Lengths | None, pixels: int
-) -> tuple[Lights | None, Lengths | None]:
+def question_without_rim(question: Question) -> Question:
     """The same for pictures that are rendered only if they are needed."""
+    pixels, lights, lengths, edges = question.rim, question.lights, question.lengths, question.edges
 
     def inner_lights() -> dict[str, FloatArray]:
         assert lights is not None
@@ -72,7 +70,12 @@ def without_rim_later(
         for one in lengths(np.pad(reference, rim)):
             yield replace(one, picture=_inner(one.picture, pixels))
 
-    return inner_lights if lights else None, inner_lengths if lengths else None
+    return replace(
+        question,
+        lights=inner_lights if lights else None,
+        lengths=inner_lengths if lengths else None,
+        edges=None if edges is None else edges.without_rim(pixels),
+    )
 
 
 def _inner(x: FloatArray, pixels: int, first: int = 0) -> FloatArray:

@@ -2,14 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from comparisons.compare import looks
-from comparisons.gate.digest import Copies
+from comparisons.gate.copies import Copies
 from comparisons.gate.driver import Driver
-from comparisons.gate.gate import first_fault, gate_pictures, judged, look, unchanged
+from comparisons.gate.gate import first_fault, look, unchanged
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference, check_sizes, size_of
 from comparisons.gate.request import Judge, Request, prepared
@@ -60,13 +59,13 @@ def gated_renderer(
     reference = judge.reference
     check_sizes(pictures, size_of(reference.pictures[0]), "as the reference")
     if first_fault(pictures[0], reference) is not None and not _is_copy(pictures[0], reference):
-        return judge.case(partial(gate_pictures, pictures, reference))
+        return judge.case(pictures)
     try:
         return _in_rounds(judge, driver, rounds, pictures, say)
     except _NotFiniteError as error:
         bad = error.picture
         notes = [f"{bad.name} is the first with such pixels: no others were made after it"]
-        return judge.case(partial(gate_pictures, [bad], reference, notes=notes))
+        return judge.case([bad], notes)
 
 
 def _in_rounds(
@@ -81,7 +80,7 @@ def _in_rounds(
     one_picture = reference.variance is None and len(reference.pictures) == 1
     if rounds.seconds is None or rounds.replicates == 1 or reference.noise_free or one_picture:
         pictures += _rendered(driver, rounds.seeds(len(pictures), rounds.replicates), reference)
-        return judge.case(partial(gate_pictures, pictures, reference))
+        return judge.case(pictures)
 
     size = reference.pictures[0].size
     most = looks.most_kept(rounds.replicates, size)
@@ -106,19 +105,19 @@ def _in_rounds(
             return RungResult("statistics", "inconclusive", reason)
         return look(others, reference, request.limit, level, request.rim)
 
-    found = looks.until_decided(
+    looked = looks.until_decided(
         grow,
         judged_at,
         seconds=rounds.seconds,
         first=rounds.replicates,
-        step=lambda count: looks.group_of(count, most),
+        most=most,
         say=say,
     )
     others = pool.pictures()
     if not others:
         return unchanged(request.name, copies, reference)
     notes = [copies.note(len(others))] if copies.count else []
-    return judge.case(partial(judged, others, reference, notes=notes, looks=found))
+    return judge.case(others, notes, looked)
 
 
 class _NotFiniteError(Exception):
@@ -132,7 +131,7 @@ class _NotFiniteError(Exception):
 def _rendered(driver: Driver, seeds: Sequence[int], reference: Reference) -> list[Picture]:
     """Pictures of the reference's size, each checked before the next is made.  Raises ImageError
     for another size, _NotFiniteError."""
-    found: list[Picture] = []
+    pictures: list[Picture] = []
     for start in [seeds] if driver.together else [[seed] for seed in seeds]:
         new = driver.pictures(start) if start else []
         if new:
@@ -140,8 +139,8 @@ def _rendered(driver: Driver, seeds: Sequence[int], reference: Reference) -> lis
         for picture in new:
             if not np.isfinite(picture.radiance).all():
                 raise _NotFiniteError(picture)
-        found += new
-    return found
+        pictures += new
+    return pictures
 
 
 def _is_copy(picture: Picture, reference: Reference) -> bool:

@@ -11,6 +11,7 @@ from typing import Any
 
 from comparisons.compare.diagnosis import FLEXIBLE
 from comparisons.compare.diagnosis.misfit import Misfit
+from comparisons.compare.diagnosis.spots import FEW_PIXELS, ONE_PIXEL, ONE_TILE
 from comparisons.compare.judge import SURE
 from comparisons.compare.path_length import DIRECT, SAMPLES
 from comparisons.results.case import Case, Cause, FloatArray
@@ -29,7 +30,7 @@ from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
 
-UNSURE = ("one bad tile", "a few wrong pixels", "a single wrong pixel", *FLEXIBLE)
+UNSURE = (ONE_TILE, FEW_PIXELS, ONE_PIXEL, *FLEXIBLE)
 """Causes that missing terms look like, however well they explain the difference."""
 
 WORTH = 0.25
@@ -93,11 +94,11 @@ def variants(scene: Scene) -> Iterator[tuple[tuple[str, ...], Scene]]:
     if own != unshadowed:
         integrators[(*more, "shadows")] = unshadowed
     matte = {name: _matte(material) for name, material in scene.materials.items()}
-    found = {terms: scene.changed(integrator=one) for terms, one in integrators.items() if terms}
+    scenes = {terms: scene.changed(integrator=one) for terms, one in integrators.items() if terms}
     if matte != scene.materials:
         for terms, one in integrators.items():
-            found[(*terms, "highlights")] = scene.changed(integrator=one, materials=matte)
-    yield from sorted(found.items(), key=lambda item: len(item[0]))
+            scenes[(*terms, "highlights")] = scene.changed(integrator=one, materials=matte)
+    yield from sorted(scenes.items(), key=lambda item: len(item[0]))
 
 
 def _matte(material: Any) -> Any:
@@ -132,5 +133,5 @@ def _picture(scene: Scene, rim: int, threads: int | None) -> FloatArray:
         pixels = scene.film.width * scene.film.height
         spp = 1 << max(0, (SAMPLES // pixels).bit_length() - 1)
         scene = scene.changed(sampler=sampler.model_copy(update={"spp": spp}))
-    found = render(scene, threads=threads).colour
-    return found[rim : found.shape[0] - rim, rim : found.shape[1] - rim]
+    colour = render(scene, threads=threads).colour
+    return colour[rim : colour.shape[0] - rim, rim : colour.shape[1] - rim]

@@ -23,7 +23,7 @@ from comparisons.mitsuba.hits import (
 from comparisons.mitsuba.lit_scene import LitScene
 from comparisons.mitsuba.plugins.base import is_wide
 from comparisons.mitsuba.scene import first_hits
-from reference_rt.core.arrays import FloatArray
+from reference_rt.core.arrays import FloatArray, IdArray, IntArray
 from reference_rt.rendering.query import Intersections
 
 
@@ -140,6 +140,15 @@ class Counterpart:
                 )
                 by_shape.setdefault(mi_shape.shape, []).append(one)
         return by_shape
+
+    def off_by(self, shapes: IdArray | IntArray, *errors: str) -> FloatArray:
+        """(n,): the largest sum of these errors of the meshes that stand in for `shapes` (n,), in
+        scene units; 0 for other shapes and for none, -1."""
+        by_shape = self.stand_ins()
+        values = np.zeros(max(int(shapes.max(initial=-1)), *by_shape, -1) + 2)
+        for shape, stand_ins in by_shape.items():
+            values[shape] = max(sum(getattr(s, name) for name in errors) for s in stand_ins)
+        return np.asarray(values[shapes])
 
     def sags(self) -> dict[int, float]:
         """The largest distance between a shape and the mesh that stands in for it, by the index of

@@ -34,8 +34,9 @@ from comparisons.results.case import (
     Status,
     how_many,
 )
-from comparisons.results.files import named, plain
+from comparisons.results.files import plain
 from comparisons.results.headline import headline, in_short
+from comparisons.results.naming import named
 from comparisons.results.rungs import RUNGS
 from reference_rt.util.files import replacing
 

@@ -4,6 +4,7 @@
   image metrics, the likeliest cause; `decide`, from rungs to the verdict of a case; `exit_code`,
   from verdicts to that of a run.  Radiance is in W/sr/m², times in seconds, places in pixels.
 - `stored_case`: one case, `case.json` and `pictures.exr`, read back exactly or refused.
+- `naming`: what sentences call the sides of a case.
 - `files`: files with checksums for anything else that a later run continues from; values in JSON's
   types; JSON and CSV files, written whole or not at all.
 

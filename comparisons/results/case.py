@@ -186,8 +186,8 @@ def decide(results: Sequence[RungResult], metrics: Metrics | None) -> tuple[Stat
 
 def _besides(ladder: Sequence[RungResult], verdict: Status) -> str:
     """What else was found in pictures that are invalid: a difference that is certain even so."""
-    found = [f"{r.name}: {r.reason}" for r in ladder if r.status == "differ"]
-    return f"; besides, {found[0]}" if verdict == "invalid" and found else ""
+    differences = [f"{r.name}: {r.reason}" for r in ladder if r.status == "differ"]
+    return f"; besides, {differences[0]}" if verdict == "invalid" and differences else ""
 
 
 def exit_code(cases: Sequence[Case], missing: Sequence[str] = ()) -> int:

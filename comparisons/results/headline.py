@@ -178,8 +178,8 @@ def _what(rung: RungResult, case: Case) -> str:
 
 def _first(case: Case, status: Status, name: str = "") -> RungResult | None:
     """The first rung with this status, and this name if one is given."""
-    found = (r for r in case.rungs if r.status == status and name in ("", r.name))
-    return next(found, None)
+    rungs = (r for r in case.rungs if r.status == status and name in ("", r.name))
+    return next(rungs, None)
 
 
 def detectable(rung: RungResult | None) -> float | None:

@@ -7,19 +7,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.geometry import affine
-from comparisons.geometry.frame import round32
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.hits import BoolArray, MitsubaHits, rows_of
-from comparisons.referee.referee import Referee, identity_of
+from comparisons.referee.referee import Referee
 from comparisons.referee.sizes import ShapeSizes
 from comparisons.results.case import RungResult, Status
 from comparisons.rungs.rays import arbiter
+from comparisons.rungs.rays.aimed import aimed_rays
 from comparisons.rungs.rays.any_hit import any_hits
 from comparisons.rungs.rays.camera import compare_camera
 from comparisons.rungs.rays.coincidence import coincident, in_one_place
 from comparisons.rungs.rays.comparer import DISCRETE, KINDS, Comparer
-from comparisons.rungs.rays.rays import Rays, described, joined, mixed_rays, random_rays
+from comparisons.rungs.rays.judgement import MOST_JUDGED, Judgement, judged
+from comparisons.rungs.rays.rays import Rays, described, joined, mixed_rays
 from comparisons.rungs.rays.resolution import resolution
 from reference_rt.cameras.film import Film
 from reference_rt.core.arrays import FloatArray, IntArray
@@ -28,155 +28,6 @@ from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
-
-# ---- rays aimed at edges, corners and silhouettes, where hits are hard to decide -----------------
-
-
-EXPONENTS = (-7.0, -2.0)
-"""Exponents of ten: how far a ray passes its target, as a fraction of the distance."""
-
-HALVINGS = 26
-"""Bisections of the angle between two rays, down to less than a step of float32."""
-
-MOST_SPOTS = 4096
-"""Most target points of a shape, and most copies of shapes that rays are aimed at."""
-
-
-def aimed_rays(tables: SceneTables, sizes: ShapeSizes, n: int, seed: int) -> Rays:
-    """At most n rays.  Half pass a boundary between two primitives, found by bisection between two
-    rays of one origin; half pass corners and middles of edges, a third of these exactly."""
-    rng = np.random.default_rng([seed, 1])
-    spots = _spots(sizes, rng)
-    at_spots = n // 2 if len(spots) else 0
-    passing = _parting(tables, sizes, n - at_spots, rng)
-    return joined(passing, _at_spots(sizes, spots, at_spots, rng))
-
-
-def _parting(tables: SceneTables, sizes: ShapeSizes, n: int, rng: np.random.Generator) -> Rays:
-    """Rays next to directions in which the primitive that is hit changes, found by bisection."""
-    tries = random_rays(sizes, 8 * n, rng)
-    # The same origin for four rays, each of which is paired with the next.
-    o = np.repeat(tries.o[::4], 4, axis=0)
-    d = tries.d
-    hits = query.intersect(tables, o, d)
-    following = np.arange(len(o)) // 4 * 4 + (np.arange(len(o)) + 1) % 4
-    differ = _identity(hits) != _identity(hits)[following]
-    turned_away = np.sum(d * d[following], axis=1) < -0.9
-    pairs = np.flatnonzero(differ & ~turned_away)[:n]
-    o, a, b = o[pairs], d[pairs], d[following[pairs]]
-    at_a = _identity(hits)[pairs]
-    for _ in range(HALVINGS):
-        middle = a + b
-        middle /= np.linalg.norm(middle, axis=1)[:, None]
-        same = _identity(query.intersect(tables, o, middle)) == at_a
-        a, b = np.where(same[:, None], middle, a), np.where(same[:, None], b, middle)
-    return Rays(o, round32(_beside(a, rng)))
-
-
-def _identity(hits: Intersections) -> FloatArray:
-    """A number (n,) that differs wherever the shape, instance, part or primitive differs."""
-    columns = np.column_stack([hits.shape, hits.instance, hits.part, hits.primitive])
-    weights = np.array([1.0, np.pi, np.e, np.sqrt(2.0)])
-    return np.asarray((columns * weights).sum(axis=1))
-
-
-def _beside(d: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Unit directions, turned by 10^x radians in a random way, x uniform in EXPONENTS."""
-    angle = 10.0 ** rng.uniform(*EXPONENTS, (len(d), 1))
-    way = rng.normal(size=d.shape)
-    way -= np.sum(way * d, axis=1)[:, None] * d
-    turned = d + angle * way / np.linalg.norm(way, axis=1)[:, None]
-    return np.asarray(turned / np.linalg.norm(turned, axis=1)[:, None])
-
-
-def _at_spots(sizes: ShapeSizes, spots: FloatArray, n: int, rng: np.random.Generator) -> Rays:
-    if n == 0:
-        return Rays(np.zeros((0, 3)), np.zeros((0, 3)))
-    o = random_rays(sizes, n, rng).o
-    d = spots[rng.integers(0, len(spots), n)] - o
-    length = np.linalg.norm(d, axis=1)
-    o, d = o[length > 0.0], d[length > 0.0] / length[length > 0.0, None]
-    exactly = rng.uniform(size=(len(d), 1)) < 1.0 / 3.0
-    return Rays(o, round32(np.where(exactly, d, _beside(d, rng))))
-
-
-def _spots(sizes: ShapeSizes, rng: np.random.Generator) -> FloatArray:
-    """Corners and middles of edges (n, 3) of all shapes that have any."""
-    found = [np.zeros((0, 3))]
-    copies = sizes.copies
-    if len(copies) > MOST_SPOTS:
-        copies = [copies[k] for k in rng.choice(len(copies), MOST_SPOTS, replace=False)]
-    local: dict[int, FloatArray] = {}
-    share = max(1, 16 * MOST_SPOTS // max(1, len(copies)))
-    for copy in copies:
-        for leaf in sizes.leaves_of(copy):
-            if id(leaf) not in local:
-                spots = leaf.known.targets(leaf.table)
-                if len(spots) > MOST_SPOTS:
-                    spots = spots[rng.choice(len(spots), MOST_SPOTS, replace=False)]
-                local[id(leaf)] = spots
-            found.append(affine.apply_points(copy.outer, local[id(leaf)][:share]))
-    return np.concatenate(found)
-
-
-# ---- which tracer's hit is wrong where they differ: exact arithmetic decides ---------------------
-
-
-MOST_JUDGED = 400
-"""Most mismatches that are judged: each takes about 10 ms."""
-
-FEW = 1e-4
-"""Largest fraction of rays, not aimed at edges, that Mitsuba may get wrong by rounding.  More means
-that its scene is a different one."""
-
-SHARE = 1e-6
-"""Tolerance of Mitsuba's t, as a fraction of the distance and over the cosine: the question is only
-which surface was hit.  A thousandth of it is the tolerance of our t (`_slack`)."""
-
-
-class Judgement(NamedTuple):
-    """Indices of the rays on which the tracers disagree, by whose hit is wrong.
-
-    ours: our hit is wrong;  mitsuba: only Mitsuba's is;  both: neither is, the two surfaces are in
-    one place;  undecided: both hits are of the right surface, and the difference is elsewhere, or
-    the ray touches an edge exactly, or it is beyond MOST_JUDGED.
-    """
-
-    ours: IntArray
-    mitsuba: IntArray
-    both: IntArray
-    undecided: IntArray
-
-
-def judged(
-    referee: Referee, rays: Rays, ours: Intersections, theirs: MitsubaHits, mismatches: IntArray
-) -> Judgement:
-    """Judge the rays with the indices `mismatches`, in their order."""
-    some = mismatches[:MOST_JUDGED]
-    truths = referee.decide(rays.o[some], rays.d[some]) if len(some) else []
-    verdicts = []
-    for k, truth in zip(some.tolist(), truths, strict=True):
-        right = truth.agrees(ours, k, _slack(rays, ours, k))
-        also = truth.agrees(theirs, k, 1e3 * _slack(rays, theirs, k))
-        apart = identity_of(ours, k) != identity_of(theirs, k)
-        verdicts.append(("both" if apart else "undecided") if right and also else
-                        "mitsuba" if right else
-                        "undecided" if truth.touching else "ours")  # fmt: skip
-    named = np.array(verdicts + ["undecided"] * (len(mismatches) - len(some)), dtype="U9")
-    return Judgement(*(mismatches[named == name] for name in Judgement._fields))
-
-
-def _slack(rays: Rays, hits: Intersections, k: int) -> float:
-    d = rays.d[k]
-    length: float = float(np.linalg.norm(d))
-    cosine = abs(float(hits.n[k] @ d)) / length
-    scale = max(_largest(rays.o[k]), _largest(hits.p[k]))
-    return SHARE * 1e-3 * scale / length / max(cosine, 1e-6)
-
-
-def _largest(v: FloatArray) -> float:
-    return float(np.abs(v).max())
-
 
 PIXELS = 16_700
 """Most camera rays, evenly strided.  Random and secondary rays make them 50,000; 50,000 more are
@@ -279,6 +130,10 @@ def geometry(
     return RungResult("geometry", status, reason, numbers)
 
 
+FEW = 1e-4
+"""Largest fraction of rays, not aimed at edges, that Mitsuba may get wrong by rounding.  More means
+that its scene is a different one."""
+
 TOGETHER = 2.0**-40
 """See `Referee`: a thousand times the rounding of tables, and a thousandth of the tolerance of our
 t, `SHARE`."""
@@ -361,11 +216,8 @@ def _traced(
     ratios[beyond | theirs.at_origin] = 0.0
     sizes = comparer.sizes
     reach = np.maximum(sizes.reach_of(ours.shape), sizes.reach_of(theirs.shape))
-    sag = np.zeros(len(sizes.reach) + 1)
-    for shape, distance in counterpart.sags().items():
-        sag[shape] = distance
     radius = sizes.frame.delta(rays.o, np.where(ours.shape[:, None] >= 0, ours.p, theirs.p), reach)
-    radius += np.maximum(sag[ours.shape], sag[theirs.shape])
+    radius += np.maximum(*(counterpart.off_by(hits.shape, "sag") for hits in (ours, theirs)))
     return TracedRays(rays, ours, theirs, ratios, radius), int(np.count_nonzero(beyond))
 
 
@@ -380,8 +232,8 @@ def _explained(
     hit the back face from behind, as no single ray can.
     """
     rays, radius = traced.rays, traced.radius
-    found = arbiter.explained(wrong, radius[wrong], _same_hit(tables, comparer, traced))
-    rest = np.flatnonzero(~found & (traced.theirs.shape[wrong] >= 0))
+    explained = arbiter.explained(wrong, radius[wrong], _same_hit(tables, comparer, traced))
+    rest = np.flatnonzero(~explained & (traced.theirs.shape[wrong] >= 0))
     numbers = wrong[rest]
     theirs = rows_of(traced.theirs, numbers)
     near = rays.rows(numbers)
@@ -403,8 +255,8 @@ def _explained(
         open_ = np.flatnonzero(comes & ~meets)
         same = _same_hit(tables, comparer, beside)
         meets[open_] = arbiter.explained(open_, radius[numbers[open_]], same)
-    found[rest] = meets
-    return found
+    explained[rest] = meets
+    return explained
 
 
 STEEPEST = 64.0

@@ -11,6 +11,7 @@ import numpy as np
 from scipy import special
 
 from comparisons.results.case import FloatArray, Images, Metrics, RungResult
+from comparisons.statistics.cells import divisor
 from comparisons.statistics.filtered import excess_by_filter
 from comparisons.statistics.metric_null import (
     LEVEL,
@@ -29,9 +30,6 @@ MEAN_BIAS = 0.001
 """Permitted relative bias of a channel's mean: Mitsuba's ray epsilon causes some, as in the
 statistics; without noise 6e-5 was measured.  A gain of 0.5 %, the least that matters, is five times
 the permitted bias."""
-
-DARK = 0.1
-"""Fraction of the mean over all channels: the least mean that a channel's bias is divided by."""
 
 NOISE_FREE = {
     "ssim": (
@@ -228,7 +226,7 @@ def _bias(
     the variance of a known reference's mean."""
     mean = images.reference.mean(axis=(0, 1))
     difference = np.abs(images.candidate.mean(axis=(0, 1)) - mean)
-    scale = np.maximum(np.abs(mean), DARK * abs(float(mean.mean())))
+    scale = divisor(mean, float(mean.mean()))
     noise = reach = np.zeros(3)
     if replicates is not None:
         ours, theirs = (_error_of_mean(x) for x in replicates)

@@ -214,14 +214,14 @@ def _repeated(a: FloatArray, b: FloatArray) -> str | None:
 
 def _odd(whose: str, x: FloatArray) -> str | None:
     """One replicate with another mean than the rest, in words."""
-    found = odd_replicate(x) if len(x) > 1 else None
-    if found is None:
+    odd = odd_replicate(x) if len(x) > 1 else None
+    if odd is None:
         return None
-    of = f" in {found.channel}" if found.channel else ""
-    where = f" {found.where}" if found.where else ""
+    of = f" in {odd.channel}" if odd.channel else ""
+    where = f" {odd.where}" if odd.where else ""
     return (
-        f"replicate {found.index} of the {whose} is unlike the other {len(x) - 1}: its median "
-        f"block is {100.0 * found.bias:+.2g} % from theirs{of}{where} ({found.errors:.0f} standard "
+        f"replicate {odd.index} of the {whose} is unlike the other {len(x) - 1}: its median "
+        f"block is {100.0 * odd.bias:+.2g} % from theirs{of}{where} ({odd.errors:.0f} standard "
         "errors of its ranks); expected replicates that differ by noise only"
     )
 
@@ -231,20 +231,20 @@ INDEPENDENT = "expected independent noise, a seed of its own for each replicate"
 
 def _in_order(whose: str, x: FloatArray) -> str | None:
     """Replicates that depend on the one before, in words."""
-    found = successive(x)
-    if found is None:
+    order = successive(x)
+    if order is None:
         return None
-    if any(found.movement):
-        x_moved, y_moved = found.movement
+    if any(order.movement):
+        x_moved, y_moved = order.movement
         return (
             f"each replicate of the {whose} is like the one before, moved by {x_moved:+d}, "
-            f"{y_moved:+d} pixels (right, down; correlation {found.correlation:.2f}), as where "
+            f"{y_moved:+d} pixels (right, down; correlation {order.correlation:.2f}), as where "
             "the seed plus the pixel's number seeds a pixel; expected independent noise: seeds "
             "that are far apart, or hashed with the pixel's number"
         )
     return (
         f"the replicates of the {whose} depend on their order: the correlation of successive ones "
-        f"is {found.correlation:+.2f} from that of any two, as in a history or in prefixes of one "
+        f"is {order.correlation:+.2f} from that of any two, as in a history or in prefixes of one "
         f"accumulation; {INDEPENDENT}"
     )
 

@@ -18,14 +18,14 @@ def limited(rungs: Sequence[RungResult]) -> list[RungResult]:
     which the arbiter finds too many rays that float32 cannot resolve, or above statistics that its
     ray epsilon explains.
     """
-    found: list[RungResult] = []
+    results: list[RungResult] = []
     limit = ""
     for result in sorted(rungs, key=lambda result: RUNGS.index(result.name)):
         if limit and result.name in OF_LIGHT and result.status == "differ":
             result = replace(result, status="reference-limited", reason=f"{limit}; {result.reason}")
         limit = limit or _limit(result)
-        found.append(result)
-    return found
+        results.append(result)
+    return results
 
 
 def _limit(result: RungResult) -> str:

@@ -60,25 +60,25 @@ def sampling(scene: Scene, tables: SceneTables) -> RungResult:
     p, n = hits.p[met], hits.n[met]
     n = n * np.where(np.sum(n * rays.d[met], axis=1) > 0.0, -1.0, 1.0)[:, None]
     u = np.random.default_rng(4).uniform(2.0 * STEP, 1.0 - 2.0 * STEP, (len(met), 3))
-    found = query.sample_lights(tables, p, u, n)
-    low, high = (_end(tables, p, n, u, found.light, u0) for u0 in ENDS)
+    samples = query.sample_lights(tables, p, u, n)
+    low, high = (_end(tables, p, n, u, samples.light, u0) for u0 in ENDS)
     length = high - low
     angles = [_solid_angle(tables, p, n, u, step) for step in (STEP, 0.5 * STEP)]
-    usable = found.is_delta | (np.abs(angles[0] - angles[1]) <= SMOOTH * angles[1])
-    picked = np.where(found.is_delta, found.pdf, found.pdf * angles[1])
-    drawn = found.light >= 0
+    usable = samples.is_delta | (np.abs(angles[0] - angles[1]) <= SMOOTH * angles[1])
+    picked = np.where(samples.is_delta, samples.pdf, samples.pdf * angles[1])
+    drawn = samples.light >= 0
     off = drawn & usable & (np.abs(picked - length) > SLACK * length + FINEST)
-    evaluated, seen = _evaluated(tables, p, n, found)
-    other = drawn & seen & (np.abs(evaluated - found.pdf) > SAME * found.pdf)
+    evaluated, seen = _evaluated(tables, p, n, samples)
+    other = drawn & seen & (np.abs(evaluated - samples.pdf) > SAME * samples.pdf)
     numbers = {"samples": int(np.count_nonzero(drawn)), "evaluated": int(np.count_nonzero(seen))}
     for k in np.flatnonzero(off | other)[:1]:
-        where = f"light {found.light[k]}, where {described(scene.film, most, rays, int(met[k]))}"
+        where = f"light {samples.light[k]}, where {described(scene.film, most, rays, int(met[k]))}"
         reason = (
             f"{where} ends, is picked with a probability of {length[k]:.6g} and sampled as if with "
             f"{picked[k]:.6g}"
             if off[k]
-            else f"{where} ends, is sampled along {found.wi[k].tolist()} with the density "
-            f"{found.pdf[k]:.9g} and evaluated with {evaluated[k]:.9g}"
+            else f"{where} ends, is sampled along {samples.wi[k].tolist()} with the density "
+            f"{samples.pdf[k]:.9g} and evaluated with {evaluated[k]:.9g}"
         )
         return RungResult("sampling", "differ", reason, numbers)
     reason = f"{numbers['samples']} light samples have their densities"
@@ -119,13 +119,13 @@ def _solid_angle(
 
 
 def _evaluated(
-    tables: SceneTables, p: FloatArray, n: FloatArray, found: query.LightSamples
+    tables: SceneTables, p: FloatArray, n: FloatArray, samples: query.LightSamples
 ) -> tuple[FloatArray, BoolArray]:
     """The densities of the directions of samples, and which of these are not occluded."""
-    begin = AHEAD * found.distance.clip(max=1.0)
-    t = query.intersect(tables, p, found.wi, begin).t
-    far = np.isinf(found.distance)
+    begin = AHEAD * samples.distance.clip(max=1.0)
+    t = query.intersect(tables, p, samples.wi, begin).t
+    far = np.isinf(samples.distance)
     with np.errstate(invalid="ignore"):
-        seen = np.where(far, np.isinf(t), np.abs(t - found.distance) <= AHEAD * found.distance)
-    density = query.light_pdf(tables, p, found.wi, n, begin)
-    return density, np.asarray(seen & (found.pdf > 0.0) & ~found.is_delta)
+        seen = np.where(far, np.isinf(t), np.abs(t - samples.distance) <= AHEAD * samples.distance)
+    density = query.light_pdf(tables, p, samples.wi, n, begin)
+    return density, np.asarray(seen & (samples.pdf > 0.0) & ~samples.is_delta)

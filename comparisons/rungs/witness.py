@@ -40,17 +40,17 @@ def witness_of(
         count = max(2, *(len(side) for side in replicates))
         try:
             with witness.load(scene, threads) as loaded:
-                found = loaded.render(count, scene.resolved_sampler.spp)
+                rendered = loaded.render(count, scene.resolved_sampler.spp)
         except NoCounterpartError as error:
             reason = f"{error}: it does not vote"
             return RungResult("witness", "not-applicable", reason), None
         except ReferenceUnavailableError as error:  # of this scene: others of a suite go on
             return RungResult("witness", "not-comparable", str(error)), None
-        say(f"witness: {count} pictures by {witness.title} ({found.seconds.sum():.1f} s)")
-        rung = vote((*replicates, found.pictures), (*sides, whose), limit)
+        say(f"witness: {count} pictures by {witness.title} ({rendered.seconds.sum():.1f} s)")
+        rung = vote((*replicates, rendered.pictures), (*sides, whose), limit)
         rung.numbers["version"] = version
-        rung.numbers["seconds"] = float(np.median(found.seconds))
-        return rung, found.pictures.mean(axis=0)
+        rung.numbers["seconds"] = float(np.median(rendered.seconds))
+        return rung, rendered.pictures.mean(axis=0)
 
     return hear
 
@@ -65,7 +65,7 @@ def vote(
     differs from both others, and these agree; or if their noise hides whether they do, but not a
     difference half as large as its own.
     """
-    found = {
+    judged = {
         (a, b): statistics.compare(replicates[a], replicates[b], limit=limit, level=1.0 / 3.0)
         for a, b in PAIRS
     }
@@ -73,13 +73,13 @@ def vote(
         "pairs": [
             {
                 "sides": [names[a], names[b]],
-                "status": found[a, b].status,
+                "status": judged[a, b].status,
                 "bias": [float(x) for x in bias(replicates[a], replicates[b])],
             }
             for a, b in PAIRS
         ],
     }
-    status_of = {pair: rung.status for pair, rung in found.items()}
+    status_of = {pair: rung.status for pair, rung in judged.items()}
     alone = [k for k in range(3) if _stands_alone(k, status_of, replicates)]
     if alone:
         k, (a, b) = alone[0], [j for j in range(3) if j != alone[0]]
@@ -92,13 +92,13 @@ def vote(
         # acquitted.  Where the reference stands alone, the witness confirms the candidate.
         status: Status = "agree" if k == 1 else "differ"
         return RungResult("witness", status, reason, numbers | {"alone": names[k]})
-    statuses = {r.status for r in found.values()}
+    statuses = {r.status for r in judged.values()}
     if statuses == {"agree"}:
         by = _bias_text(replicates[0], replicates[2])
         found_by = f"{names[0]} differs from it by {by} of the image mean"
         reason = f"{names[2]} agrees with both: {found_by}"
         return RungResult("witness", "agree", reason, numbers)
-    told = "; ".join(f"{names[a]} and {names[b]}: {found[a, b].status}" for a, b in PAIRS)
+    told = "; ".join(f"{names[a]} and {names[b]}: {judged[a, b].status}" for a, b in PAIRS)
     return RungResult("witness", "not-applicable", f"no vote ({told})", numbers)
 
 

@@ -1,12 +1,10 @@
 """Statistical tests of noisy pictures: the means of independent replicates on both sides.
 
 Each side renders the scene R times with independent seeds. The means are compared, with the
-variance of either side (Welch 1947), at six scales. Each scale is a family of tests that share one
-level (Šidák 1967); the levels of all families add up to one false alarm in a thousand cases.
-
-- *image*: the mean of each channel; *tiles*: of each channel of each tile; *pixels*: of each pixel.
-- *lines*, *modes*: of each row and column; of smooth patterns over the picture (`welch`).
-- *uniformity*: the rank of the difference of small blocks among differences that hold only noise.
+variance of either side (Welch 1947), at several scales (`scales.SCALES`): of the image, of tiles,
+pixels, rows and columns, and smooth patterns. Each scale is a family of tests that share one level
+(Šidák 1967), and so are the ranks of the differences of small blocks among differences that hold
+only noise (`ranks`); the levels of all families add up to one false alarm in a thousand cases.
 
 Each mean has three standard errors, and a bias is proven only if it is so with each. One comes from
 the spread of the means between replicates, whatever happens inside a picture (correlated pixels,
@@ -55,14 +53,14 @@ every level (`compare`, `level`), and the shares sum to 1 at most (`comparisons.
 Contract: pictures are linear radiance, (R, height, width, 3) or (height, width, 3); biases, limits
 and margins are fractions of the reference's mean. `compare` returns the `statistics` rung. A side
 of a single picture is handled by `single`; a reference with known mean and variance is `Known`. To
-add a scale: a level and a margin in `scales` (the levels must still sum to 1e-3), a test in
-`welch`, its numbers in `wording`, and its verdict in `decide`.
+add a scale: its test, and its row in `scales` (the levels must still sum to 1e-3).
 """
 
 from comparisons.statistics.advice import noise_free_candidate, shortfall
-from comparisons.statistics.decide import compare, read
+from comparisons.statistics.cells import CHANNELS, Margins
+from comparisons.statistics.decide import compare
 from comparisons.statistics.places import standard_error, worst_regions
-from comparisons.statistics.scales import CHANNELS, Margins
+from comparisons.statistics.reading import read
 from comparisons.statistics.sides import Known
 
 __all__ = [

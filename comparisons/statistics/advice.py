@@ -12,9 +12,10 @@ import numpy as np
 from scipy import special
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.scales import IMAGE_LEVEL, Margins
+from comparisons.statistics.cells import Margins
+from comparisons.statistics.scales import IMAGE, Pair, image_test
 from comparisons.statistics.sides import Known, known_side, side_of
-from comparisons.statistics.welch import MOST_DOF, BiasTest, image_test, quantiles
+from comparisons.statistics.welch import MOST_DOF, BiasTest, quantiles
 from comparisons.statistics.wording import percent
 
 FEW = 2.0
@@ -44,9 +45,9 @@ def noise_free_candidate(
     """
     if not isinstance(reference, Known) and len(reference) < 2:
         return None
-    side = known_side(reference) if isinstance(reference, Known) else side_of(reference)
+    side = side_of(reference)
     perfect = known_side(Known(side.mean, np.zeros_like(side.mean)))
-    return image_test(side, perfect, margins or Margins(), level)
+    return image_test(Pair(side, perfect, margins or Margins()), level * IMAGE.level)
 
 
 def wanted(
@@ -115,7 +116,7 @@ def factor_needed(
     goal = np.minimum(
         limit * image.scale - margin, np.maximum(limit * image.scale - size, size - margin)
     )
-    reach_of = quantiles(-math.expm1(math.log1p(-level * IMAGE_LEVEL) / image.difference.size))[1]
+    reach_of = quantiles(-math.expm1(math.log1p(-level * IMAGE.level) / image.difference.size))[1]
 
     def suffices(factor: float) -> bool:
         value = np.sqrt((known**2 - fixed**2) / factor + fixed**2)

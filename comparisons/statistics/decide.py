@@ -1,49 +1,36 @@
 """The verdict of the statistics, with its reason and numbers; where the pictures differ beyond
 their noise."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from comparisons.results.case import FloatArray, RungResult, Status
 from comparisons.statistics.advice import noise_free_candidate, wanted
-from comparisons.statistics.metrics import count_nonfinite
+from comparisons.statistics.cells import POWER, TILE, Margins
 from comparisons.statistics.ranks import Uniformity, uniformity
-from comparisons.statistics.scales import (
-    IMAGE_LEVEL,
-    POWER,
-    TILE,
-    Margins,
-)
-from comparisons.statistics.sides import Known, known_side, picture_array, side_of
+from comparisons.statistics.reading import UnlikePicturesError, read
+from comparisons.statistics.scales import IMAGE, PIXELS, SCALES, TILES, Pair, Place, Scale
+from comparisons.statistics.sides import Known, known_side, side_of
 from comparisons.statistics.single import single_factor, single_tests
 from comparisons.statistics.unseen import Unseen, unseen, worse
-from comparisons.statistics.welch import (
-    BiasTest,
-    image_test,
-    line_test,
-    mode_test,
-    named_line,
-    named_mode,
-    pixel_test,
-    tile_test,
-)
+from comparisons.statistics.welch import BiasTest
 from comparisons.statistics.wording import (
-    beyond,
-    cell_numbers,
     channels,
     detectable_words,
     finite,
     image_numbers,
     interval,
-    line_numbers,
+    numbers_of,
     percent,
     uniformity_numbers,
     uniformity_words,
     unseen_numbers,
     unseen_words,
-    which,
+    words_of,
 )
 
 ONE_PICTURE = (
@@ -72,13 +59,10 @@ TOP = ("relative_bias", "standard_error_of_bias", "detectable_bias", "p_value")
 class Findings:
     """The tests at every scale."""
 
-    image: BiasTest
-    tiles: BiasTest
-    pixels: BiasTest
-    lines: BiasTest | None
-    modes: BiasTest | None
-    """None for single and for small pictures, as `lines`."""
+    tests: Mapping[str, BiasTest]
+    """By the names of the scales (`scales.SCALES`), without those that do not apply."""
     uniformity: Uniformity | None
+    """None for single and for small pictures."""
     unseen: Unseen | None
     """The worse of both sides; None if either is a single picture."""
     tile: int
@@ -87,6 +71,16 @@ class Findings:
     """Whether a side is a single picture."""
     level: float = 1.0
     """The share of the families' levels that was used."""
+
+    @property
+    def image(self) -> BiasTest:
+        """The test of the image mean."""
+        return self.tests[IMAGE.name]
+
+    def place(self, scale: Scale) -> Place:
+        """That of the worst of a scale's tests."""
+        shape = self.tests[PIXELS.name].difference.shape
+        return scale.place(self.tests[scale.name].worst, shape, self.tile)
 
 
 def compare(
@@ -117,24 +111,16 @@ def compare(
         raise ValueError(f"limit {limit}: expected more than the margin {margins.image}")
     if not 0.0 < level <= 1.0:
         raise ValueError(f"level {level}: expected a share above 0, and 1 at most")
-    a = picture_array(candidate, "candidate", 4)
-    b, variance = _reference(reference)
-    if a.shape[1:] != b.shape[1:]:
-        reason = f"candidate is {_size(a)}, reference {_size(b)} pixels (width x height)"
-        return RungResult("statistics", "invalid", reason)
-    if count_nonfinite(a) or count_nonfinite(b):
-        bad = f"{count_nonfinite(a)} of the candidate, {count_nonfinite(b)} of the reference"
-        return RungResult("statistics", "invalid", f"pixels not finite: {bad}")
-    if variance is not None and not (np.isfinite(variance).all() and variance.min() >= 0.0):
-        return RungResult(
-            "statistics", "invalid", "the reference's variance is negative or not finite"
-        )
-    if not a.any() and not b.any():
+    try:
+        a, b = read(candidate, reference)
+    except UnlikePicturesError as error:
+        return RungResult("statistics", "invalid", str(error))
+    pictures = b.mean[np.newaxis] if isinstance(b, Known) else b
+    if not a.any() and not pictures.any():
         return RungResult("statistics", "not-applicable", "every picture of either side is black")
-    known = None if variance is None else Known(b[0], variance)
-    found = findings(a, known or b, tile, margins, level)
-    alone = noise_free_candidate(known or b, margins, level) if fixed_reference else None
-    return _verdict(found, a, b, limit, alone)
+    tested = findings(a, b, tile, margins, level)
+    alone = noise_free_candidate(b, margins, level) if fixed_reference else None
+    return _verdict(tested, a, pictures, limit, alone)
 
 
 def findings(
@@ -143,16 +129,14 @@ def findings(
     """All tests, for pictures (R, h, w, 3) that are finite and of one size;  level: as in
     `compare`."""
     if len(a) == 1 or (not isinstance(b, Known) and len(b) == 1):
-        image, tiles, pixels, side = single_tests(a, b, tile, margins)
-        return Findings(image, tiles, pixels, None, None, None, None, side, True)
+        tests, side = single_tests(a, b, tile, margins)
+        return Findings(tests, None, None, side, True)
     one = side_of(a)
     two = known_side(b, one.mean) if isinstance(b, Known) else side_of(b)
+    pair = Pair(one, two, margins, tile)
+    applied = ((scale.name, scale.test(pair, level * scale.level)) for scale in SCALES)
     return Findings(
-        image_test(one, two, margins, level),
-        tile_test(one, two, tile, margins, level),
-        pixel_test(one, two, margins, level),
-        line_test(one, two, margins, level),
-        mode_test(one, two, margins, level),
+        {name: test for name, test in applied if test is not None},
         uniformity(one, two, margins, level),
         worse(*(_unseen(side, level) for side in (a, b))),
         tile,
@@ -162,38 +146,7 @@ def findings(
 
 
 def _unseen(pictures: FloatArray | Known, level: float) -> Unseen | None:
-    return None if isinstance(pictures, Known) else unseen(pictures, level * IMAGE_LEVEL)
-
-
-def read(
-    candidate: npt.ArrayLike, reference: npt.ArrayLike | Known, *, finite: bool = True
-) -> tuple[FloatArray, FloatArray | Known]:
-    """The pictures as float64 arrays. Raises ValueError if they cannot be compared. With `finite`
-    false, pixels that are not finite become black; otherwise they raise ValueError."""
-    a = picture_array(candidate, "candidate", 4)
-    b, variance = _reference(reference)
-    if a.shape[1:] != b.shape[1:]:
-        raise ValueError(f"candidate is {_size(a)}, reference {_size(b)} pixels (width x height)")
-    if not finite:
-        a, b = _without_nan(a), _without_nan(b)
-    elif count_nonfinite(a) or count_nonfinite(b):
-        raise ValueError("pixels are not finite")
-    return a, (b if variance is None else Known(b[0], _without_nan(variance)))
-
-
-def _without_nan(values: FloatArray) -> FloatArray:
-    return values if np.isfinite(values).all() else np.nan_to_num(values, posinf=0.0, neginf=0.0)
-
-
-def _reference(reference: npt.ArrayLike | Known) -> tuple[FloatArray, FloatArray | None]:
-    """(S, h, w, 3) and None, or a known mean as (1, h, w, 3) and its variance."""
-    if not isinstance(reference, Known):
-        return picture_array(reference, "reference", 4), None
-    mean = picture_array(reference.mean, "reference's mean", 3)
-    variance = picture_array(reference.variance, "reference's variance", 3)
-    if mean.shape != variance.shape:
-        raise ValueError(f"reference: mean is {mean.shape}, its variance {variance.shape}")
-    return mean[None], variance
+    return None if isinstance(pictures, Known) else unseen(pictures, level * IMAGE.level)
 
 
 def _verdict(
@@ -205,10 +158,10 @@ def _verdict(
     unknown = status == "inconclusive" and found.single and not np.isfinite(least)
     image = found.image
     reach = image.over_scale(np.abs(image.difference) + image.half_width).max()
-    seen = detectable_words(image, found.tiles, found.tile, found.pixels)
+    seen = detectable_words(found.tests, found.tile)
     reason = (
         f"{UNKNOWN if unknown else f'{finding}; {seen}'}; the means are equivalent within "
-        f"±{percent(reach)} at {100.0 * (1.0 - found.level * IMAGE_LEVEL):.6g} %"
+        f"±{percent(reach)} at {100.0 * (1.0 - found.level * IMAGE.level):.6g} %"
     )
     if found.unseen is not None and status != "differ":
         reason += f"; {unseen_words(found.unseen)}"
@@ -224,7 +177,7 @@ def _verdict(
         "mean_candidate": channels(a.mean(axis=(0, 1, 2))),
         "mean_reference": channels(b.mean(axis=(0, 1, 2))),
         "limit": limit,
-        "confidence": 1.0 - found.level * IMAGE_LEVEL,
+        "confidence": 1.0 - found.level * IMAGE.level,
         "power": POWER,
         **{key: of_image[key] for key in TOP},
         "equivalent_within": finite(reach),
@@ -233,39 +186,28 @@ def _verdict(
         "noise_known": not unknown,
         "unseen_light": unseen_numbers(found.unseen),
         "image": of_image,
-        "tiles": {"side": found.tile, **cell_numbers(found.tiles, found.tile)},
-        "pixels": cell_numbers(found.pixels, 1),
-        "lines": None if found.lines is None else line_numbers(found.lines),
-        "modes": None if found.modes is None else line_numbers(found.modes),
+        **{scale.name: _numbers(scale, found) for scale in SCALES[1:]},
         "uniformity": uniformity_numbers(found.uniformity),
     }
     return RungResult("statistics", status, reason, numbers)
 
 
+def _numbers(scale: Scale, found: Findings) -> dict[str, Any] | None:
+    if scale.name not in found.tests:
+        return None
+    side = {"side": found.tile} if scale is TILES else {}
+    return side | numbers_of(found.tests[scale.name], found.place(scale))
+
+
 def _decide(found: Findings, limit: float, advice: str) -> tuple[Status, str]:
     """The status and what was found;  advice: how many more samples are needed, in words."""
     image, spread = found.image, found.uniformity
-    if image.differs.any():
-        text = f"the image mean differs: {beyond(image, image.worst)}"
-        if found.tiles.differs.any():
-            text += f"; {which(found.tiles, found.tile, 'tiles')}"
+    differ = [s for s in SCALES if s.name in found.tests and found.tests[s.name].differs.any()]
+    for scale in differ[:1]:
+        text = words_of(scale, found.tests[scale.name], found.place(scale))
+        if scale is IMAGE and TILES in differ:
+            text += f"; {words_of(TILES, found.tests[TILES.name], found.place(TILES), alone=False)}"
         return "differ", text
-    if found.tiles.differs.any():
-        return "differ", which(found.tiles, found.tile, "tiles", ", though not the image mean")
-    if found.pixels.differs.any():
-        return "differ", which(found.pixels, 1, "pixels", ", though not a whole tile")
-    if found.lines is not None and found.lines.differs.any():
-        lines, count = found.lines, np.count_nonzero(found.lines.differs.any(axis=-1))
-        line = named_line(lines.worst[0], len(found.pixels.difference))
-        return "differ", (
-            f"{count} of {len(lines.difference)} rows and columns differ, though no tile and no "
-            f"pixel; the worst, {line}: {beyond(lines, lines.worst)}"
-        )
-    if found.modes is not None and found.modes.differs.any():
-        return "differ", (
-            "brightness differs smoothly over the picture, though not its mean: "
-            f"{named_mode(found.modes.worst[0])}, {beyond(found.modes, found.modes.worst)}"
-        )
     if spread is not None and spread.wide:
         return "differ", (
             "small blocks differ more between the sides than within: "
@@ -299,7 +241,3 @@ def _least(found: Findings, limit: float) -> float:
     if found.single:
         return single_factor(found.image, limit)
     return found.unseen.missing / limit if found.unseen is not None else 0.0
-
-
-def _size(images: FloatArray) -> str:
-    return f"{images.shape[2]} x {images.shape[1]}"

@@ -7,8 +7,8 @@ from scipy import special
 from scipy.ndimage import correlate1d
 
 from comparisons.results.case import FloatArray
+from comparisons.statistics.cells import tile_sums
 from comparisons.statistics.metrics import ratio
-from comparisons.statistics.scales import tile_sums
 
 NEAR = 4
 """Pixels: beyond the diameter of usual filters, whose radii are 2 at most."""
@@ -46,15 +46,15 @@ def excess_by_filter(candidate: FloatArray, reference: FloatArray, variance: Flo
     near, far = (tile_sums(x) for x in _products(z))
     pairs_near, pairs_far = (tile_sums(x) for x in _products(noisy.astype(np.float64)))
     some = (pairs_near > 0.0) & (pairs_far > 0.0)
-    found = near[some] / pairs_near[some] - far[some] / pairs_far[some]
-    if not len(found):
+    covariances = near[some] / pairs_near[some] - far[some] / pairs_far[some]
+    if not len(covariances):
         return 0.0
     # The lower quartile, which the errors of half of the tiles do not move, and what it is below
     # the mean by chance. Each pair of pixels is of the same products twice.
     power = float((z**2).sum()) / float(noisy.sum())
     error = PAIRS * power * math.sqrt(2.0 / float(pairs_near.sum()))
-    quartile = PAIRS * float(np.quantile(found, 0.25))
-    total = quartile - special.ndtri(0.25) * error * math.sqrt(len(found))
+    quartile = PAIRS * float(np.quantile(covariances, 0.25))
+    total = quartile - special.ndtri(0.25) * error * math.sqrt(len(covariances))
     return total if total > CLEAR * error else 0.0
 
 

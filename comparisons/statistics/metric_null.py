@@ -13,9 +13,9 @@ import numpy as np
 from scipy import special
 
 from comparisons.results.case import FloatArray, Images
+from comparisons.statistics.cells import HALF, TILE, tile_sums
 from comparisons.statistics.metrics import LocalErrors, local_errors, relative_squares
 from comparisons.statistics.rare import share_unmet, unmet_variance
-from comparisons.statistics.scales import HALF, TILE, tile_sums
 from comparisons.statistics.sides import side_of
 
 NOISE_LIMIT = 1.25
@@ -60,10 +60,15 @@ def can_draw(replicates: tuple[FloatArray, FloatArray]) -> bool:
         return False
     if _has_rare_light(replicates):
         return False
-    noise = _tile_sums(np.asarray(sum(x.var(axis=0, ddof=1) / len(x) for x in replicates)))
+    noise = _tile_sums(_variance(*replicates))
     seen = _tile_sums(np.asarray(sum(x.mean(axis=0) for x in replicates)) ** 2) / 4.0
     lit = seen > 0.0
     return bool(lit.any() and np.median(noise[lit] / seen[lit]) <= MOST_NOISE**2)
+
+
+def _variance(*sides: FloatArray) -> FloatArray:
+    """(height, width, 3): of the difference of the means of replicates, or of one side's mean."""
+    return np.asarray(sum(x.var(axis=0, ddof=1) / len(x) for x in sides))
 
 
 def _has_rare_light(replicates: tuple[FloatArray, FloatArray]) -> bool:
@@ -104,24 +109,21 @@ def noise_alone(
         expected[k] = np.mean(maps)
         allowance = max(0.0, float(more[k].mean() - maps[0].mean()))
         highest[k] = expected[k] + allowance + _scatter(np.stack(maps))
-    found = np.array([m.mean() for m in errors(images.candidate - images.reference)])
-    variance = np.asarray(sum(x.var(axis=0, ddof=1) / len(x) for x in replicates))
+    measured = np.array([m.mean() for m in errors(images.candidate - images.reference)])
+    variance = _variance(*replicates)
     darker = np.minimum(images.candidate, images.reference)
     relative = relative_squares(Images(darker + np.sqrt(variance), darker), middle)
     # The other maps are bounded: no pixel has more than its share of them.
     for k, noise in ((-2, variance.mean(axis=-1)), (-1, relative)):
         if noise.sum() ** 2 < FEWEST_PIXELS * (noise**2).sum():
             highest[k] = math.inf
-    return found, expected, highest
+    return measured, expected, highest
 
 
 def _share(replicates: tuple[FloatArray, FloatArray]) -> FloatArray:
     """(height, width, 1): the candidate's share of the variance of each pixel's tile.  By tiles,
     since one firefly has more variance than all the rest of a picture."""
-    ours, both = (
-        _tile_sums(np.asarray(sum(x.var(axis=0, ddof=1) / len(x) for x in sides)))
-        for sides in (replicates[:1], replicates)
-    )
+    ours, both = (_tile_sums(_variance(*sides)) for sides in (replicates[:1], replicates))
     share = np.divide(ours, both, out=np.full_like(both, 0.5), where=both > 0.0)
     height, width = replicates[0].shape[1:3]
     share = share.reshape(math.ceil(height / TILE), -1)
@@ -192,10 +194,10 @@ def noise_ratio(candidate: FloatArray, reference: FloatArray) -> tuple[float, fl
     """
     sides = (candidate, reference)
     difference2 = (candidate.mean(axis=0) - reference.mean(axis=0)) ** 2
-    variance = sum(x.var(axis=0, ddof=1) / len(x) for x in sides)
+    variance = _variance(*sides)
     if _has_rare_light(sides):
         variance = variance + unmet_variance(*(side_of(x) for x in sides))
-    observed, noise = _tile_sums(difference2), _tile_sums(np.asarray(variance))
+    observed, noise = _tile_sums(difference2), _tile_sums(variance)
     rounding = _tile_sums((HALF * reference.mean(axis=0)) ** 2)
     # Without noise, as in a background, the bound is twice the rounding of stored values.
     noisy = noise > rounding

@@ -132,8 +132,8 @@ def flip_map(images: Images) -> FloatArray:
     bad = nonfinite_pixels(a, b)
     a, b = (np.where(bad[..., None], 0.0, image) for image in (a, b))
     white = white_level(b)
-    found = _flip(a, b, white, flip_exposures(b / white))
-    return np.where(bad, np.nan, found)
+    shown = _flip(a, b, white, flip_exposures(b / white))
+    return np.where(bad, np.nan, shown)
 
 
 def flip_exposures(reference: FloatArray) -> tuple[float, float]:
@@ -240,11 +240,11 @@ def _dissimilarity(a: FloatArray, b: FloatArray) -> FloatArray:
     if window < 3:
         return np.full(a.shape[:2], np.nan)
     # scikit-image has no type stubs.
-    found: Any = structural_similarity(
+    similarity: Any = structural_similarity(
         a, b, win_size=window, channel_axis=-1, data_range=1.0, full=True
     )
     margin = window // 2
-    inside = found[1][margin : a.shape[0] - margin, margin : a.shape[1] - margin]
+    inside = similarity[1][margin : a.shape[0] - margin, margin : a.shape[1] - margin]
     return np.asarray(1.0 - inside.mean(axis=-1))
 
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from scipy import special
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.scales import cell_means, cell_sums, ranks_of
+from comparisons.statistics.cells import cell_means, cell_sums, ranks_of
 
 BLOCK = 4
 """Side of a block in pixels: larger than a usual filter's radius, as in `ranks`."""

@@ -1,4 +1,21 @@
-"""Whether replicates depend on their order, and whether two sides share noise."""
+"""Whether replicates depend on their order, and whether two sides share noise.
+
+Pictures that go on from each other depend on their order: a history (nine tenths of the last
+picture and one tenth of new samples), prefixes of one accumulation, and pixels that are seeded by
+the seed plus the pixel's number, for which the picture of the next seed is the last one moved by a
+pixel. The spread of such replicates does not show the error of their mean.
+
+Independent replicates of one renderer are exchangeable: any order of them is equally likely. So the
+sum of the correlations of successive pictures (lag 1) is compared with those of the same pictures
+in other orders (Dwass 1957: exact for any number of random orders). The level is exact whatever the
+noise is: heavy tails, filters, pixels that share random numbers. The movement for which pictures
+are compared is the one with the largest correlation of any two, which does not depend on the order.
+
+If the means of two sides differ by less than independent replicates permit, either the sides share
+noise, as the same seeds do, or the replicates of a side make up for each other, as strata of one
+pattern do. The former have deviations that are correlated in the pixels where they belong; the
+latter have none.
+"""
 
 import functools
 import itertools
@@ -45,10 +62,10 @@ def successive(pictures: FloatArray) -> Successive | None:
     there are too few to tell."""
     if len(pictures) < FEWEST:
         return None
-    z = _deviations(pictures[:MOST])
+    z = deviations(pictures[:MOST])
     if not all(picture.any() for picture in z):
         return None
-    found = {(0, 0): _correlations(z, z)}
+    correlations = {(0, 0): _correlations(z, z)}
     middle = _middle(z.sum(axis=-1))
     spectra = np.fft.rfft2(middle)
     height, width = middle.shape[1:]
@@ -57,8 +74,8 @@ def successive(pictures: FloatArray) -> Successive | None:
         2j * math.pi * (y * np.fft.fftfreq(height)[:, None] + x * np.fft.rfftfreq(width))
     )
     moved = np.fft.irfft2(spectra * phase, (height, width))
-    found[x, y] = _correlations(middle, moved)
-    excess = {by: _about_mean(pairs) for by, pairs in found.items()}
+    correlations[x, y] = _correlations(middle, moved)
+    excess = {by: _about_mean(pairs) for by, pairs in correlations.items()}
     orders = _orders(len(z))
     in_order = {by: _of_order(x, np.arange(len(z))[None])[:, 0] for by, x in excess.items()}
     extreme = np.max([np.abs(_of_order(pairs, orders)).max(0) for pairs in excess.values()], axis=0)
@@ -80,7 +97,7 @@ def shared_by_sides(a: FloatArray, b: FloatArray) -> bool:
     """Whether replicates of one side share noise with replicates of the other: the squares of their
     correlations are larger than with noise that is moved, by whatever movement. Of unrelated noise
     that is so with a chance of one over the number of pixels."""
-    one, two = (_middle(_deviations(x).sum(axis=-1)) for x in (a, b))
+    one, two = (_middle(deviations(x).sum(axis=-1)) for x in (a, b))
     size = one.shape[1:]
     first, second = (
         np.fft.rfft2(x / np.sqrt(np.maximum((x**2).sum(axis=(1, 2), keepdims=True), 1e-300)))
@@ -92,7 +109,7 @@ def shared_by_sides(a: FloatArray, b: FloatArray) -> bool:
     return bool(squares[0, 0] > 0.0 and squares.argmax() == 0)
 
 
-def _deviations(pictures: FloatArray) -> FloatArray:
+def deviations(pictures: FloatArray) -> FloatArray:
     """From the mean of the replicates, over each value's standard deviation; 0 without noise."""
     deviation = pictures - pictures.mean(axis=0)
     scale = np.sqrt((deviation**2).mean(axis=0))

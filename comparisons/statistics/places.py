@@ -4,24 +4,21 @@ import numpy as np
 import numpy.typing as npt
 
 from comparisons.results.case import FloatArray, ImageRegion
-from comparisons.statistics.decide import findings, read
-from comparisons.statistics.metrics import ratio
-from comparisons.statistics.scales import (
+from comparisons.statistics.cells import (
     CHANNELS,
-    DARK,
     ROUNDING,
     TILE,
     Margins,
     cell_means,
+    divisor,
 )
-from comparisons.statistics.sides import Known, known_side, neighbourhood, side_of
-from comparisons.statistics.welch import (
-    BiasTest,
-    pixel_test,
-)
-from comparisons.statistics.wording import (
-    percent,
-)
+from comparisons.statistics.decide import findings
+from comparisons.statistics.metrics import ratio
+from comparisons.statistics.reading import read
+from comparisons.statistics.scales import PIXELS, Pair, pixel_test
+from comparisons.statistics.sides import Known, neighbourhood, side_of
+from comparisons.statistics.welch import BiasTest
+from comparisons.statistics.wording import percent
 
 NOTABLE = 0.5
 """Least strength (`BiasTest.strength`, 1 is a proof) of a tile that is listed. It is about three
@@ -37,10 +34,9 @@ def standard_error(candidate: npt.ArrayLike, reference: npt.ArrayLike | Known) -
     ValueError for pictures of different sizes.
     """
     a, b = read(candidate, reference, finite=False)
-    if len(a) > 1 and isinstance(b, Known):
-        return pixel_test(side_of(a), known_side(b), Margins()).standard_error
-    if len(a) > 1 and not isinstance(b, Known) and len(b) > 1:
-        return pixel_test(side_of(a), side_of(b), Margins()).standard_error
+    if len(a) > 1 and (isinstance(b, Known) or len(b) > 1):
+        pair = Pair(side_of(a), side_of(b), Margins())
+        return pixel_test(pair, PIXELS.level).standard_error
     mean = b.mean if isinstance(b, Known) else b.mean(axis=0)
     difference = a.mean(axis=0) - mean
     variance = neighbourhood(difference**2) - neighbourhood(difference) ** 2
@@ -59,8 +55,8 @@ def worst_regions(
     a, b = read(candidate, reference)
     if not isinstance(b, Known) and len(a) == len(b) == 1:
         return _of_single_pictures(a[0], b[0], tile, most)
-    found = findings(a, b, tile, Margins())
-    side, tiles, pixels = found.tile, found.tiles, found.pixels
+    tested = findings(a, b, tile, Margins())
+    side, tiles, pixels = tested.tile, tested.tests["tiles"], tested.tests["pixels"]
     worst_pixels = _cell_maxima(pixels.strength, side)
     strength = np.maximum(tiles.strength, worst_pixels)
     places = []
@@ -82,7 +78,7 @@ def _of_single_pictures(
 ) -> tuple[ImageRegion, ...]:
     rms = np.sqrt(cell_means((a - b) ** 2, tile))
     bias = cell_means(a - b, tile)
-    scale = np.maximum(np.abs(cell_means(b, tile)), DARK * abs(float(b.mean())))
+    scale = divisor(cell_means(b, tile), float(b.mean()))
     places = []
     for row, column in _first(rms.max(axis=-1), most, np.finfo(np.float64).tiny):
         at = row, column, int(rms[row, column].argmax())

@@ -1,5 +1,4 @@
-"""Tests by ranks, exact whatever the law of the noise: `uniformity` of small blocks' p-values, and
-whether replicates depend on their order (`successive`).
+"""`uniformity`: a test by ranks of the p-values of small blocks, exact whatever the noise is.
 
 The candidate's and the reference's G replicates are 2G pictures. Their difference is one of 2G - 1
 orthogonal Walsh functions of these pictures; every other one has as many pictures of a side with a
@@ -16,51 +15,35 @@ Pareto noise with exponent 1.2, 32 pictures against 16 means of 16, 2 of 400 rig
 
 Too small a mean p-value means that blocks differ systematically, or that replicates are not
 independent of each other; too large a one that candidate and reference share their noise, or that
-the replicates of a side make up for each other (`shared_by_sides`).
-
-Pictures that go on from each other depend on their order: a history (nine tenths of the last
-picture and one tenth of new samples), prefixes of one accumulation, and pixels that are seeded by
-the seed plus the pixel's number, for which the picture of the next seed is the last one moved by a
-pixel. The spread of such replicates does not show the error of their mean.
-
-Independent replicates of one renderer are exchangeable: any order of them is equally likely. So the
-sum of the correlations of successive pictures (lag 1) is compared with those of the same pictures
-in other orders (Dwass 1957: exact for any number of random orders). The level is exact whatever the
-noise is: heavy tails, filters, pixels that share random numbers. The movement for which pictures
-are compared is the one with the largest correlation of any two, which does not depend on the order.
-
-If the means of two sides differ by less than independent replicates permit, either the sides share
-noise, as the same seeds do, or the replicates of a side make up for each other, as strata of one
-pattern do. The former have deviations that are correlated in the pixels where they belong; the
-latter have none.
+the replicates of a side make up for each other (`order.shared_by_sides`).
 """
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from scipy import special
 from scipy.linalg import hadamard
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.order import shared_by_sides
-from comparisons.statistics.rare import Events
-from comparisons.statistics.scales import (
-    DARK,
-    UNIFORMITY_LEVEL,
+from comparisons.statistics.cells import (
     Margins,
     cell_means,
-    cell_pixels,
-    cell_sums,
+    divisor,
     ranks_of,
+    tiles,
 )
+from comparisons.statistics.order import shared_by_sides
+from comparisons.statistics.rare import Events
 from comparisons.statistics.sides import Side
 from comparisons.statistics.welch import are_unequal, noise_ratio
 
 BLOCK = 4
 """Side of a block in pixels: larger than a filter's radius, and many blocks even in small
 pictures."""
+
+LEVEL = 0.0001
+"""Chance of a false alarm of both tests together; see `scales` for the other families."""
 
 LEAST = 4
 """Least number of replicates on each side: fewer give too few Walsh functions."""
@@ -84,8 +67,7 @@ class Uniformity:
     replicates: int
     shared: bool = False
     """The blocks are `narrow` because the sides share noise."""
-    level: float = UNIFORMITY_LEVEL
-    """Chance of a false alarm of both tests together."""
+    level: float = LEVEL
 
     @property
     def wide(self) -> bool:
@@ -114,7 +96,7 @@ def uniformity(a: Side, b: Side, margins: Margins, level: float = 1.0) -> Unifor
     contrasts = np.tensordot(hadamard(2 * half)[1:] / half, blocks, axes=1)
     difference = half - 1
     mean = cell_means(b.mean, BLOCK)
-    scale = np.maximum(np.abs(mean), DARK * abs(float(b.mean.mean())))
+    scale = divisor(mean, float(b.mean.mean()))
     size = np.abs(contrasts)
     size[size <= margins.constant * scale] = 0.0
     # If the sides are equal, only half of the other functions contain noise.
@@ -142,7 +124,7 @@ def uniformity(a: Side, b: Side, margins: Margins, level: float = 1.0) -> Unifor
         p_reversed=float(special.stdtr(of_reversed[1], -excess / of_reversed[0])),
         blocks=int(noisy.any(axis=-1).sum()),
         replicates=half,
-        level=level * UNIFORMITY_LEVEL,
+        level=level * LEVEL,
     )
     return replace(found, shared=found.narrow and shared_by_sides(*pictures))
 
@@ -172,7 +154,7 @@ def _unmet(a: Side, b: Side) -> FloatArray:
     ranks presume noise of one distribution on both sides; of a side that seldom meets a light, most
     blocks are darker, though none by more than a few events."""
     difference = cell_means(a.mean - b.mean, BLOCK)
-    events = Events.of_cells(a, b, partial(cell_sums, tile=BLOCK), cell_pixels(b.mean, BLOCK))
+    events = Events.of(a, b, tiles(b.mean, BLOCK))
     return np.asarray(8.0 * np.abs(difference) * events.missed_by(difference))
 
 

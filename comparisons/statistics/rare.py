@@ -23,7 +23,7 @@ import numpy as np
 from scipy.ndimage import correlate1d
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.scales import DARK, HALF
+from comparisons.statistics.cells import DARK, HALF, Cells, whole
 from comparisons.statistics.sides import NEIGHBOURS, Side
 
 
@@ -36,14 +36,8 @@ class Events:
     reference: FloatArray
 
     @classmethod
-    def of_cells(
-        cls,
-        a: Side,
-        b: Side,
-        sums: Callable[[FloatArray], FloatArray],
-        pixels: FloatArray | float,
-    ) -> "Events":
-        """For cells of so many pixels;  sums: over each cell, of a picture.
+    def of(cls, a: Side, b: Side, cells: Cells) -> "Events":
+        """Of each part.
 
         The size of events is taken relative to the other side's radiance: the edge of a bright lamp
         has larger ones than any other place. So an event in a cell has the cell's brightness,
@@ -55,12 +49,12 @@ class Events:
         The side with fewer replicates has seen fewer rare paths: its events count as at least as
         large as the other's.
         """
-        of_a, of_b = (_in_cells(x, np.abs(y.mean), sums) for x, y in ((a, b), (b, a)))
+        of_a, of_b = (_in_cells(x, np.abs(y.mean), cells.sums) for x, y in ((a, b), (b, a)))
         if b.pictures is not None and a.count < b.count:
             of_a = np.maximum(of_a, of_b)
         elif b.pictures is not None and b.count < a.count:
             of_b = np.maximum(of_a, of_b)
-        return cls(0.5 * of_a / (pixels * a.count), 0.5 * of_b / (pixels * b.count))
+        return cls(*(0.5 * x / (cells.pixels * side.count) for x, side in ((of_a, a), (of_b, b))))
 
     def missed_by(self, difference: FloatArray) -> FloatArray:
         """The event of the side whose mean is lower: it may have missed some."""
@@ -74,27 +68,22 @@ class Events:
 def _in_cells(side: Side, seen: FloatArray, sums: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """The energy of an event of `side` in each cell of one picture;  seen: the other's radiance."""
     mean, noisy = float(seen.mean()), side.variance > (HALF * side.mean) ** 2
-    found = []
+    sizes = []
     for least, of_places in ((DARK, 0.0), (1.0, 0.0), (1.0, 2.0)):
         scale = np.maximum(seen, least * mean) if mean else np.ones_like(seen)
         lit = sums(scale * noisy)
         whole = sums(scale**2) / sums(scale)
         own = sums(scale**2 * noisy) / np.where(lit > 0.0, lit, 1.0)
         size = side.event(scale, (1.0 / scale) ** of_places)
-        found.append(size * np.where(lit > 0.0, own, whole))
-    return np.asarray(np.max(found, axis=0))
-
-
-def of_image(a: Side, b: Side) -> Events:
-    """Those of the mean of the image."""
-    height, width = b.mean.shape[:2]
-    return Events.of_cells(a, b, lambda picture: picture.sum(axis=(0, 1)), float(height * width))
+        sizes.append(size * np.where(lit > 0.0, own, whole))
+    return np.asarray(np.max(sizes, axis=0))
 
 
 def image_missed(a: Side, b: Side) -> FloatArray:
     """(3,): the variance of the difference of the image means that missing light may add."""
     difference = (a.mean - b.mean).mean(axis=(0, 1))
-    return np.asarray(np.abs(difference) * of_image(a, b).missed_by(difference))
+    events = Events.of(a, b, whole(b.mean))
+    return np.asarray(np.abs(difference) * events.missed_by(difference))
 
 
 def unmet_variance(a: Side, b: Side) -> FloatArray:
@@ -105,7 +94,7 @@ def unmet_variance(a: Side, b: Side) -> FloatArray:
     stays a proof.
     """
     difference = a.mean - b.mean
-    events = Events.of_cells(a, b, np.asarray, 1.0).missed_by(difference)
+    events = Events.of(a, b, Cells(np.asarray, 1.0)).missed_by(difference)
     return np.asarray(np.abs(around(difference)) * events)
 
 

@@ -8,7 +8,8 @@ from scipy import ndimage, special
 from scipy.linalg import helmert
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.scales import HALF, tile_sums
+from comparisons.statistics.cells import HALF, tile_sums
+from comparisons.statistics.order import deviations
 
 FEWEST_PIXELS = 256
 """Least number of noisy pixels for these tests."""
@@ -72,13 +73,10 @@ def correlated_pair(pictures: FloatArray) -> tuple[int, int, float] | None:
     for its detail: a rare event that brightens two pictures is smooth, equal seeds repeat detail.
     """
     count = len(pictures)
-    deviation = pictures - pictures.mean(axis=0)
-    scale = np.sqrt((deviation**2).mean(axis=0))
-    noisy = scale > 1e-9 * max(float(np.abs(pictures).max()), 1e-300)
-    pixels = int(np.count_nonzero(noisy.any(axis=-1)))
+    z = deviations(pictures)
+    pixels = int(np.count_nonzero(z.any(axis=(0, 3))))
     if count < FEWEST_REPLICATES or pixels < FEWEST_PIXELS:
         return None
-    z = np.where(noisy, deviation / np.where(noisy, scale, 1.0), 0.0)
     products = [_products(band) for band in (z, _detail(z))]
     bands = [_correlations(band) for band in products]
     lowest = np.min([band - _highest_by_chance(band, pixels) for band in bands], axis=0)
@@ -113,9 +111,9 @@ def _correlations(products: FloatArray) -> FloatArray:
     """
     count = len(products)
     length = np.sqrt(np.maximum(np.diag(products), 1e-300))
-    found = products / np.outer(length, length) * (count - 1) / count + 1.0 / count
-    np.fill_diagonal(found, -np.inf)
-    return np.asarray(found)
+    correlations = products / np.outer(length, length) * (count - 1) / count + 1.0 / count
+    np.fill_diagonal(correlations, -np.inf)
+    return np.asarray(correlations)
 
 
 def _beyond_others(products: FloatArray, i: int, j: int, pixels: int) -> float:
@@ -128,11 +126,11 @@ def _beyond_others(products: FloatArray, i: int, j: int, pixels: int) -> float:
     of_all = about @ products @ about.T
     # Both contain the noise of that mean, which is a correlation of 1 / (R - 1).
     length = math.sqrt(max(float(of_all[i, i] * of_all[j, j]), 1e-300))
-    found = (float(of_all[i, j]) / length - 1.0 / (count - 1)) * (count - 1) / (count - 2)
+    correlation = (float(of_all[i, j]) / length - 1.0 / (count - 1)) * (count - 1) / (count - 2)
     pairs = _correlations(of_all[np.ix_(others, others)])[np.triu_indices(count - 2, 1)]
     scatter = max(math.sqrt(float((pairs**2).mean())), 1.0 / math.sqrt(pixels))
     times = OUTLYING_ALONE[0] + OUTLYING_ALONE[1] / (count - 3) ** 2
-    return found - max(CORRELATED, times * scatter, -2.0 * float(pairs.min()))
+    return correlation - max(CORRELATED, times * scatter, -2.0 * float(pairs.min()))
 
 
 def _highest_by_chance(correlations: FloatArray, pixels: int) -> float:

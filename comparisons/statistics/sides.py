@@ -3,16 +3,15 @@
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import correlate1d
 
 from comparisons.results.case import FloatArray
+from comparisons.statistics.cells import Cells
 from comparisons.statistics.filtered import excess_by_filter
 from comparisons.statistics.metrics import ratio
-from comparisons.statistics.scales import cell_pixels, cell_sums
 
 Sums = Callable[[FloatArray], FloatArray]
 """From pictures (..., height, width, 3) to sums over parts of them."""
@@ -64,12 +63,13 @@ class Side:
     filtered: float = 0.0
     """Of a known mean the excess of the variance of sums of pixels (see `excess_by_filter`)."""
 
-    def of_tiles(self, tile: int) -> Noise:
-        """The noise of tiles of one picture, (rows, columns, 3)."""
-        sums = partial(cell_sums, tile=tile)
-        return self.of_sums(sums, sums, sums, cell_pixels(self.mean, tile))
+    def of(self, cells: Cells) -> Noise:
+        """The noise of the means over parts of one picture."""
+        return self.of_sums(cells.sums, cells.sums, cells.sums, cells.pixels)
 
-    def of_sums(self, sums: Sums, squares: Sums, fourths: Sums, pixels: FloatArray) -> Noise:
+    def of_sums(
+        self, sums: Sums, squares: Sums, fourths: Sums, pixels: FloatArray | float
+    ) -> Noise:
         """The noise of weighted sums over one picture's pixels, divided by `pixels`;  squares,
         fourths: sums with the weights' squares and fourth powers."""
         variance = squares(self.variance)
@@ -78,17 +78,6 @@ class Side:
         if self.pictures is None:
             return Noise(summed, dof, summed, dof)
         own = (sums(self.pictures) / pixels).var(axis=0, ddof=1)
-        return Noise(own, float(self.count - 1), summed, dof)
-
-    def of_image(self) -> Noise:
-        """The noise of the mean of one picture, (3,)."""
-        size = float(self.mean.shape[0] * self.mean.shape[1])
-        variance = self.variance.sum(axis=(0, 1))
-        summed = (1.0 + self.filtered) * variance / size**2
-        dof = self._dof(variance, self.fourth.sum(axis=(0, 1)), size) / (1.0 + self.filtered)
-        if self.pictures is None:
-            return Noise(summed, dof, summed, dof)
-        own = self.pictures.mean(axis=(1, 2)).var(axis=0, ddof=1)
         return Noise(own, float(self.count - 1), summed, dof)
 
     def of_pixels(self) -> Noise:
@@ -138,8 +127,10 @@ class Side:
         return np.asarray(2.0 * pixels * (self.count - 1) / np.maximum(excess, 1.0))
 
 
-def side_of(images: FloatArray) -> Side:
-    """A side with replicates (R >= 2, h, w, 3)."""
+def side_of(images: FloatArray | Known) -> Side:
+    """A side with replicates (R >= 2, h, w, 3), or with a known mean of independent pixels."""
+    if isinstance(images, Known):
+        return known_side(images)
     mean = images.mean(axis=0)
     squares = np.zeros_like(mean)
     fourth = np.zeros_like(mean)

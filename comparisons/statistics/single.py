@@ -23,17 +23,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.metrics import ratio
-from comparisons.statistics.scales import (
-    DARK,
-    IMAGE_LEVEL,
-    PIXEL_LEVEL,
-    TILE_LEVEL,
+from comparisons.statistics.cells import (
     Margins,
     cell_means,
     cell_pixels,
     cell_sums,
+    divisor,
+    tiles,
+    whole,
 )
+from comparisons.statistics.metrics import ratio
+from comparisons.statistics.scales import IMAGE, PIXELS, TILES
 from comparisons.statistics.sides import NEIGHBOURS, Known, known_side, neighbourhood, side_of
 from comparisons.statistics.welch import BiasTest, Error, bias_test
 
@@ -47,9 +47,9 @@ noise of neighbouring small blocks is correlated."""
 
 def single_tests(
     candidate: FloatArray, reference: FloatArray | Known, tile: int, margins: Margins
-) -> tuple[BiasTest, BiasTest, BiasTest, int]:
-    """The tests of image, tiles and pixels for pictures (R, h, w, 3) with R = 1 on a side; and the
-    side of a tile, rounded to whole blocks."""
+) -> tuple[dict[str, BiasTest], int]:
+    """The tests by the names of their scales, for pictures (R, h, w, 3) with R = 1 on a side; and
+    the side of a tile, rounded to whole blocks."""
     mean = reference.mean if isinstance(reference, Known) else reference.mean(axis=0)
     difference = candidate.mean(axis=0) - mean
     tile = max(tile // COARSE, 1) * COARSE
@@ -61,23 +61,24 @@ def single_tests(
     wider = np.where(known, coarse.image().value, 1.0) / np.where(known, of_image.value, 1.0)
     of_tiles = Error(of_tiles.value * np.maximum(wider, 1.0), of_tiles.dof)
     rare_image, rare_tiles = _rare(candidate, reference, difference, tile)
-    image = bias_test(
+    of_whole = bias_test(
         difference.mean(axis=(0, 1)),
         mean.mean(axis=(0, 1)),
         (of_image, coarse.image(), *rare_image),
         margins.image,
-        IMAGE_LEVEL,
+        IMAGE.level,
         level,
     )
-    tiles = bias_test(
+    of_each = bias_test(
         cell_means(difference, tile),
         cell_means(mean, tile),
         (of_tiles, *rare_tiles),
         margins.tile,
-        TILE_LEVEL,
+        TILES.level,
         level,
     )
-    return image, tiles, _pixels(difference, mean, margins), tile
+    of_pixels = _pixels(difference, mean, margins)
+    return {IMAGE.name: of_whole, TILES.name: of_each, PIXELS.name: of_pixels}, tile
 
 
 FULL = 0.5
@@ -210,16 +211,16 @@ def _rare(
     ours, theirs = cell_sums(steps, tile), cell_sums(of_one, tile)
     noisy = (ours > 0.0) & (theirs > 0.0)
     factor = float(np.median(ours[noisy] / theirs[noisy])) if noisy.any() else 0.0
-    image, tiles = many.of_image(), many.of_tiles(tile)
+    image, each = many.of(whole(difference)), many.of(tiles(difference, tile))
     return (
         [Error(np.sqrt(factor * image.pixels), np.asarray(image.pixels_dof))],
-        [Error(np.sqrt(factor * tiles.pixels), np.asarray(tiles.pixels_dof))],
+        [Error(np.sqrt(factor * each.pixels), np.asarray(each.pixels_dof))],
     )
 
 
 def _pixels(difference: FloatArray, reference: FloatArray, margins: Margins) -> BiasTest:
     """The test of pixels without noise; all others get an infinite interval."""
-    scale = np.maximum(np.abs(reference), DARK * abs(float(reference.mean())))
+    scale = divisor(reference, float(reference.mean()))
     around = neighbourhood(difference)
     variance = neighbourhood(difference**2) - around**2
     whole = min(difference.shape[:2]) >= NEIGHBOURS
@@ -227,4 +228,4 @@ def _pixels(difference: FloatArray, reference: FloatArray, margins: Margins) -> 
     spread = np.sqrt(np.maximum(variance, 0.0))
     error = Error(np.where(still, spread, np.inf), np.full(difference.shape, np.inf))
     margin = margins.constant + ratio(margins.stored * np.abs(reference), scale)
-    return bias_test(difference, reference, (error,), margin, PIXEL_LEVEL, float(reference.mean()))
+    return bias_test(difference, reference, (error,), margin, PIXELS.level, float(reference.mean()))

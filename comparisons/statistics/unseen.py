@@ -6,8 +6,8 @@ import numpy as np
 from scipy import special
 
 from comparisons.results.case import FloatArray
+from comparisons.statistics.cells import divisor
 from comparisons.statistics.metrics import ratio
-from comparisons.statistics.scales import DARK
 from comparisons.statistics.sides import met_once
 
 
@@ -39,7 +39,7 @@ def unseen(pictures: FloatArray, level: float) -> Unseen:
     count = ratio(energy, size)
     most = 0.5 * special.chdtri(2.0 * (count + 1.0), level / 3.0)  # three channels
     # A channel counts by its energy: in a dark one a share says little.
-    scale = np.maximum(total, DARK * total.mean())
+    scale = divisor(total, total.mean())
     return Unseen(
         met_once=float(ratio(energy, scale).max()),
         missing=float(ratio((most - count) * size, scale).max()),

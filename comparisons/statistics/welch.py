@@ -1,39 +1,22 @@
-"""Welch's test of many means at once, with the noise of both sides: of the image, of tiles, of
-pixels, and of rows, columns and smooth patterns.
-
-A column that is 2 % dark changes each tile by an eighth of that. A vignette whose mean is kept
-changes each tile by less than its margin. Both are many standard errors off in a sum of their own:
-over a row or a column, or over the picture times a wave (the modes of the discrete cosine transform
-up to the second order, of which the mean is the first, and the sum of two for what is round).
-"""
+"""Welch's test of many means at once, with the noise of both sides."""
 
 import functools
 import math
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 from scipy import special
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.metrics import ratio
-from comparisons.statistics.rare import Events, of_image, unmet_variance
-from comparisons.statistics.scales import (
-    DARK,
-    IMAGE_LEVEL,
-    LINE_LEVEL,
-    MODE_LEVEL,
-    PIXEL_LEVEL,
+from comparisons.statistics.cells import (
     POWER,
     ROUNDING,
-    TILE_LEVEL,
-    Margins,
-    cell_means,
-    cell_pixels,
-    cell_sums,
+    divisor,
 )
-from comparisons.statistics.sides import Noise, Side, neighbourhood
+from comparisons.statistics.metrics import ratio
+from comparisons.statistics.rare import Events
+from comparisons.statistics.sides import Noise, Side
 
 MOST_DOF = 1000
 """Cap on degrees of freedom: beyond it the quantile is the normal one within 1 %."""
@@ -227,7 +210,7 @@ def bias_test(
     events: of rare light. They make a third standard error: the largest of the others, with the
     scatter of as much missing light as there is difference.
     """
-    scale = np.maximum(np.abs(reference), DARK * abs(image_mean))
+    scale = divisor(reference, image_mean)
     level_of_one = -math.expm1(math.log1p(-level) / difference.size)
     critical_of, reach_of = quantiles(level_of_one)
     half_width, reach = np.zeros_like(scale), np.zeros_like(scale)
@@ -270,194 +253,3 @@ def quantiles(level: float) -> tuple[FloatArray, FloatArray]:
     critical = np.asarray(-special.stdtrit(dof, level / 2.0))
     reach = critical + special.ndtri(POWER) * np.sqrt(1.0 + critical**2 / (2.0 * dof))
     return critical, reach
-
-
-# ---- the tests of the image mean, of tiles and of pixels, for two sides with replicates ----------
-
-
-def image_test(a: Side, b: Side, margins: Margins, level: float = 1.0) -> BiasTest:
-    """The image mean of each channel, (3,);  level: the share of the family's that is used."""
-    reference = b.mean.mean(axis=(0, 1))
-    difference = a.mean.mean(axis=(0, 1)) - reference
-    errors = welch_errors(a.of_image(), b.of_image(), a, b)
-    return bias_test(
-        difference,
-        reference,
-        errors,
-        margins.image,
-        level * IMAGE_LEVEL,
-        reference.mean(),
-        of_image(a, b),
-    )
-
-
-def tile_test(a: Side, b: Side, tile: int, margins: Margins, level: float = 1.0) -> BiasTest:
-    """Each channel of each tile, (rows, columns, 3): errors of hue would cancel in luminance."""
-    reference = cell_means(b.mean, tile)
-    difference = cell_means(a.mean, tile) - reference
-    errors = welch_errors(a.of_tiles(tile), b.of_tiles(tile), a, b)
-    return bias_test(
-        difference,
-        reference,
-        errors,
-        margins.tile,
-        level * TILE_LEVEL,
-        b.mean.mean(),
-        Events.of_cells(a, b, partial(cell_sums, tile=tile), cell_pixels(b.mean, tile)),
-    )
-
-
-def pixel_test(a: Side, b: Side, margins: Margins, level: float = 1.0) -> BiasTest:
-    """Each channel of each pixel, (height, width, 3).
-
-    The margin is that of a pixel, but at most half the standard deviation of one picture's pixel:
-    whatever a rounded ray could hit differently varies within the pixel, and so is noise. Where
-    that is less than the rounding of stored values, the margin is this rounding.
-
-    A pixel with two possible values (a lamp's edge, one sample per pixel) may by chance have one
-    value in all pictures of the candidate and the other in all of the reference, without any
-    spread. With few replicates such pixels count only if there are more than chance produces.
-    """
-    of_test = level * PIXEL_LEVEL
-    noise_a, noise_b = a.of_pixels(), b.of_pixels()
-    own, near = welch_errors(noise_a, noise_b, a, b, single_pixels=True)
-    mean = float(b.mean.mean())
-    scale = np.maximum(np.abs(b.mean), DARK * abs(mean))
-    spread = np.sqrt(np.maximum(a.variance, b.variance))
-    hit = np.minimum(margins.pixel, 0.5 * np.minimum(ratio(spread, scale), 1.0))
-    margin = margins.constant + np.maximum(hit, ratio(margins.stored * np.abs(b.mean), scale))
-    parted = scale.size * (chance_of_parting(a.count, b.count) if b.pictures is not None else 0.0)
-    still = spread <= margins.constant * scale
-    noisy = neighbourhood(np.where(still, 0.0, 1.0)).max(axis=-1, keepdims=True) > 0.0
-    if parted < of_test / 2.0:  # enough replicates: chance does not separate the sides
-        near = replace(near, value=np.where(still, own.value, near.value))
-    difference = a.mean - b.mean
-    missed = np.where(still, 0.0, unmet_variance(a, b))
-    unmet = Error(
-        np.sqrt(np.maximum(own.value, near.value) ** 2 + missed),
-        np.full(difference.shape, float(MOST_DOF)),
-    )
-    test = bias_test(difference, b.mean, (own, near, unmet), margin, of_test, mean)
-
-    proven = test.differs & noisy
-    # The channels of a pixel may depend on each other: pixels are counted, against the expected
-    # number of channels.
-    count = np.count_nonzero(proven.any(axis=-1))
-    if count and special.pdtrc(count - 1, parted) <= of_test:  # a Poisson number is as large
-        return test
-    return replace(test, half_width=np.where(proven, np.abs(test.difference), test.half_width))
-
-
-def chance_of_parting(count_a: int, count_b: int) -> float:
-    """The chance that all coin tosses of one side show heads and all of the other tails, for the
-    coin with the largest chance."""
-    share = count_a / (count_a + count_b)
-    return 2.0 * math.exp(count_a * math.log(share) + count_b * math.log1p(-share))
-
-
-# ---- the tests of rows and columns, and of smooth patterns ---------------------------------------
-
-ORDERS = ((0, 1), (1, 0), (0, 2), (1, 1), (2, 0))
-"""Half waves along y and along x of each mode but the last, which is the sum of whole waves along
-both: the falloff of a lens has two thirds of its strength in each of them."""
-
-FEWEST = 8
-"""Side in pixels of a picture from which on lines and modes are tested: smaller ones are a tile."""
-
-
-def line_test(a: Side, b: Side, margins: Margins, level: float = 1.0) -> BiasTest | None:
-    """The means of all rows, then of all columns, (height + width, 3); None for small pictures."""
-    height, width = b.mean.shape[:2]
-    if min(height, width) < FEWEST:
-        return None
-    pixels = np.repeat([float(width), float(height)], [height, width])[:, None]
-    noise_a, noise_b = (side.of_sums(_lines, _lines, _lines, pixels) for side in (a, b))
-    reference = _lines(b.mean) / pixels
-    mean = float(b.mean.mean())
-    steps = _steps(b.mean) / pixels
-    edges = margins.pixel * ratio(steps, np.maximum(np.abs(reference), DARK * abs(mean)))
-    return bias_test(
-        _lines(a.mean) / pixels - reference,
-        reference,
-        welch_errors(noise_a, noise_b, a, b),
-        np.minimum(margins.image + edges, margins.tile),
-        level * LINE_LEVEL,
-        mean,
-        Events.of_cells(a, b, _lines, pixels),
-    )
-
-
-def _steps(mean: FloatArray) -> FloatArray:
-    """(height + width, 3): the sums over each line of the larger step to a neighbouring line.
-
-    An edge that a renderer moves by a fraction of a pixel (`Margins.pixel`) changes its pixels by
-    that fraction of the step there; where a line resembles its neighbours, none is to be moved.
-    """
-    found = []
-    for axis in (0, 1):
-        step = np.abs(np.diff(mean, axis=axis))
-        none = np.zeros_like(step.take([0], axis=axis))
-        before, after = (np.concatenate(x, axis=axis) for x in ((none, step), (step, none)))
-        found.append(np.maximum(before, after).sum(axis=1 - axis))
-    return np.concatenate(found)
-
-
-def mode_test(a: Side, b: Side, margins: Margins, level: float = 1.0) -> BiasTest | None:
-    """The root mean square of each mode of the difference, (modes, 3), with the mode's sign; None
-    for small pictures.
-
-    What differs at one place, as a shadow that begins too late, has at most twice as much in a mode
-    as in the mean: Mitsuba's offset makes less than half of `margins.image` there, a fifth in the
-    mean.
-    """
-    height, width = b.mean.shape[:2]
-    if min(height, width) < FEWEST:
-        return None
-    waves = np.stack([np.outer(_wave(y, height), _wave(x, width)) for y, x in ORDERS])
-    waves = np.concatenate([waves, waves[2:3] + waves[4:5]])
-    waves /= np.sqrt((waves**2).mean(axis=(1, 2), keepdims=True))
-    once, twice, four = (partial(_along, waves**n) for n in (1, 2, 4))
-    pixels = np.full((len(waves), 1), float(height * width))
-    noise_a, noise_b = (side.of_sums(once, twice, four, pixels) for side in (a, b))
-    mean = np.broadcast_to(b.mean.mean(axis=(0, 1)), (len(waves), 3))
-    # At a crest an event counts by its height; either side may have missed it, since waves have
-    # both signs.
-    event = np.abs(waves).max(axis=(1, 2))[:, None] * of_image(a, b).largest()
-    return bias_test(
-        once(a.mean - b.mean) / pixels,
-        mean,
-        welch_errors(noise_a, noise_b, a, b),
-        0.5 * margins.image,
-        level * MODE_LEVEL,
-        float(mean.mean()),
-        Events(event, event),
-    )
-
-
-def named_line(index: int, height: int) -> str:
-    """Of an index into the lines of `line_test`."""
-    return f"row {index}" if index < height else f"column {index - height}"
-
-
-def named_mode(index: int) -> str:
-    """Of an index into the modes of `mode_test`."""
-    if index == len(ORDERS):
-        return "from the middle to the corners"
-    y, x = ORDERS[index]
-    what = {1: "half a wave", 2: "a whole wave"}
-    parts = [f"{what[n]} along {axis}" for n, axis in ((x, "x"), (y, "y")) if n]
-    return " and ".join(parts)
-
-
-def _wave(order: int, size: int) -> FloatArray:
-    return np.asarray(np.cos(np.pi * order * (np.arange(size) + 0.5) / size))
-
-
-def _along(waves: FloatArray, images: FloatArray) -> FloatArray:
-    """(..., height, width, 3) -> (..., modes, 3)."""
-    return np.asarray(np.einsum("mhw,...hwc->...mc", waves, images, optimize=True))
-
-
-def _lines(images: FloatArray) -> FloatArray:
-    """(..., height, width, 3) -> (..., height + width, 3)."""
-    return np.concatenate([images.sum(axis=-2), images.sum(axis=-3)], axis=-2)

@@ -1,19 +1,15 @@
-"""The results of the tests in words, and as numbers for JSON; advice for a run that was too noisy.
-
-The advice says how many more samples are needed, and on which side. The samples of both sides can
-be raised in a comparison of two renderers. At a gate only the candidate's can: the reference may be
-a baseline of few replicates. If these alone are too noisy, no candidate could show agreement, and
-the advice is about the reference.
-"""
+"""The results of the tests in words, and as numbers for JSON."""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from comparisons.results.case import FloatArray
+from comparisons.statistics.cells import CHANNELS, POWER
 from comparisons.statistics.ranks import Uniformity
-from comparisons.statistics.scales import CHANNELS, POWER
+from comparisons.statistics.scales import IMAGE, PIXELS, TILES, Place, Scale
 from comparisons.statistics.unseen import Unseen
 from comparisons.statistics.welch import BiasTest
 
@@ -47,29 +43,28 @@ def interval(test: BiasTest, at: tuple[int, ...]) -> str:
     return f"{name} {100.0 * test.relative[at]:+.3g} ± {half_width}"
 
 
-def beyond(test: BiasTest, at: tuple[int, ...]) -> str:
-    """The interval, and the margin that it lies outside of."""
-    return f"{interval(test, at)}, beyond ±{percent(float(test.margin[at]))}"
-
-
-def which(test: BiasTest, side: int, what: str, though: str = "") -> str:
-    """How many cells of `side` pixels differ, and the worst of them."""
-    row, column, _ = test.worst
+def words_of(scale: Scale, test: BiasTest, place: Place, alone: bool = True) -> str:
+    """That some of a scale's tests differ, and the worst of them;  alone: no scale before does."""
     differ = test.differs.any(axis=-1)
-    return (
-        f"{np.count_nonzero(differ)} of {differ.size} {what} differ{though}; the "
-        f"worst, at x, y = ({column * side}, {row * side}): {beyond(test, test.worst)}"
+    return scale.finds.format(
+        count=np.count_nonzero(differ),
+        tests=differ.size,
+        what=scale.what,
+        though=f", though {scale.though}" if alone else "",
+        place=place.words,
+        beyond=f"{interval(test, test.worst)}, beyond ±{percent(float(test.margin[test.worst]))}",
     )
 
 
-def detectable_words(image: BiasTest, tiles: BiasTest, side: int, pixels: BiasTest) -> str:
-    """The smallest bias that would have been seen at each scale."""
-    of_tiles, of_pixels = (
-        test.over_scale(test.detectable).max(axis=-1) for test in (tiles, pixels)
+def detectable_words(tests: Mapping[str, BiasTest], side: int) -> str:
+    """The smallest bias that would have been seen of the image, of a tile and of a pixel."""
+    of_image, of_tiles, of_pixels = (
+        tests[scale.name].over_scale(tests[scale.name].detectable).max(axis=-1)
+        for scale in (IMAGE, TILES, PIXELS)
     )
     text = (
         f"the smallest bias of the image mean seen with {100.0 * POWER:g} % power is "
-        f"{percent(image.over_scale(image.detectable).max())}; of a tile of {side} x {side} pixels "
+        f"{percent(float(of_image))}; of a tile of {side} x {side} pixels "
         f"it is {percent(float(np.median(of_tiles)))} in half of the tiles and "
         f"{percent(of_tiles.max())} in all"
     )
@@ -103,34 +98,18 @@ def image_numbers(test: BiasTest) -> dict[str, Any]:
     }
 
 
-def cell_numbers(test: BiasTest, side: int) -> dict[str, Any]:
-    """Numbers of tiles, or of pixels if `side` is 1."""
-    row, column, channel = test.worst
+def numbers_of(test: BiasTest, place: Place) -> dict[str, Any]:
+    """Numbers of the many tests of a scale, the worst of which is at `place`."""
     differ = test.differs.any(axis=-1)
+    detectable = test.over_scale(test.detectable)
+    of_cells = {"largest_detectable_bias": finite(detectable.max())} if differ.ndim == 2 else {}
     return {
         "tested": differ.size,
         "differ": int(np.count_nonzero(differ)),
-        "median_detectable_bias": finite(np.median(test.over_scale(test.detectable))),
-        "largest_detectable_bias": finite(test.over_scale(test.detectable).max()),
-        "worst_x": column * side,
-        "worst_y": row * side,
-        "worst_channel": CHANNELS[channel],
-        "worst_bias": finite(test.relative[test.worst]),
-        "worst_half_width": finite(test.over_scale(test.half_width)[test.worst]),
-        "worst_margin": float(test.margin[test.worst]),
-        "worst_p_value": finite(float(test.p_value(test.worst))),
-    }
-
-
-def line_numbers(test: BiasTest) -> dict[str, Any]:
-    """Numbers of rows and columns, or of modes."""
-    differ = test.differs.any(axis=-1)
-    return {
-        "tested": differ.size,
-        "differ": int(np.count_nonzero(differ)),
-        "median_detectable_bias": finite(np.median(test.over_scale(test.detectable))),
-        "worst": test.worst[0],
-        "worst_channel": CHANNELS[test.worst[1]],
+        "median_detectable_bias": finite(np.median(detectable)),
+        **of_cells,
+        **place.numbers,
+        "worst_channel": CHANNELS[test.worst[-1]],
         "worst_bias": finite(test.relative[test.worst]),
         "worst_half_width": finite(test.over_scale(test.half_width)[test.worst]),
         "worst_margin": float(test.margin[test.worst]),

@@ -26,8 +26,8 @@ from comparisons.report.biases import tell
 from comparisons.report.ci import ranked
 from comparisons.report.table import Column, Table
 from comparisons.results.case import PASSING, WARNING, Case, RungResult, how_many
-from comparisons.results.files import named
 from comparisons.results.headline import first_difference, headline
+from comparisons.results.naming import named
 from comparisons.results.stored_case import (
     CASE,
     StoredCaseError,

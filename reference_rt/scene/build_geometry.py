@@ -147,7 +147,7 @@ class _Assembly:
         hierarchy of shapes."""
         first, boxes = len(self.operands), []
         operands = csg.operands_of(shape, identity(), material)
-        anchor, seen = csg.anchored(shape)
+        (anchor, seen), steps = csg.anchored(shape), csg.postfix(shape)
         for k, (_, _, name, turned) in enumerate(operands):
             operand, outer = seen[k]
             try:
@@ -157,7 +157,7 @@ class _Assembly:
                 boxes.append(self.operand(operand, place._replace(outer=outer)))
             except ValueError as error:
                 raise ValueError(f"operand {k}, a {_type_of(operand)}: {error}") from None
-        self.solids.append(_Program(first, csg.postfix(shape), boxes, anchor))
+        self.solids.append(_Program(first, steps, boxes, anchor))
         return len(self.solids) - 1
 
     def operand(self, shape: Shape, place: TabulationContext) -> Bounds:
@@ -248,7 +248,7 @@ class _Assembly:
                         raise ValueError("it is infinite; expected a shape of a finite size")
                     references.append(reference)
                     if isinstance(shape, Solid):
-                        more += len(list(csg.operands_of(shape, identity(), None))) - 1
+                        more += self.solids[-1].count - 1
             except ValueError as error:
                 raise self.scene.error(str(error), "groups", name, k) from None
         if references:

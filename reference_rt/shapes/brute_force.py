@@ -81,7 +81,7 @@ def _kind_of(code: int) -> int:
 
 
 @kernel
-def _complete(shapes: Link, rays: RayBlock, hits: HitBlock, n: int) -> None:
+def _complete(shapes: Any, rays: RayBlock, hits: HitBlock, n: int) -> None:
     for j in range(n):
         put_hit(hits, j, completed(shapes, ray_of(rays, j), hits, j))
 

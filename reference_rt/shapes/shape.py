@@ -1,4 +1,4 @@
-"""The base of all shapes: descriptions, SIMD packets, points on lights, tangents, spans."""
+"""The base of all shapes: descriptions, points on lights, tangents, spans."""
 
 import math
 from collections.abc import Callable

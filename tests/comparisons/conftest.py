@@ -14,7 +14,7 @@ from PIL import Image
 from suite_runs import RUNNER
 from typer.testing import Result
 
-from comparisons.gate import reference
+from comparisons.gate import reference_cache
 from comparisons.gate.browser import PageError, chromium_program
 from comparisons.mitsuba.backend import Backend
 from comparisons.report import write_report
@@ -212,7 +212,7 @@ def gate_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, gate_references
     """The working folder is the test's own, and it is not CI's."""
     for name in ("CI", "GITHUB_ACTIONS", "GITHUB_STEP_SUMMARY"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(reference, "cache_folder", lambda: gate_references)
+    monkeypatch.setattr(reference_cache, "cache_folder", lambda: gate_references)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "ball.yaml").write_text(SCENE)
     return tmp_path

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from comparisons.compare.diagnosis.colour import CHANNELS
-from comparisons.compare.diagnosis.misfit import Hypothesis, Misfit
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.results.case import FloatArray
 from reference_rt.rendering.image import srgb
 from reference_rt.textures.image_file import linear
@@ -34,25 +35,26 @@ light does, and says less: it is no rival."""
 
 def hypotheses(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hypothesis]:
     """All of them, fitted."""
-    for one in _gains(misfit):
-        if (
-            not lights
-            or one.family != "gain"
-            or one.picture.mean() > LITTLE * misfit.reference.mean()
-        ):
-            yield one
+    gain = _gain(misfit)
+    if not lights or gain.picture.mean() > LITTLE * misfit.reference.mean():
+        yield gain
+    yield from _gains(misfit)
     yield from _limits(misfit)
     yield from _lights(misfit, lights)
 
 
-def _gains(misfit: Misfit) -> Iterator[Hypothesis]:
+def _gain(misfit: Misfit) -> Hypothesis:
     r = misfit.reference
     gain = 1.0 + misfit.amount(r)
     evidence = f"the candidate is {gain:.4g} times the reference ({100.0 * (gain - 1.0):+.3g} %)"
     for factor, name in REMARKABLE.items():
         if abs(gain / factor - 1.0) < NEAR:
             evidence += f", {name} what it should be"
-    yield Hypothesis("gain", f"constant gain of {gain:.4g}", evidence, gain * r, 1)
+    return Hypothesis("gain", f"constant gain of {gain:.4g}", evidence, gain * r, 1)
+
+
+def _gains(misfit: Misfit) -> Iterator[Hypothesis]:
+    r = misfit.reference
     gains = np.ones(3)
     for k, channel in enumerate(CHANNELS):
         alone = np.zeros_like(r)

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 from scipy import ndimage
 
-from comparisons.compare.diagnosis.misfit import Hypothesis, Misfit
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.results.case import FloatArray
 
 STEPS = ((4.0, 1), (2.0, 1), (1.0, 1), (0.0, 3), (0.0, 3))
@@ -75,10 +76,10 @@ class _Lens:
             normal = np.einsum("ahwc,bhwc,hwc->cab", columns, columns, weights)
             wanted = np.einsum("ahwc,hwc,hwc->ca", columns, rest, weights)
             if apart:
-                found = [_solved(n, v) for n, v in zip(normal, wanted, strict=True)]
+                steps = [_solved(n, v) for n, v in zip(normal, wanted, strict=True)]
             else:
-                found = 3 * [_solved(normal.sum(axis=0), wanted.sum(axis=0))]
-            amounts = np.clip(amounts + np.stack(found, axis=1), -MOST, MOST)
+                steps = 3 * [_solved(normal.sum(axis=0), wanted.sum(axis=0))]
+            amounts = np.clip(amounts + np.stack(steps, axis=1), -MOST, MOST)
         return amounts, self._seen(self._misfit.reference, self._factors(terms, amounts), 3)
 
     def _factors(self, terms: list[FloatArray], amounts: FloatArray) -> FloatArray:

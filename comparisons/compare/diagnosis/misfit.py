@@ -2,28 +2,12 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage, optimize
 
 from comparisons.results.case import FloatArray, Images
-from comparisons.statistics.scales import DARK
-
-# ---- a hypothesis about what is wrong with a picture ---------------------------------------------
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """family: hypotheses of the same family do not compete;  name, evidence: as in `Cause`;
-    picture: the candidate that the hypothesis predicts;  parameters: how many were fitted."""
-
-    family: str
-    name: str
-    evidence: str
-    picture: FloatArray
-    parameters: int
-
+from comparisons.statistics.cells import divisor
 
 FLOOR = 0.005
 """Relative to a pixel's brightness, or the picture's if that is brighter: smaller differences have
@@ -92,7 +76,7 @@ class Misfit:
         mean, and of the squares at any scale of blocks at which the difference is clear."""
         before, left = self.candidate - self.reference, self.candidate - picture
         mean = np.abs(self.reference.mean(axis=(0, 1)))
-        permitted = BIAS * np.maximum(mean, DARK * mean.mean())
+        permitted = BIAS * divisor(mean, mean.mean())
         noise = CLEARLY * np.sqrt(self._scales[0].error2.sum(axis=(0, 1))) / (before.size // 3)
         bias, rest = (np.abs(x.mean(axis=(0, 1))) for x in (before, left))
         if np.any(rest > np.maximum(REST * bias, permitted) + noise):
@@ -157,8 +141,8 @@ class Misfit:
         difference = self.candidate - self.reference
         for scale in self._scales:
             if scale.clearness(difference) > CLEARLY:
-                found = scale.binned(difference) ** 2 - scale.error2
-                yield scale.block, np.asarray((scale.weights * found).sum(axis=-1))
+                squares = scale.binned(difference) ** 2 - scale.error2
+                yield scale.block, np.asarray((scale.weights * squares).sum(axis=-1))
 
 
 class _Scale:

@@ -7,7 +7,8 @@ import numpy as np
 from scipy import ndimage, optimize
 
 from comparisons.compare.diagnosis import lens
-from comparisons.compare.diagnosis.misfit import Hypothesis, Misfit
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.results.case import FloatArray
 
 FARTHEST = 3

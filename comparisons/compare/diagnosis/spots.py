@@ -9,6 +9,9 @@ from comparisons.results.case import Cause, FloatArray
 SHARE = 0.9
 """The fraction of the excess that must lie in the place."""
 
+ONE_TILE, FEW_PIXELS, ONE_PIXEL = "one bad tile", "a few wrong pixels", "a single wrong pixel"
+"""Names of causes."""
+
 FEW = 1e-3
 """The fraction of all pixels up to which wrong pixels are called few."""
 
@@ -20,10 +23,10 @@ def one_place(misfit: Misfit) -> Cause | None:
     """The row, column, rectangle or few pixels in which the difference lies, if it does."""
     for block, excess in misfit.excesses():
         total = float(excess.sum())
-        found = [_rectangle(excess, total, block)]
+        places = [_rectangle(excess, total, block)]
         if block == 1:
-            found = [_line(excess, total), _pixels(excess, total), *found]
-        for place in found:
+            places = [_line(excess, total), _pixels(excess, total), *places]
+        for place in places:
             if place is not None and _holds(misfit, place[1], block):
                 return place[0]
     return None
@@ -118,7 +121,7 @@ def _pixels(excess: FloatArray, total: float) -> Place | None:
     evidence = f"{_percent(share)} of the difference are in {many}, the worst at x {x}, y {y}"
     inside = np.zeros(excess.shape, dtype=np.bool_)
     inside.flat[order] = True
-    name = "a single wrong pixel" if needed == 1 else "a few wrong pixels"
+    name = ONE_PIXEL if needed == 1 else FEW_PIXELS
     return Cause(name, evidence, share), inside
 
 
@@ -139,7 +142,7 @@ def _rectangle(excess: FloatArray, total: float, block: int) -> Place | None:
         f"pixels at x {left * block}, y {top * block}"
     )
     thin = block == 1 and 1 in (width, height) and max(width, height) > 8
-    name = ("one bad row" if height == 1 else "one bad column") if thin else "one bad tile"
+    name = ("one bad row" if height == 1 else "one bad column") if thin else ONE_TILE
     blocks = np.zeros(excess.shape, dtype=np.bool_)
     blocks[top:bottom, left:right] = True
     return Cause(name, evidence, min(inside, 1.0)), blocks

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.gate.digest import scene_digest, source_digest
-from comparisons.gate.reference import cache_folder
+from comparisons.gate.reference_cache import cache_folder
 from comparisons.mitsuba.backend import backend
 from comparisons.results.files import read_arrays, write_arrays
 from comparisons.runs import engine

@@ -83,11 +83,11 @@ def any_hits(
     questions += through
     wrong, first = 0, ""
     for question in questions:
-        found = _answers(tables, question)
-        bad = np.flatnonzero((found != question.answer).any(axis=0))
+        answers = _answers(tables, question)
+        bad = np.flatnonzero((answers != question.answer).any(axis=0))
         wrong += len(bad)
         if len(bad) and not first:
-            first = _describe(question, found, int(bad[0]))
+            first = _describe(question, answers, int(bad[0]))
     for question in through:
         # Closest hits must not pass the triangle either.
         t = query.first_hits(tables, question.rays.o, question.rays.d).t
@@ -152,7 +152,7 @@ def _through_triangles(sizes: ShapeSizes, rng: np.random.Generator) -> list[_Que
 
 def _triangles(sizes: ShapeSizes, rng: np.random.Generator) -> FloatArray:
     """Corners (n, 3, 3) in the scene of the triangles of all copies, without those of solids."""
-    found = [np.zeros((0, 3, 3))]
+    corners_of = [np.zeros((0, 3, 3))]
     meshes = [
         (copy, leaf)
         for copy in sizes.copies
@@ -166,8 +166,8 @@ def _triangles(sizes: ShapeSizes, rng: np.random.Generator) -> FloatArray:
     for (copy, leaf), count in zip(meshes, counts.tolist(), strict=True):
         rows = _some(len(leaf.table.vertices), count, rng)
         corners = leaf.table.vertices[rows].reshape(-1, 3)
-        found.append(affine.apply_points(copy.outer, corners).reshape(-1, 3, 3))
-    return np.concatenate(found)
+        corners_of.append(affine.apply_points(copy.outer, corners).reshape(-1, 3, 3))
+    return np.concatenate(corners_of)
 
 
 def _some(n: int, count: int, rng: np.random.Generator) -> IntArray:
@@ -190,8 +190,8 @@ def _of_mitsuba(counterpart: Counterpart, question: _Question) -> int:
         ray.maxt = maximum
         return (mi_scene.ray_test(ray),)
 
-    found = for_rays(test, o, d / length[:, None], end)[0].astype(bool)
-    return int(np.count_nonzero(found != question.answer))
+    answers = for_rays(test, o, d / length[:, None], end)[0].astype(bool)
+    return int(np.count_nonzero(answers != question.answer))
 
 
 def _describe(question: _Question, found: BoolArray, k: int) -> str:

@@ -62,17 +62,17 @@ def explained(
     `like_theirs(rays, offsets)` traces the rays (k,) moved by offsets (k, 3) and returns which now
     agree with Mitsuba.  False for all beyond the first MOST.
     """
-    found = np.zeros(len(rays), bool)
+    settled = np.zeros(len(rays), bool)
     for most, count, radii in SEARCHES:
         moves = np.concatenate([factor * directions(count) for factor in radii])
         done = 0
         while done < len(moves):
-            open_ = np.flatnonzero(~found[:MOST])
+            open_ = np.flatnonzero(~settled[:MOST])
             if len(open_) == 0 or len(open_) > most:
                 break
             some = moves[done : done + max(1, AT_ONCE // len(open_))]
             offsets = some * radius[open_][:, None, None]
             agree = like_theirs(np.repeat(rays[open_], len(some)), offsets.reshape(-1, 3))
-            found[open_] = agree.reshape(len(open_), -1).any(axis=1)
+            settled[open_] = agree.reshape(len(open_), -1).any(axis=1)
             done += len(some)
-    return found
+    return settled

@@ -1,107 +1,23 @@
 """Rays that hit coincident surfaces, of which each tracer may report either."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
-from comparisons.lights import type_of
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.hits import BoolArray, MitsubaHits, rows_of
 from comparisons.referee.sizes import ShapeSizes
-from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.comparer import DISCRETE, KINDS, Comparer
 from comparisons.rungs.rays.rays import Rays
-from comparisons.rungs.rays.resolution import slide
+from comparisons.rungs.rays.slide import slide
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.transform import Translate
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.materials import Diffuse, Emissive, Material, Wrapper
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
-
-# How much radiance changes within float32's error of a ray: highlights, textures and bent normals
-# amplify the error of a point or a direction.
-#
-# The change is measured with our own tracer, along rays moved by float32's bound.
-
-
-STEPS = 8
-"""Number of moved rays."""
-
-STEEPEST = 1e-2
-"""Fraction of the brightest value: a larger change within float32's bound is an edge, which is left
-to the arbiter."""
-
-
-def is_steep(scene: Scene) -> bool:
-    """Whether any material has a glossy lobe, a texture, or is made of others, or a light projects
-    an image: untextured diffuse materials, lamps and perfect mirrors are not steep."""
-
-    def is_flat(material: Material) -> bool:
-        if isinstance(material, Emissive):
-            return not isinstance(material.radiance, str)
-        if isinstance(material, Wrapper) or material.oriented:
-            return False
-        plain = isinstance(material, Diffuse) and not isinstance(material.reflectance, str)
-        return plain or not material.smooth
-
-    if any(type_of(light).projects(light) for light in scene.lights):
-        return True
-    return not all(is_flat(material) for material in scene.materials.values())
-
-
-def moved(rays: Rays, radius: FloatArray) -> list[Rays]:
-    """STEPS versions of the rays: origins moved by `radius` (n,), directions turned by float32's
-    error, on the opposite side of the sphere."""
-    moves = arbiter.directions(STEPS)
-    found = []
-    for move, way in zip(moves, np.roll(moves, STEPS // 2, axis=0), strict=True):
-        turned = rays.d + ROUNDINGS * UNIT_ROUNDOFF * way
-        turned /= np.linalg.norm(turned, axis=1)[:, None]
-        found.append(Rays(rays.o + radius[:, None] * move, turned))
-    return found
-
-
-NEAR = 0.01
-"""How far from the point that it must hit a turned ray starts, as a fraction of its length: a ray
-from further away meets other surfaces."""
-
-
-def turned(rays: Rays, p: FloatArray, angle: FloatArray) -> list[Rays]:
-    """Four versions of the rays that hit the same points p (n, 3), turned about them by `angle`
-    (n,), up, down, left and right."""
-    length = np.linalg.norm(p - rays.o, axis=1)[:, None]
-    forward = rays.d / np.linalg.norm(rays.d, axis=1)[:, None]
-    least = np.eye(3)[np.argmin(np.abs(forward), axis=1)]
-    right = np.cross(forward, least)
-    right /= np.linalg.norm(right, axis=1)[:, None]
-    up = np.cross(right, forward)
-    cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    found = []
-    for across in (right, up, -right, -up):
-        d = cosine * forward + sine * across
-        found.append(Rays(p - NEAR * length * d, d))
-    return found
-
-
-def slopes(
-    value: FloatArray, others: Sequence[Callable[[], FloatArray]], brightest: float
-) -> FloatArray:
-    """(n,): how far `value` (n, 3) may change, from the values `others` of moved rays.
-
-    Twice the largest change: the directions of the moves are up to a cosine of 0.7 apart.
-    """
-    found = np.zeros(len(value))
-    for other in others:
-        change = np.abs(other() - value).max(axis=1)
-        found = np.maximum(found, np.where(change <= STEEPEST * brightest, change, 0.0))
-    return 2.0 * found
-
 
 COINCIDENCES = 8
 """Most shapes that are moved away to trace what lies behind: each needs new tables."""
@@ -118,26 +34,28 @@ def coincident(
     crosses Mitsuba's face too, at the same t.  Two shapes: with our shape moved far away, our
     tracer has Mitsuba's hit at the same t.
     """
-    found = np.zeros(len(numbers), bool)
+    together = np.zeros(len(numbers), bool)
     if len(numbers) == 0:
-        return found
+        return together
     rays, ours, theirs = traced.rays, traced.ours, traced.theirs
     if counterpart.solids:
         for tolerance in (None, 0.0, 1.0):
-            rest = np.flatnonzero(~found)
+            rest = np.flatnonzero(~together)
             k = numbers[rest]
             some, mine = rays.rows(k), rows_of(ours, k)
             again = rows_of(theirs, k)
             if tolerance is not None:
                 again = trace(counterpart, some.o, some.d, tolerance)
             _as_one_part(counterpart, some, mine, again)
-            found[rest] = (comparer.ratios(some, mine, again) <= 1.0).all(axis=1)
-    rest = np.flatnonzero(~found)
+            together[rest] = (comparer.ratios(some, mine, again) <= 1.0).all(axis=1)
+    rest = np.flatnonzero(~together)
     k = numbers[rest]
-    found[rest] = _on_two_faces(scene, comparer, rays.rows(k), rows_of(ours, k), rows_of(theirs, k))
-    left = ours.shape[numbers][~found]
+    together[rest] = _on_two_faces(
+        scene, comparer, rays.rows(k), rows_of(ours, k), rows_of(theirs, k)
+    )
+    left = ours.shape[numbers][~together]
     for shape in np.unique(left[left >= 0])[:COINCIDENCES].tolist():
-        rest = np.flatnonzero(~found & (ours.shape[numbers] == shape))
+        rest = np.flatnonzero(~together & (ours.shape[numbers] == shape))
         k = numbers[rest]
         some = rays.rows(k)
         others = build_tables(_without(scene, shape, float(comparer.sizes.reach.max())))
@@ -145,8 +63,8 @@ def coincident(
         agrees = (comparer.ratios(some, behind, rows_of(theirs, k)) <= 1.0).all(axis=1)
         e = slide(comparer.sizes, some.o, some.d, behind)
         with np.errstate(invalid="ignore"):
-            found[rest] = agrees & (np.abs(behind.t - ours.t[k]) <= e)
-    return found
+            together[rest] = agrees & (np.abs(behind.t - ours.t[k]) <= e)
+    return together
 
 
 def _on_two_faces(
@@ -155,13 +73,11 @@ def _on_two_faces(
     """Which rays cross the face that Mitsuba reports at the same t as another face of the same
     shape, which we report: as where a mesh has a triangle twice, or two shapes of an instanced
     group lie in one plane."""
-    found = np.zeros(len(ours.t), bool)
-    other_face = np.zeros(len(found), bool)
-    for name in ("instance", "part", "primitive"):
-        other_face |= getattr(ours, name) != getattr(theirs, name)
+    crossing = np.zeros(len(ours.t), bool)
+    other_face = _is_other(ours, theirs)
     rows = np.flatnonzero(other_face & (ours.shape >= 0) & (ours.shape == theirs.shape))
     if len(rows) == 0:
-        return found
+        return crossing
     some, mine, other = rays.rows(rows), rows_of(ours, rows), rows_of(theirs, rows)
     e = slide(comparer.sizes, some.o, some.d, mine, other.sag) / np.linalg.norm(some.d, axis=1)
     crossed = query.crossings(scene.tables, some.o, some.d)
@@ -178,8 +94,8 @@ def _on_two_faces(
             rows_of(all_of_them, np.array([k])),
             rows_of(other, np.array([one])),
         )
-        found[rows[one]] |= bool((ratios <= 1.0).all())
-    return found
+        crossing[rows[one]] |= bool((ratios <= 1.0).all())
+    return crossing
 
 
 def _as_hits(crossed: query.Crossings) -> Intersections:
@@ -193,13 +109,24 @@ def in_one_place(comparer: Comparer, traced: Any, numbers: IntArray) -> BoolArra
     t, with the same normal or the opposite one."""
     ours, theirs = rows_of(traced.ours, numbers), rows_of(traced.theirs, numbers)
     rays = traced.rays.rows(numbers)
-    e = slide(comparer.sizes, rays.o, rays.d, ours, theirs.sag)
-    length = np.linalg.norm(rays.d, axis=1)
-    with np.errstate(invalid="ignore"):
-        near = np.abs(theirs.t - ours.t) * length <= e
+    near = _at_one_t(comparer.sizes, rays, ours, theirs)
     parallel = np.abs(np.sum(ours.n * theirs.n, axis=1)) >= 1.0 - 1e-6
     other = (traced.ratios[numbers, :DISCRETE] > 1.0).any(axis=1)
     return np.asarray(near & parallel & other & (ours.shape >= 0) & (theirs.shape >= 0))
+
+
+def _is_other(ours: Intersections, theirs: MitsubaHits) -> BoolArray:
+    """(n,): whether the hits are of different shapes, instances, parts or faces."""
+    pairs = ((getattr(ours, name), getattr(theirs, name)) for name in KINDS[1:DISCRETE])
+    return np.asarray(np.any([mine != other for mine, other in pairs], axis=0))
+
+
+def _at_one_t(sizes: ShapeSizes, rays: Rays, ours: Intersections, theirs: MitsubaHits) -> BoolArray:
+    """(n,): whether rays hit at the same t, within float32's error; not where either misses."""
+    e = slide(sizes, rays.o, rays.d, ours, theirs.sag)
+    with np.errstate(invalid="ignore"):  # misses
+        off = np.abs(theirs.t - ours.t) * np.linalg.norm(rays.d, axis=1)
+        return np.asarray(off <= e)
 
 
 def on_two_surfaces(
@@ -207,16 +134,11 @@ def on_two_surfaces(
 ) -> BoolArray:
     """(n,): whether a ray hits two surfaces of ours in one place, of which each renderer reports
     another one: they may have different materials, and the rung of geometry judges them."""
-    other = np.zeros(len(rays.o), bool)
-    for name in KINDS[1:DISCRETE]:
-        other |= getattr(ours, name) != getattr(theirs, name)
-    e = slide(sizes, rays.o, rays.d, ours, theirs.sag)
-    with np.errstate(invalid="ignore"):  # misses
-        here = np.abs(theirs.t - ours.t) * np.linalg.norm(rays.d, axis=1) <= e
-    rows = np.flatnonzero(other & here)
-    found = np.zeros(len(other), bool)
-    found[rows] = _are_two(sizes, tables, rays.rows(rows), ours.t[rows])
-    return found
+    here = _at_one_t(sizes, rays, ours, theirs)
+    rows = np.flatnonzero(_is_other(ours, theirs) & here)
+    two = np.zeros(len(here), bool)
+    two[rows] = _are_two(sizes, tables, rays.rows(rows), ours.t[rows])
+    return two
 
 
 def is_doubled(

@@ -5,7 +5,7 @@ import numpy as np
 from comparisons.mitsuba.hits import MitsubaHits
 from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays.rays import Rays
-from comparisons.rungs.rays.resolution import slide
+from comparisons.rungs.rays.slide import slide
 from comparisons.shapes import type_of
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.query import Intersections

@@ -5,8 +5,9 @@ from functools import partial
 import numpy as np
 
 from comparisons.rungs.rays.arbiter import BoolArray
-from comparisons.rungs.rays.coincidence import NEAR, slopes
-from comparisons.rungs.rays.light_error import MIDDLE, LightContext, kind_of
+from comparisons.rungs.rays.light_context import LightContext, kind_of
+from comparisons.rungs.rays.light_error import MIDDLE
+from comparisons.rungs.rays.slopes import NEAR, slopes
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import WhittedSetup
 from reference_rt.lights import AREA, ENVIRONMENT, EnvironmentMap
@@ -63,13 +64,13 @@ def is_beside(
 ) -> BoolArray:
     """(n,): whether the light has Mitsuba's value, `wanted` (n, 3), next to u, up to `allowed`
     (n,): at the edge of a texel."""
-    found = np.zeros(len(wanted), bool)
+    beside = np.zeros(len(wanted), bool)
     if not scale.any():
-        return found
+        return beside
     for at in _beside(u, float(scale.max())):
         error = np.abs(_value_at(context, light, at) - wanted).max(axis=1)
-        found |= (error <= allowed) & (scale > 0.0)
-    return found
+        beside |= (error <= allowed) & (scale > 0.0)
+    return beside
 
 
 def changes_of_lamps(context: LightContext, setup: WhittedSetup) -> tuple[FloatArray, FloatArray]:
@@ -114,8 +115,8 @@ def _beside(u: tuple[float, float], scale: float, count: int = 4) -> list[tuple[
 
 def _value_at(context: LightContext, light: int, u: tuple[float, float]) -> FloatArray:
     rays = context.rays
-    found = query.direct_light(context.tables, rays.o, rays.d, light, u)
-    return np.asarray(found.contribution)
+    light_there = query.direct_light(context.tables, rays.o, rays.d, light, u)
+    return np.asarray(light_there.contribution)
 
 
 def _has_image(context: LightContext, light: int) -> bool:

@@ -2,78 +2,28 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from comparisons.geometry.frame import UNIT_ROUNDOFF
-from comparisons.lights import BY_TYPE, type_of
-from comparisons.lights.light import LightType
+from comparisons.lights import type_of
 from comparisons.materials.coat import PASSED
-from comparisons.mitsuba.counterpart import Counterpart
-from comparisons.mitsuba.hits import MitsubaHits, rows_of
-from comparisons.referee.sizes import ShapeSizes
-from comparisons.rungs.rays.coincidence import is_steep, moved, slopes, turned
+from comparisons.rungs.rays.light_context import (
+    DISTANT,
+    POINT_LIKE,
+    LightContext,
+    described,
+    kind_of,
+)
 from comparisons.rungs.rays.rays import Rays
-from comparisons.rungs.rays.resolution import slide
+from comparisons.rungs.rays.slide import slide
+from comparisons.rungs.rays.slopes import is_steep, moved, slopes, turned
 from comparisons.translator.accuracy import accuracy, coat_error, is_tilted
-from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.lights import ENVIRONMENT, TABLES
+from reference_rt.core.arrays import FloatArray
+from reference_rt.lights import ENVIRONMENT
 from reference_rt.materials import Emissive
 from reference_rt.rendering import query
-from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
-
-# ---- the data that the comparisons of a scene's lights share -------------------------------------
-
-
-POINT_LIKE: dict[int, LightType[Any]] = {code: BY_TYPE[of] for code, _, of, _ in TABLES}
-"""The lights without extent, by kind: from a point each has one direction, which Mitsuba's emitter
-itself gives."""
-
-DISTANT = {ENVIRONMENT, *(kind for kind, of in POINT_LIKE.items() if of.along is not None)}
-"""Kinds of lights whose `target` is a direction, not a point."""
-
-
-class LightContext(NamedTuple):
-    """The scene in both renderers, n rays, their hits in both, and the lengths behind the
-    bounds."""
-
-    scene: Scene
-    tables: SceneTables
-    counterpart: Counterpart
-    rays: Rays
-    hits: Intersections
-    theirs: MitsubaHits
-    sizes: ShapeSizes
-
-    def of(self, rows: IntArray) -> "LightContext":
-        """Of some of the rays."""
-        return self._replace(
-            rays=self.rays.rows(rows),
-            hits=rows_of(self.hits, rows),
-            theirs=rows_of(self.theirs, rows),
-        )
-
-
-def kind_of(context: LightContext, light: int) -> int:
-    choice = context.tables.lights.choice
-    return -1 if choice is None else int(choice.kind[light])
-
-
-def described(context: LightContext, light: int) -> Any:
-    """The description of a light without extent (POINT_LIKE)."""
-    return context.scene.lights[number_of(context, light)]
-
-
-def number_of(context: LightContext, light: int) -> int:
-    """Its index in the scene's lights: rows of our tables count those of its kind."""
-    choice = context.tables.lights.choice
-    row = 0 if choice is None else int(choice.row[light])
-    of = POINT_LIKE[kind_of(context, light)].description
-    return [i for i, x in enumerate(context.scene.lights) if isinstance(x, of)][row]
-
 
 FAINTEST = 1e-12
 """Absolute error, as a fraction of the brightest hit of any light: far above where float32
@@ -107,7 +57,7 @@ def bounds(
     """
     value, theirs, their_cosine = values
     rays, hits = context.rays, context.hits
-    e = slide(context.sizes, rays.o, rays.d, hits, of_stand_ins(context, "sag"))
+    e = slide(context.sizes, rays.o, rays.d, hits, context.off_by("sag"))
     kind = kind_of(context, light)
     if kind in DISTANT:
         w, distance = target, np.full(len(target), np.inf)
@@ -119,7 +69,7 @@ def bounds(
         # The cosine may be negative: refracted light arrives from behind.
         ours_full = np.nan_to_num(value.max(axis=1) / np.abs(cosine))
         theirs_full = np.nan_to_num(theirs.max(axis=1) / np.abs(their_cosine))
-    turn = 2.0 * e / _feature(context) + of_stand_ins(context, "turn")
+    turn = 2.0 * e / _feature(context) + context.off_by("turn")
     relative = turn + 4.0 * (e + _along(context)) / distance + 16.0 * UNIT_ROUNDOFF
     relative += _of_leaves(context, accuracy)
     full = np.maximum(ours_full, theirs_full)
@@ -143,10 +93,10 @@ def bounds(
 def of_direct_light(context: LightContext) -> FloatArray:
     """(n,): how far float32 may move the light that Whitted's ray tracing takes from the middles of
     all lights, at the first hits."""
-    found = np.zeros(len(context.hits.t))
+    total = np.zeros(len(context.hits.t))
     choice = context.tables.lights.choice
     if choice is None:
-        return found
+        return total
     rays, hits = context.rays, context.hits
     for light in np.flatnonzero((choice.kind != ENVIRONMENT) & (choice.probability > 0.0)).tolist():
         ours = query.direct_light(context.tables, rays.o, rays.d, light, MIDDLE)
@@ -158,8 +108,8 @@ def of_direct_light(context: LightContext) -> FloatArray:
         w = target if distant else target - hits.p[lit]
         cosine = np.sum(w * hits.ns[lit], axis=1) / np.linalg.norm(w, axis=1)
         some = context.of(lit)
-        found[lit] += bounds(some, light, target, (value, value, cosine), 0.0)
-    return found
+        total[lit] += bounds(some, light, target, (value, value, cosine), 0.0)
+    return total
 
 
 def _feature(context: LightContext) -> FloatArray:
@@ -176,10 +126,9 @@ def cut_off(scene: Scene) -> float:
     for images.
     """
     lamps = [m for m in scene.materials.values() if isinstance(m, Emissive)]
-    found = [0.0]
-    found += [type_of(light).brightest(light) for light in scene.lights]
-    found += [1.0 if isinstance(m.radiance, str) else float(np.max(m.radiance)) for m in lamps]
-    return 1e-18 * max(found)
+    sizes = [0.0, *(type_of(light).brightest(light) for light in scene.lights)]
+    sizes += [1.0 if isinstance(m.radiance, str) else float(np.max(m.radiance)) for m in lamps]
+    return 1e-18 * max(sizes)
 
 
 def _of_leaves(context: LightContext, error: Callable[[Scene, str], float]) -> FloatArray:
@@ -198,7 +147,7 @@ def _of_critical(context: LightContext, d: FloatArray, w: FloatArray, n: FloatAr
     """
     leaves = context.tables.materials.leaves
     tables = [table for table in (leaves.rough_dielectrics, leaves.principleds) if table]
-    found = np.zeros(len(d))
+    largest = np.zeros(len(d))
     wo, wi = (v / np.linalg.norm(v, axis=1)[:, None] for v in (-d, w))
     for index in np.unique([eta for table in tables for eta in table.eta]):
         eta = np.where(np.sum(wo * n, axis=1) > 0.0, index, 1.0 / index)[:, None]
@@ -207,8 +156,8 @@ def _of_critical(context: LightContext, d: FloatArray, w: FloatArray, n: FloatAr
         with np.errstate(divide="ignore", invalid="ignore"):
             cosines = [np.abs(np.sum(v * half, axis=1)) / length for v in (wo, wi)]
             error = ROUNDED * max(index, 1.0 / index) ** 2 / np.minimum(*cosines) ** 2
-        found = np.maximum(found, np.nan_to_num(error, nan=1.0))
-    return np.minimum(found, 1.0)
+        largest = np.maximum(largest, np.nan_to_num(error, nan=1.0))
+    return np.minimum(largest, 1.0)
 
 
 def slopes_of(
@@ -231,12 +180,12 @@ def slopes_of(
     rays, hits = context.rays, context.hits
     bent = np.zeros(len(value))
     if is_steep(context.scene):
-        angle = of_stand_ins(context, "turn")
+        angle = context.off_by("turn")
         if context.tables.materials.oriented is not None:
-            angle += of_stand_ins(context, "twist")
+            angle += context.off_by("twist")
         radius = context.sizes.frame.delta(rays.o, hits.p, context.sizes.reach_of(hits.shape))
         angle += np.where(np.isfinite(context.theirs.height), radius / _feature(context), 0.0)
-        apart = of_stand_ins(context, "sag") + of_stand_ins(context, "shift") + _along(context)
+        apart = context.off_by("sag") + context.off_by("shift") + _along(context)
         others = [partial(value_of, other) for other in moved(rays, radius + apart)]
         if angle.any():
             for other in turned(rays, hits.p, TURNS * angle):
@@ -253,12 +202,3 @@ def _along(context: LightContext) -> FloatArray:
     rays, hits, sizes = context.rays, context.hits, context.sizes
     radius = sizes.frame.delta(rays.o, hits.p, sizes.reach_of(hits.shape))
     return radius * context.theirs.aspect
-
-
-def of_stand_ins(context: LightContext, field: str) -> FloatArray:
-    """(n,): a field of `StandIn`, of the meshes that stand in for the shapes that are hit; 0 for
-    other shapes."""
-    values = np.zeros(len(context.scene.shapes) + 1)
-    for shape, found in context.counterpart.stand_ins().items():
-        values[shape] = max(getattr(s, field) for s in found)
-    return np.asarray(values[context.hits.shape])

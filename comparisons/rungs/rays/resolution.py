@@ -26,25 +26,6 @@ from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
 
-# ---- the error bound of a hit point, which the bounds of all rungs follow from -------------------
-
-
-def slide(
-    sizes: ShapeSizes,
-    o: FloatArray,
-    d: FloatArray,
-    hits: Intersections,
-    sag: FloatArray | float = 0.0,
-) -> FloatArray:
-    """(n,): how far a hit may slide along its ray and its surface: `Frame.delta`, the distance by
-    which float32 moves the surface, plus `sag`, the error of a mesh that stands in for it, over
-    the ray's cosine to n."""
-    cosine = np.abs(np.sum(d * hits.n, axis=1)) / np.linalg.norm(d, axis=1)
-    with np.errstate(divide="ignore"):
-        size = sizes.frame.delta(o, hits.p, sizes.reach_of(hits.shape)) + sag
-        return np.asarray(size / cosine)
-
-
 RAYS = 2000
 """A third of the rays whose hits are the starting points."""
 
@@ -170,12 +151,12 @@ def _doubled(
     """(n,): whether rays along w hit two surfaces that float32 cannot separate: at most 2 e apart
     along the normal."""
     met = np.flatnonzero(right.shape >= 0)
-    found = np.zeros(len(w), bool)
+    doubled = np.zeros(len(w), bool)
     if len(met):
         front, along = rows_of(right, met), w[met]
         behind = query.intersect(tables, _off(sizes, front, along), along)
-        found[met] = behind.t * np.abs(np.sum(front.n * along, axis=1)) <= 2.0 * e[met]
-    return found
+        doubled[met] = behind.t * np.abs(np.sum(front.n * along, axis=1)) <= 2.0 * e[met]
+    return doubled
 
 
 def _side(hits: Intersections, w: FloatArray) -> FloatArray:
@@ -211,17 +192,17 @@ def _ways(
     random = rng.normal(size=d.shape)
     random /= np.linalg.norm(random, axis=1)[:, None]
     random *= np.where(np.sum(random * front, axis=1) < 0.0, -1.0, 1.0)[:, None]
-    found = [random]
+    ways = [random]
     lights = [light for light in scene.lights if type_of(light).has_no_extent]
     for light in lights[:MOST_LIGHTS]:
         to_light = type_of(light).towards(light, hits.p)
         length = np.linalg.norm(to_light, axis=1)[:, None]
         faces = np.sum(to_light * front, axis=1) > 0.0
-        found.append(np.where(faces[:, None], to_light / length, 0.0))
+        ways.append(np.where(faces[:, None], to_light / length, 0.0))
     through = _is_clear(scene, sizes, hits)
     if through.any():
-        found.append(np.where(through[:, None], d, 0.0))
-    return found
+        ways.append(np.where(through[:, None], d, 0.0))
+    return ways
 
 
 def _is_clear(scene: Scene, sizes: ShapeSizes, hits: Intersections) -> BoolArray:

@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from noise import LAWS, normal
 from scipy import stats
 
 from comparisons import statistics
@@ -95,9 +96,9 @@ def test_it_ends_at_the_time_limit(seconds, counts):
 
 
 def test_a_look_ends_with_whole_groups():
-    found, _ = looked(["inconclusive"], seconds=1e3, step=lambda count: group_of(count, 64))
+    found, _ = looked(["inconclusive"], seconds=1e3, most=64)
     assert found.counts[-1] == 1000  # groups of eight
-    found, _ = looked(["inconclusive"], seconds=999.0, step=lambda count: group_of(count, 64))
+    found, _ = looked(["inconclusive"], seconds=999.0, most=64)
     assert found.counts[-1] == 992
 
 
@@ -137,29 +138,6 @@ def test_how_many_are_kept():
     assert most_kept(200, 12) == 200
 
 
-# ---- laws of noise: (rng, count) -> (count, SIDE, SIDE, 3) --------------------------------------
-
-
-def normal(rng, count):
-    return 1.0 + 0.3 * rng.standard_normal((count, SIDE, SIDE, 3))
-
-
-def lognormal(rng, count):
-    return np.exp(1.5 * rng.standard_normal((count, SIDE, SIDE, 3)) - 1.125)
-
-
-def fireflies(rng, count):
-    smooth = 0.5 * rng.gamma(4.0, 0.25, (count, SIDE, SIDE, 3))
-    return smooth + (rng.random((count, SIDE, SIDE, 1)) < 1e-3) * 500.0
-
-
-def on_and_off(rng, count):
-    return (rng.random((count, SIDE, SIDE, 3)) < 0.05).astype(float)
-
-
-LAWS = {law.__name__: law for law in (normal, lognormal, fireflies, on_and_off)}
-
-
 def sequence(law, seed, limit, gain=1.0, looks=5, stop=True):
     """The statuses of looks at two sides of this noise, the candidate's times a gain; without
     `stop` all looks are taken, whatever the former ones said."""
@@ -169,8 +147,8 @@ def sequence(law, seed, limit, gain=1.0, looks=5, stop=True):
 
     def grow(count):
         while len(sides[0]) < count:
-            sides[0].append(gain * law(rng, 1)[0])
-            sides[1].append(law(rng, 1)[0])
+            sides[0].append(gain * law(rng, 1, SIDE)[0])
+            sides[1].append(law(rng, 1, SIDE)[0])
 
     def judge(level):
         found = statistics.compare(*map(np.stack, sides), limit=limit, level=level)

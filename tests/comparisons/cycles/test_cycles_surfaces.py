@@ -9,26 +9,14 @@ import reference_rt as rt
 from comparisons.cycles.surfaces import placed_arrays, triangles_of
 from comparisons.geometry import affine
 from comparisons.renderers import NoCounterpartError
+from comparisons.shapes import type_of
 from comparisons.shapes.fine import FINE
 from reference_rt.core.transform import Matrix, Rotate, Scale, Translate
+from reference_rt.scene.examples import examples
+from reference_rt.shapes import Primitive
 
-SHAPES = {
-    "sphere": rt.Sphere(center=(0.3, -0.2, 0.1), radius=0.7),
-    "rectangle": rt.Rectangle(),
-    "triangle": rt.Triangle(v0=(0, 0, 0), v1=(1, 0.2, 0), v2=(0.1, 1, 0.3)),
-    "box": rt.Box(),
-    "mesh": rt.Mesh(
-        vertices=((0, 0, 0), (1, 0, 0), (1, 1, 0.5), (0, 1, 0)),
-        faces=((0, 1, 2), (0, 2, 3)),
-        uv=((0, 0), (1, 0), (1, 1), (0, 1)),
-    ),
-    "disk": rt.Disk(),
-    "cylinder": rt.Cylinder(radius=0.5, z_min=-0.4, z_max=0.9),
-    "tube": rt.Cylinder(radius=0.5, capped=False),
-    "cone": rt.Cone(radius=0.8, height=1.3),
-    "frustum": rt.Cone(radius=0.4, height=1.1, top_radius=0.7),
-    "torus": rt.Torus(major_radius=1.0, minor_radius=0.3),
-}
+EXAMPLES = examples(Primitive)
+SHAPES = [shape for shape in EXAMPLES if type_of(shape).to_cycles is not None]
 
 MAPS = {
     "none": (),
@@ -42,9 +30,9 @@ OFF = 4.0 * (1.0 - np.cos(np.pi / FINE))
 
 
 @pytest.mark.parametrize("steps", MAPS)
-@pytest.mark.parametrize("name", SHAPES)
-def test_rays_hit_ours_where_the_triangles_are(name, steps):
-    shape = SHAPES[name].model_copy(update={"transform": MAPS[steps]})
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.type)
+def test_rays_hit_ours_where_the_triangles_are(shape, steps):
+    shape = shape.model_copy(update={"transform": MAPS[steps]})
     surface = triangles_of(shape, Path())
     m = affine.of_steps(shape.transform)
     placed = placed_arrays(surface, m)
@@ -72,27 +60,28 @@ def test_rays_hit_ours_where_the_triangles_are(name, steps):
 
 
 @pytest.mark.parametrize(
-    ("name", "volume"),
+    ("shape", "volume"),
     [
-        ("sphere", 4.0 / 3.0 * np.pi * 0.7**3),
-        ("box", 8.0),
-        ("cylinder", np.pi * 0.25 * 1.3),
-        ("cone", np.pi * 0.64 * 1.3 / 3.0),
-        ("frustum", np.pi * 1.1 / 3.0 * (0.16 + 0.28 + 0.49)),
-        ("torus", 2.0 * np.pi**2 * 0.09),
+        (rt.Sphere(center=(0.3, -0.2, 0.1), radius=0.7), 4.0 / 3.0 * np.pi * 0.7**3),
+        (rt.Box(), 8.0),
+        (rt.Cylinder(radius=0.5, z_min=-0.4, z_max=0.9), np.pi * 0.25 * 1.3),
+        (rt.Cone(radius=0.8, height=1.3), np.pi * 0.64 * 1.3 / 3.0),
+        (
+            rt.Cone(radius=0.4, height=1.1, top_radius=0.7),
+            np.pi * 1.1 / 3.0 * (0.16 + 0.28 + 0.49),
+        ),
+        (rt.Torus(major_radius=1.0, minor_radius=0.3), 2.0 * np.pi**2 * 0.09),
     ],
 )
-def test_volumes(name, volume):
+def test_volumes(shape, volume):
     """By the divergence theorem: no triangle is missing, doubled or turned."""
-    surface = triangles_of(SHAPES[name], Path())
+    surface = triangles_of(shape, Path())
     a, b, c = (surface.positions[surface.faces[:, k]] for k in range(3))
     found = np.sum(a * np.cross(b, c)) / 6.0
     assert found == pytest.approx(volume, rel=3.0 * OFF)
 
 
-@pytest.mark.parametrize(
-    "shape", [rt.Plane(), rt.Quadric(coefficients=(1,) * 10, lower=(-1,) * 3, upper=(1,) * 3)]
-)
+@pytest.mark.parametrize("shape", [shape for shape in EXAMPLES if shape not in SHAPES])
 def test_others_do_not_vote(shape):
     with pytest.raises(NoCounterpartError, match=shape.type):
         triangles_of(shape, Path())

@@ -10,6 +10,7 @@ from comparisons.gate import edges
 from comparisons.gate.edges import RULES, Edges, edges_rung, look_at
 from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture
+from comparisons.gate.question import Question
 from comparisons.gate.reference import of_scene
 from comparisons.report.biases import biases_of
 from comparisons.results.case import RungResult
@@ -271,12 +272,12 @@ def test_a_scene_through_the_gate() -> None:
     np.testing.assert_array_equal(look(at)[0], reference.pictures[0])
 
     several = np.mean([look(at + s / 16.0)[0] for s in RULES["2 x 2 samples"]], axis=0)
-    case = gate_pictures([Picture(several)], reference, edges=Edges(look))
+    case = gate_pictures([Picture(several)], reference, Question(edges=Edges(look)))
     assert case.verdict == "agree", case.reason  # shading is no plane in a pixel
 
     def gated(shift: float, rim: int = 0):  # type: ignore[no-untyped-def]
         moved = look(at + np.array([shift, 0.0]))[0].astype(np.float32).astype(np.float64)
-        return gate_pictures([Picture(moved)], reference, edges=Edges(look), rim=rim)
+        return gate_pictures([Picture(moved)], reference, Question(edges=Edges(look), rim=rim))
 
     for rim in (0, 3):
         case = gated(0.04, rim)  # within what a rasteriser's grid of vertices may move
@@ -297,7 +298,7 @@ def test_a_dithered_picture_of_a_scene() -> None:
     noise = np.random.default_rng(1).uniform(-0.5, 0.5, (30, 40, 3))
     codes = np.clip(np.round(255.0 * srgb(np.clip(reference.pictures[0], 0, 1)) + noise), 0, 255)
     shown = Picture(linear(codes / 255.0), quantised=True, displayed=True)
-    case = gate_pictures([shown], reference, edges=Edges(look))
+    case = gate_pictures([shown], reference, Question(edges=Edges(look)))
     assert case.verdict == "agree", case.reason
 
 

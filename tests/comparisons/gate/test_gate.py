@@ -10,7 +10,7 @@ from command_line import invoke
 from gate_checks import SCENE, files, pictures, run, status, write
 from junitparser import JUnitXml
 
-from comparisons.gate import reference
+from comparisons.gate import reference_cache
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.image import srgb, write_png
 from reference_rt.rendering.render import render
@@ -41,7 +41,7 @@ def test_right_pictures_pass(right: FloatArray, monkeypatch: pytest.MonkeyPatch)
     def refuse(*arguments: object, **more: object) -> None:
         raise AssertionError("the reference is in the cache")
 
-    monkeypatch.setattr(reference, "render", refuse)
+    monkeypatch.setattr(reference_cache, "render", refuse)
     assert run(*files(right), "--scene", "ball.yaml")[0].exit_code == 0
 
 

@@ -10,7 +10,8 @@ from picture_writers import exr, hdr, rgbe
 from PIL import Image
 
 import comparisons
-from comparisons.gate.gate import _is_dithered, gate_pictures
+from comparisons.gate.displayed import _is_dithered
+from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import (
     Picture,
     from_array,

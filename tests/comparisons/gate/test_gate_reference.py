@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from gate_checks import BALL
 
-from comparisons.gate import reference
+from comparisons.gate import reference, reference_cache
 from comparisons.gate.pictures_in import from_array
-from comparisons.gate.reference import is_noise_free, of_files, of_scene, relative_error
+from comparisons.gate.reference import is_noise_free, of_files, of_scene
+from comparisons.gate.reference_cache import relative_error
 from reference_rt.core.exr import write_exr
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ImageError, UsageError
@@ -28,7 +29,7 @@ LIMIT = 0.01
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Of references only: kernels have theirs already."""
     folder = tmp_path / "references"
-    monkeypatch.setattr(reference, "cache_folder", lambda: folder)
+    monkeypatch.setattr(reference_cache, "cache_folder", lambda: folder)
     monkeypatch.setattr(reference, "_ROUND", 1 << 10)
     return folder
 
@@ -37,8 +38,8 @@ class Renderings:
     """Counts calls of `render`."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.count, self._render = 0, reference.render
-        monkeypatch.setattr(reference, "render", self)
+        self.count, self._render = 0, reference_cache.render
+        monkeypatch.setattr(reference_cache, "render", self)
 
     def __call__(self, *arguments: object, **more: object) -> object:
         self.count += 1
@@ -88,7 +89,7 @@ def test_another_scene_is_another_reference(monkeypatch: pytest.MonkeyPatch) -> 
     once = calls.count
     of_scene(Scene.parse(SCENE.replace("0.5}", "0.6}")), LIMIT)
     assert calls.count > once
-    monkeypatch.setattr(reference, "source_digest", lambda: "another source")
+    monkeypatch.setattr(reference_cache, "source_digest", lambda: "another source")
     twice = calls.count
     of_scene(Scene.parse(SCENE), LIMIT)
     assert calls.count > twice
@@ -123,7 +124,7 @@ def test_work_has_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.slow
 def test_the_cache_forgets(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reference, "_KEPT", 1)
+    monkeypatch.setattr(reference_cache, "_KEPT", 1)
     for radius in ("1", "2"):
         of_scene(Scene.parse(SCENE.replace("radius: 1", f"radius: {radius}")), LIMIT)
     assert len(list(cache.iterdir())) == 1
@@ -187,22 +188,22 @@ def test_what_was_cut_off_continues(
     for file in cache.iterdir():
         file.unlink()
     calls = Renderings(monkeypatch)
-    counted, save = reference.render, reference._save
+    counted, save = reference_cache.render, reference_cache._save
     if how == "killed":
-        monkeypatch.setattr(reference, "_SAVED_EACH", 0.0)
+        monkeypatch.setattr(reference_cache, "_SAVED_EACH", 0.0)
 
     def cut_off(*arguments: object, **more: object) -> object:
         if calls.count == at:
             if how == "killed":
-                monkeypatch.setattr(reference, "_save", lambda *kept: None)
+                monkeypatch.setattr(reference_cache, "_save", lambda *kept: None)
             raise CutOffError
         return counted(*arguments, **more)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(reference, "render", cut_off)
+    monkeypatch.setattr(reference_cache, "render", cut_off)
     with pytest.raises(CutOffError):
         of_scene(scene, LIMIT)
-    monkeypatch.setattr(reference, "render", counted)
-    monkeypatch.setattr(reference, "_save", save)
+    monkeypatch.setattr(reference_cache, "render", counted)
+    monkeypatch.setattr(reference_cache, "_save", save)
     assert calls.count == at
     np.testing.assert_array_equal(of_scene(scene, LIMIT).pictures, whole.pictures)
     rendered = calls.count

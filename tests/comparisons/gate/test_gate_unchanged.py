@@ -11,9 +11,10 @@ from gate_checks import files, run, status
 from junitparser import JUnitXml
 
 from comparisons.gate.baselines import MOST_KEPT
-from comparisons.gate.digest import Copies, fingerprint
+from comparisons.gate.copies import Copies, fingerprint
 from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture
+from comparisons.gate.question import Question
 from comparisons.gate.reference import of_files
 from comparisons.results.files import sealed
 from reference_rt.core.arrays import FloatArray
@@ -160,7 +161,7 @@ def test_invalid_does_not_hide_a_bias(fault: str, gain: float) -> None:
     else:
         pictures[1] = 0.1 * pictures[1] + 0.9 * pictures[2]
     reference = of_files([Picture(p) for p in noisy(8, 2)], None, False)
-    case = gate_pictures([Picture(p) for p in pictures], reference, limit=0.02)
+    case = gate_pictures([Picture(p) for p in pictures], reference, Question(limit=0.02))
     assert case.verdict == "invalid"
     assert case.reason.startswith("input: ")
     assert ("; besides, statistics: the image mean differs: " in case.reason) == (gain > 1.0)

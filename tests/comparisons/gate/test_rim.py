@@ -5,6 +5,7 @@ import pytest
 
 from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture
+from comparisons.gate.question import Question
 from comparisons.gate.reference import Reference
 from comparisons.gate.rim import without_rim, without_rim_later
 from comparisons.results.case import FloatArray
@@ -36,7 +37,7 @@ def test_a_rim_by_another_convention_is_named_and_can_be_left_out() -> None:
     assert "within 3 px of the border" in case.cause.evidence
     assert "--rim" in case.cause.evidence
     for rim, verdict in ((2, "differ"), (3, "agree"), (5, "agree")):
-        case = gate_pictures(candidates(0.8), reference, rim=rim)
+        case = gate_pictures(candidates(0.8), reference, Question(rim=rim))
         assert case.verdict == verdict, case.reason
         assert any(f"outermost {rim} pixels on each side are left out" in n for n in case.notes)
     assert gate_pictures(candidates(1.0), reference).verdict == "agree"
@@ -62,4 +63,4 @@ def test_all_that_has_pixels_is_cropped() -> None:
 @pytest.mark.parametrize("rim", [-1, 24, 100])
 def test_a_rim_that_leaves_nothing(rim: int) -> None:
     with pytest.raises(UsageError, match="less than half of the shorter side"):
-        gate_pictures(candidates(1.0), Reference(noisy(0, 16)), rim=rim)
+        gate_pictures(candidates(1.0), Reference(noisy(0, 16)), Question(rim=rim))

@@ -10,7 +10,6 @@ import pytest
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import trace
 from comparisons.mitsuba.scene import render
-from comparisons.rungs import geometry
 from comparisons.translator import UntranslatableError, load, to_mitsuba
 from reference_rt.cameras.camera import Camera
 from reference_rt.cameras.film import Film
@@ -19,77 +18,9 @@ from reference_rt.lights import Constant, Point
 from reference_rt.materials import Emissive, Mirror
 from reference_rt.materials.material import Material
 from reference_rt.rendering.scene import Scene
-from reference_rt.scene.build import build_tables
 from reference_rt.shapes import Mesh, Sphere
 from reference_rt.shapes.shape import Shape
 from reference_rt.util.errors import SceneError
-
-ALL_SHAPES = """
-camera: {type: perspective, eye: [0.4, 1, 6], target: [0, 0, 0], fov: 50}
-film: {width: 40, height: 30}
-shapes:
-  - {type: sphere, center: [-2, 1, 0.3], radius: 0.5,
-     transform: [{rotate: {axis: [1, 2, 3], degrees: 50}}]}
-  - {type: sphere, center: [0, 1, 0], radius: 0.3,
-     transform: [{matrix: [[-2, 0, 0, 0], [0, 2, 0, -0.8], [0, 0, 2, 0]]}]}
-  - {type: rectangle,
-     transform: [{rotate: {axis: [1, 0.2, 0], degrees: -60}}, {translate: [2, 1, 0]}]}
-  - {type: rectangle, transform: [{matrix: [[0.9, 0.4, 0, -2], [0, 0.7, 0, -1], [0, 0.2, -1, 0]]}]}
-  - {type: box,
-     transform: [{scale: [0.3, 0.5, 0.2]}, {rotate: {axis: [1, 1, 0], degrees: 40}},
-       {translate: [0, -1, 0]}]}
-  - {type: box, transform: [{matrix: [[0.3, 0.1, 0, 1.5], [0, -0.4, 0.1, -1.2], [0, 0, 0.3, 1]]}]}
-  - {type: triangle, v0: [1, 0, 2], v1: [2, 0.3, 2], v2: [1.2, 1, 1.5]}
-  - {type: triangle, v0: [-1, 0, 2], v1: [-1.8, 0.3, 2], v2: [-1.2, 1, 1.5],
-     transform: [{scale: [-1, 1, 1]}, {translate: [-2.4, 0, 0]}]}
-  - {type: mesh, file: roof.obj, transform: [{scale: [1, -1, 1]}, {translate: [0, 0.9, 1.5]}]}
-  - {type: mesh, file: roof.obj, face_normals: true, transform: [{translate: [0, -2.2, 1]}]}
-  - {type: mesh, file: bare.obj, transform: [{translate: [1, -0.7, 2]}]}
-"""
-
-ROOF = """
-v -0.7 0 0
-v 0.7 0 0
-v 0.7 0.5 -0.4
-v -0.7 0.5 -0.4
-vn 0 -0.5 1
-vn 0.3 0 1
-vn 0 0.6 1
-vn -0.2 0.1 1
-f 1//1 2//2 3//3
-f 1//1 3//3 4//4
-"""
-
-BARE = """
-v -0.4 -0.2 0
-v 0.4 -0.2 0
-v 0 0.3 0.2
-v 0 0 -0.5
-f 1 2 3
-f 1 4 2
-f 2 4 3
-f 3 4 1
-"""
-
-
-@pytest.fixture(scope="module")
-def all_shapes(tmp_path_factory: pytest.TempPathFactory) -> Scene:
-    folder = tmp_path_factory.mktemp("meshes")
-    (folder / "roof.obj").write_text(ROOF)
-    (folder / "bare.obj").write_text(BARE)
-    return Scene.parse(ALL_SHAPES, folder=folder)
-
-
-def test_every_shape_is_where_ours_is(all_shapes: Scene) -> None:
-    counterpart = load(all_shapes)
-    rung = geometry(all_shapes, build_tables(all_shapes), counterpart, pixels=4_000)
-    assert rung.status == "agree", rung.reason
-    # The outcome says something about a shape only where rays met it.
-    rng = np.random.default_rng(1)
-    o = rng.uniform(-4.0, 4.0, (20_000, 3))
-    d = rng.uniform(-2.0, 2.0, (20_000, 3)) - o
-    seen = np.unique(trace(counterpart, o, d).shape)
-    assert seen.tolist() == list(range(-1, len(all_shapes.shapes)))
 
 
 def test_shapes_keep_their_index_beyond_ten() -> None:

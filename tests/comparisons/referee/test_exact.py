@@ -8,13 +8,16 @@ import pytest
 from comparisons.geometry.exact.dyadic import NEVER, Dyadic, dot, nearest, quotient, roots, tied
 from comparisons.referee import all_hits, columns_of, first_hit
 from comparisons.referee.sizes import LeafSizes, ShapeSizes
+from comparisons.shapes import type_of
+from reference_rt.core.transform import Rotate, Scale, Turn
 from reference_rt.rendering.scene import Scene
+from reference_rt.scene.examples import examples
+from reference_rt.shapes import Mesh, Primitive, Shape
 
-ODD = ["rotate: {axis: [1, 2, 3], degrees: 40}", "scale: [1, 0.7, 1.2]"]
-TURN = "transform: [" + ", ".join(f"{{{step}}}" for step in ODD) + "]"
 
-
-def leaf(shape: str) -> LeafSizes:
+def leaf(shape: str | Shape) -> LeafSizes:
+    if not isinstance(shape, str):
+        return ShapeSizes(Scene(shapes=(shape,))).leaves[0]
     return ShapeSizes(Scene.parse(f"shapes:\n  - {shape}\n")).leaves[0]
 
 
@@ -158,31 +161,21 @@ def test_fill_rules(fill: str, middle: bool) -> None:
     assert np.isfinite(t).tolist() == [middle, True, False]
 
 
-KINDS = (
-    "{type: sphere, radius: 0.8}",
-    f"{{type: sphere, radius: 0.8, {TURN}}}",
-    f"{{type: rectangle, {TURN}}}",
-    f"{{type: disk, {TURN}}}",
-    f"{{type: box, {TURN}}}",
-    f"{{type: plane, {TURN}}}",
-    "{type: triangle, v0: [0, 0, 0], v1: [1, 0.2, 0.1], v2: [0.3, 1, 0.2]}",
-    f"{{type: polygon, rings: [{STAR}], {TURN}}}",
-    f"{{type: cylinder, {TURN}}}",
-    f"{{type: cylinder, capped: false, {TURN}}}",
-    f"{{type: cone, top_radius: 0.3, {TURN}}}",
-    f"{{type: torus, {TURN}}}",
-    "{type: quadric, coefficients: [1, 1, -1, 0.3, 0.2, 0, 0, 0, 0.1, 0.1], capped: true,"
-    f" lower: [-1, -1, -1], upper: [1, 1, 0.8], {TURN}}}",
-    "{type: quadric, coefficients: [1, -1, 0, 0, 0, 0, 0, 0, -1, 0.1],"
-    f" lower: [-1, -1, -1], upper: [1, 1, 0.8], {TURN}}}",
-)
+SHAPES = [
+    shape.model_copy(update={"transform": tuple(steps)})
+    for shape in examples(Primitive)
+    if not isinstance(shape, Mesh)
+    for steps in ([], [Rotate(rotate=Turn(axis=(1, 2, 3), degrees=40)), Scale(scale=(1, 0.7, 1.2))])
+]
 
 
-@pytest.mark.parametrize("shape", KINDS)
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.type)
 @pytest.mark.parametrize(
     "rays", [150, pytest.param(100_000, marks=pytest.mark.slow)], ids=["few", "1e5"]
 )
-def test_crossings_alternate_and_do_not_depend_on_where_a_ray_begins(shape: str, rays: int) -> None:
+def test_crossings_alternate_and_do_not_depend_on_where_a_ray_begins(
+    shape: Shape, rays: int
+) -> None:
     """Of a solid a line enters as often as it leaves, in turns; a ray that begins further along
     finds the same crossings, exactly that much earlier."""
     found = leaf(shape)
@@ -198,17 +191,14 @@ def test_crossings_alternate_and_do_not_depend_on_where_a_ray_begins(shape: str,
     assert tied(hits.t, moved)[there].all()
     np.testing.assert_array_equal(hits.enters[there], later.enters[there])
     np.testing.assert_array_equal(hits.code[there], later.code[there])
-    whole = found.field in ("spheres", "boxes", "tori") or (
-        found.field == "quadrics" and bool(found.table.capped[0])
-    )
-    if whole:
+    if type_of(shape).encloses(shape) and found.is_finite:
         assert (there.sum(axis=1) % 2 == 0)[~hits.touching].all()
         turns = np.arange(there.shape[1]) % 2 == 0
         assert (hits.enters == turns)[there].all()
 
 
-@pytest.mark.parametrize("shape", KINDS)
-def test_scales_do_not_matter(shape: str) -> None:
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.type)
+def test_scales_do_not_matter(shape: Shape) -> None:
     """A power of two of everything leaves t as it is, and of the direction alone divides it."""
     found = leaf(shape)
     row = dict(columns_of(found.table))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from report_page import NASTY, PROVENANCE, Page, case, noise
 
-from comparisons.compare.one_scene import NotebookCase
+from comparisons.compare.notebook import NotebookCase
 from comparisons.report import write_report
 from comparisons.report.biases import biases_of
 from comparisons.report.pictures_data import unpack

@@ -2,7 +2,7 @@
 
 import pytest
 
-from comparisons.results.files import named
+from comparisons.results.naming import named
 
 OURS = ("ours", "Mitsuba's")
 

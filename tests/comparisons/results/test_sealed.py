@@ -8,7 +8,7 @@ from test_stored_case import case
 
 from comparisons.experiments.convergence import store as convergence_reference
 from comparisons.experiments.convergence.store import Rung, Store
-from comparisons.gate import reference as gate_reference
+from comparisons.gate import reference_cache as gate_reference
 from comparisons.results.files import sealed, unsealed
 from comparisons.results.stored_case import StoredCaseError, read_case, write_case
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from comparisons.rungs import grating
 from comparisons.rungs.film import film
 from reference_rt.cameras.film import (
     CatmullRomFilter,
@@ -93,7 +94,7 @@ def blurred(x: Any) -> Any:
 def test_gratings_show_faults_of_pictures(
     name: str, layer: str, change: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(RUNG, "render", faulty(layer, change))
+    monkeypatch.setattr(grating, "render", faulty(layer, change))
     found = film(FILTERS[name], FILTERS[name])
     assert found.status == "differ"
     assert "grating" in found.reason

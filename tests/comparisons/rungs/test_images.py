@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from noise import as_wholes as judged
 from scipy import ndimage
 
 from comparisons.results.case import FloatArray, Images, RungResult
@@ -27,11 +28,6 @@ def picture() -> FloatArray:
     image = np.ones((48, 64, 3)) * (0.5 + 0.3 * np.sin(9.0 * x * y))[..., None]
     image[:, 32:] *= 0.3
     return image
-
-
-def judged(candidate: FloatArray, reference: FloatArray) -> RungResult:
-    pair = Images(candidate.mean(axis=0), reference.mean(axis=0))
-    return images_rung(pair, image_metrics(pair), (candidate, reference))
 
 
 def judged_alone(candidate: FloatArray, reference: FloatArray) -> RungResult:

@@ -11,7 +11,8 @@ from comparisons.mitsuba.counterpart import trace
 from comparisons.referee.referee import Referee
 from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs import geometry
-from comparisons.rungs.geometry import MOST_JUDGED, aimed_rays, judged
+from comparisons.rungs.rays.aimed import aimed_rays
+from comparisons.rungs.rays.judgement import MOST_JUDGED, judged
 from comparisons.rungs.rays.rays import Rays, mixed_rays
 from comparisons.translator import load
 from reference_rt.rendering import query

@@ -10,7 +10,8 @@ from builders import SCENES
 
 from comparisons.mitsuba.backend import scalar
 from comparisons.rungs import layers
-from comparisons.rungs.layers import rung
+from comparisons.rungs.layers.means import LIMIT, compare_means
+from comparisons.rungs.layers.variance import compare_spread
 from comparisons.translator import load
 from reference_rt.cameras.film import BoxFilter, Film, MitchellFilter
 from reference_rt.integrators import RayCast
@@ -84,7 +85,7 @@ def changed_by(monkeypatch: pytest.MonkeyPatch, name: str, change: Callable[[Any
             picture.layers[name] = change(picture.layers[name])
         return picture
 
-    monkeypatch.setattr(rung, "render", faulty)
+    monkeypatch.setattr("comparisons.rungs.layers.rung.render", faulty)
 
 
 FAULTS: dict[str, tuple[str, Callable[[Any], Any]]] = {
@@ -175,7 +176,7 @@ def heavy_tailed(rng: np.random.Generator, shape: tuple[int, ...], n: int) -> An
 def test_means_of_one_distribution_agree(seed: int) -> None:
     rng = np.random.default_rng(seed)
     halves = [heavy_tailed(rng, (24, 32, 3), 64) for _ in range(4)]
-    assert rung.compare_means((halves[0], halves[1]), (halves[2], halves[3])).score < rung.LIMIT
+    assert compare_means((halves[0], halves[1]), (halves[2], halves[3])).score < LIMIT
 
 
 @pytest.mark.slow
@@ -195,8 +196,8 @@ def test_false_alarms_of_means(kind: str) -> None:
             (least + (rng.uniform(size=share.shape) < 64 * share - least)) / 64 * colour
             for _ in range(2)
         ]
-        worst = max(worst, rung.compare_means((ours[0], ours[1]), (theirs[0], theirs[1])).score)
-    assert worst < rung.LIMIT
+        worst = max(worst, compare_means((ours[0], ours[1]), (theirs[0], theirs[1])).score)
+    assert worst < LIMIT
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -206,7 +207,7 @@ def test_variance_of_heavy_tails(seed: int, factor: float) -> None:
     samples = rng.lognormal(0.0, 1.0, (16, 8, 32, 48, 3))
     pictures = samples.mean(axis=1)
     estimates = factor * samples.var(axis=1, ddof=1) / 8
-    found = rung.compare_spread(pictures, estimates)
+    found = compare_spread(pictures, estimates)
     assert found.differs(upper=False) == (factor != 1.0)
     assert found.differs(upper=True) == (factor < 1.0)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from comparisons.rungs.whitted import is_mixture
+from comparisons.rungs.rays.neighbours import is_mixture
 
 RNG = np.random.default_rng(5)
 

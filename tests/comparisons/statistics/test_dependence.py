@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from noise import fireflies, lognormal, normal
 from renderers_that_share import RENDERERS
 from scipy import stats
 
@@ -14,19 +15,6 @@ from comparisons.statistics import compare
 from comparisons.statistics.order import ORDER_LEVEL, successive
 
 Law = Callable[[np.random.Generator, int, int], FloatArray]
-
-
-def normal(rng: np.random.Generator, count: int, side: int) -> FloatArray:
-    return 1.0 + 0.3 * rng.standard_normal((count, side, side, 3))
-
-
-def lognormal(rng: np.random.Generator, count: int, side: int) -> FloatArray:
-    return np.exp(2.0 * rng.standard_normal((count, side, side, 3)) - 2.0)
-
-
-def fireflies(rng: np.random.Generator, count: int, side: int) -> FloatArray:
-    smooth = 0.5 * rng.gamma(4.0, 0.25, (count, side, side, 3))
-    return smooth + (rng.random((count, side, side, 1)) < 1e-3) * 50.0
 
 
 def lit_corner(rng: np.random.Generator, count: int, side: int) -> FloatArray:

@@ -7,10 +7,10 @@ from scipy import stats
 
 from comparisons.results.case import FloatArray
 from comparisons.statistics import Margins, compare
+from comparisons.statistics.scales import LINES, MODES, ORDERS, Pair
 from comparisons.statistics.sides import side_of
-from comparisons.statistics.welch import ORDERS, line_test, mode_test, named_line, named_mode
 
-HEIGHT, WIDTH = 48, 64
+SHAPE = HEIGHT, WIDTH = 48, 64
 
 
 def scene() -> FloatArray:
@@ -58,7 +58,10 @@ def test_an_edge_that_moves_by_a_fortieth_of_a_pixel_is_no_difference() -> None:
         noisy = np.random.default_rng(axis).gamma(1e4, 1e-4, (2, 16, HEIGHT, WIDTH, 3))
         a, b = side_of(moved * noisy[0]), side_of(mean * noisy[1])
         where = 20 if axis == 0 else HEIGHT + 20
-        found, strict = line_test(a, b, Margins()), line_test(a, b, Margins(pixel=0.0))
+        found, strict = (
+            LINES.test(Pair(a, b, margins), LINES.level)
+            for margins in (Margins(), Margins(pixel=0.0))
+        )
         assert not found.differs[where].any()
         assert strict.differs[where].all()
 
@@ -77,7 +80,7 @@ def test_a_vignette_that_keeps_the_mean(amount: float, noise: float) -> None:
 def test_each_mode_is_found_and_named() -> None:
     sides = [side_of(scene() * np.random.default_rng(k).gamma(1e4, 1e-4, (8, HEIGHT, WIDTH, 1)))
              for k in (1, 2)]  # fmt: skip
-    assert mode_test(*sides, Margins()).differs.sum() == 0
+    assert MODES.test(Pair(*sides, Margins()), MODES.level).differs.sum() == 0
     waves = [
         np.outer(
             np.cos(np.pi * y * (np.arange(HEIGHT) + 0.5) / HEIGHT),
@@ -87,7 +90,7 @@ def test_each_mode_is_found_and_named() -> None:
     ]
     for index, wave in enumerate(waves):
         changed = side_of(sides[0].pictures + 0.01 * scene().mean() * wave[..., None])
-        found = mode_test(changed, sides[1], Margins())
+        found = MODES.test(Pair(changed, sides[1], Margins()), MODES.level)
         assert found.worst[0] == index
         expected = 0.01 * np.sqrt((wave**2).mean())
         np.testing.assert_allclose(found.difference[index] / scene().mean(), expected, rtol=0.1)
@@ -95,9 +98,10 @@ def test_each_mode_is_found_and_named() -> None:
         round_too = [index, len(ORDERS)] if index in (2, 4) else [index]
         assert not np.delete(found.differs, round_too, axis=0).any()
     changed = side_of(sides[0].pictures + 0.01 * scene().mean() * (waves[2] + waves[4])[..., None])
-    assert mode_test(changed, sides[1], Margins()).worst[0] == len(ORDERS)
-    assert named_mode(3) == "half a wave along x and half a wave along y"
-    assert (named_line(5, HEIGHT), named_line(HEIGHT + 5, HEIGHT)) == ("row 5", "column 5")
+    assert MODES.test(Pair(changed, sides[1], Margins()), MODES.level).worst[0] == len(ORDERS)
+    assert MODES.place((3,), SHAPE, 16).words == "half a wave along x and half a wave along y"
+    lines = [LINES.place((k,), SHAPE, 16).words for k in (5, HEIGHT + 5)]
+    assert lines == ["row 5", "column 5"]
 
 
 def alarms(law: str, cases: int, counts: tuple[int, int] = (8, 16)) -> int:
@@ -105,7 +109,10 @@ def alarms(law: str, cases: int, counts: tuple[int, int] = (8, 16)) -> int:
     for seed in range(cases):
         rng = np.random.default_rng([seed, *counts, 5])
         sides = [side_of(RENDERERS[law](rng, count, 32)) for count in counts]
-        found += any(test(*sides, Margins()).differs.any() for test in (line_test, mode_test))
+        found += any(
+            scale.test(Pair(*sides, Margins()), scale.level).differs.any()
+            for scale in (LINES, MODES)
+        )
     return found
 
 

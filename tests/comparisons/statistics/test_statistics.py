@@ -77,7 +77,9 @@ def test_agreement_needs_an_interval_within_the_limit():
     off = replace(image, difference=only_green * (0.00505 * image.scale - image.half_width))
     assert not off.differs.any()
     assert _decide(found, 0.005, "")[0] == "agree"
-    status, reason = _decide(replace(found, image=off), 0.005, "it takes about twice")
+    status, reason = _decide(
+        replace(found, tests=found.tests | {"image": off}), 0.005, "it takes about twice"
+    )
     assert status == "inconclusive"
     assert ", not within ±0.5 %; it takes about" in reason
 
@@ -179,7 +181,7 @@ def test_no_noise_by_chance_beside_noise_is_no_proof():
     rng = np.random.default_rng(0)
     a, b = rng.integers(0, 2, (2, 4, 32, 32, 3)).astype(float)
     a[:, 9, 9], b[:, 9, 9] = 1.0, 0.0
-    assert not findings(a, b, 16, MARGINS).pixels.differs.any()
+    assert not findings(a, b, 16, MARGINS).tests["pixels"].differs.any()
 
 
 # What is said where there is nothing to compare

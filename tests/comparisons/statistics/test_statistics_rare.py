@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
+from noise import as_wholes, known
 from planted import HEIGHT, MARGINS, WIDTH, scene
 from scipy import stats
 
 from comparisons.compare.judge import Evidence, judge, of_replicates
-from comparisons.results.case import FloatArray, Images
-from comparisons.rungs.images import images_rung
-from comparisons.statistics import Known, compare
+from comparisons.results.case import FloatArray
+from comparisons.statistics import compare
 from comparisons.statistics.decide import findings
-from comparisons.statistics.metrics import image_metrics
 from comparisons.statistics.rare import around, share_unmet
 from comparisons.statistics.sides import met_once, side_of
 from comparisons.statistics.unseen import unseen, worse
@@ -90,12 +89,11 @@ def test_a_lamp_that_is_seen_does_not_make_events_of_its_light_small():
 def test_a_known_mean_with_a_lamp_found_by_scattered_rays_alone():
     rng = np.random.default_rng(0)
     many = sampled_light(rng, 64)
-    known = Known(many.mean(axis=0), many.var(axis=0, ddof=1) / 64)
     for event in EVENTS:
-        found = findings(rare_light(rng, 16, event), known, 16, MARGINS)
+        found = findings(rare_light(rng, 16, event), known(many), 16, MARGINS)
         assert not found.image.differs.any()
-        assert not found.tiles.differs.any()
-        assert not found.pixels.differs.any()
+        assert not found.tests["tiles"].differs.any()
+        assert not found.tests["pixels"].differs.any()
 
 
 # What it costs
@@ -108,7 +106,7 @@ def test_a_wrong_pixel_is_found_amid_rare_light(factor):
         rng = np.random.default_rng(seed)
         a, b = rare_light(rng, 16, 3.0), rare_light(rng, 16, 3.0)
         a[:, 4, 20] *= factor
-        assert findings(a, b, 16, MARGINS).pixels.differs[4, 20].any()
+        assert findings(a, b, 16, MARGINS).tests["pixels"].differs[4, 20].any()
 
 
 @pytest.mark.parametrize("change", [0.9, 1.1])
@@ -120,7 +118,7 @@ def test_a_wrong_tile_is_found_amid_rare_light(change):
         for side in (a, b):
             side[:, 32:] += 2.0 * (rng.random((16, 16, SIDE, 1)) < 1e-3)
         a[:, :16, :16] *= change
-        assert findings(a, b, 16, MARGINS).tiles.differs[0, 0].any()
+        assert findings(a, b, 16, MARGINS).tests["tiles"].differs[0, 0].any()
 
 
 def test_noise_without_rare_light_loses_no_power():
@@ -128,7 +126,7 @@ def test_noise_without_rare_light_loses_no_power():
     rng = np.random.default_rng(0)
     a, b = 1.0 + 0.3 * rng.standard_normal((2, 16, 48, 48, 3))
     found = findings(a, b, 16, MARGINS)
-    for test, margin in ((found.image, 0.001), (found.tiles, 0.01)):
+    for test, margin in ((found.image, 0.001), (found.tests["tiles"], 0.01)):
         ordinary = max(float(error.value.max()) for error in test.errors[:2])
         dof = [np.minimum(error.dof, 1000).astype(int).min() for error in test.errors[:2]]
         reach = float((test.detectable - margin * test.scale).max())
@@ -236,7 +234,7 @@ def test_sizes_of_tiles_and_pixels_are_stated():
     assert "; of a pixel it is " in result.reason
     for scale, bias in (("tiles", 0.011), ("pixels", 0.05)):
         found = findings(a, b, 16, MARGINS)
-        test = getattr(found, scale)
+        test = found.tests[scale]
         assert numbers[scale]["median_detectable_bias"] > bias
         largest = test.over_scale(test.detectable).max()
         assert numbers[scale]["largest_detectable_bias"] == pytest.approx(largest)
@@ -263,8 +261,7 @@ def test_rare_light_of_uneven_brightness_does_not_differ(chance: float, runs: in
         rng = np.random.default_rng([seed, 7])
         sides = uneven(rng, 8, chance), scene() * (1.0 + 0.01 * rng.standard_normal((16, 1, 1, 1)))
         alarms += compare(*sides).status != "inconclusive"
-        means = Images(*(side.mean(axis=0) for side in sides))
-        found = images_rung(means, image_metrics(means), sides)
+        found = as_wholes(*sides)
         assert found.status == "agree", found.reason
     assert alarms <= stats.binom.isf(0.02, runs, 1e-3)
 

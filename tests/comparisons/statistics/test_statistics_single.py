@@ -5,15 +5,15 @@ import math
 
 import numpy as np
 import pytest
+from noise import as_wholes, known
 from planted import FAULTS, MARGINS, STILL, replicates, scene
 from scipy import ndimage
 
+from comparisons.compare.judge import of_replicates
 from comparisons.results.case import Images
-from comparisons.rungs.images import images_rung
 from comparisons.statistics import Known, compare, standard_error
 from comparisons.statistics.decide import findings
 from comparisons.statistics.metric_null import noise_alone
-from comparisons.statistics.metrics import image_metrics
 
 
 def test_a_single_picture_says_what_it_presumes():
@@ -59,7 +59,7 @@ def test_standard_error_of_a_tile_knows_of_noise_that_blocks_share():
     for _ in range(40):
         a, b = rng.standard_normal((2, 1, 64, 64, 3))
         a = sum(np.roll(a, shift, axis=2) for shift in range(4)) / 4.0
-        tiles = findings(5.0 + a, 5.0 + 0.01 * b, 16, MARGINS).tiles
+        tiles = findings(5.0 + a, 5.0 + 0.01 * b, 16, MARGINS).tests["tiles"]
         found.append(tiles.standard_error)
         differences.append(tiles.difference)
     assert 0.88 < np.sqrt(np.mean(np.square(found))) / np.std(differences) < 1.1
@@ -72,8 +72,8 @@ def test_a_firefly_leaves_a_single_picture_few_degrees_of_freedom():
     a[0, 30, 30] = 1e4
     found = findings(a, b, 16, MARGINS)
     assert np.all(found.image.errors[0].dof < 3)
-    assert np.all(found.tiles.errors[0].dof[1, 1] < 3)
-    assert np.all(found.tiles.errors[0].dof[0, 0] > 8)
+    assert np.all(found.tests["tiles"].errors[0].dof[1, 1] < 3)
+    assert np.all(found.tests["tiles"].errors[0].dof[0, 0] > 8)
 
 
 @pytest.mark.parametrize(
@@ -83,28 +83,24 @@ def test_faults_of_a_single_picture_of_little_noise(fault):
     rng = np.random.default_rng(0)
     candidate = replicates(rng, FAULTS[fault][0], 1, 0.02)
     assert compare(candidate, replicates(rng, scene())).status == "differ"
-    many = replicates(rng, scene(), 64)
-    known = Known(many.mean(axis=0), many.var(axis=0, ddof=1) / 64)
-    assert compare(candidate, known).status == "differ"
+    assert compare(candidate, known(replicates(rng, scene(), 64))).status == "differ"
 
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_faults_against_a_known_mean(fault):
     rng = np.random.default_rng(0)
-    many = replicates(rng, scene(), 64)
-    known = Known(many.mean(axis=0), many.var(axis=0, ddof=1) / 64)
-    result = compare(replicates(rng, FAULTS[fault][0]), known)
-    assert result.status == "differ"
-    assert compare(replicates(rng, scene()), known).status == "agree"
+    reference = known(replicates(rng, scene(), 64))
+    assert compare(replicates(rng, FAULTS[fault][0]), reference).status == "differ"
+    assert compare(replicates(rng, scene()), reference).status == "agree"
 
 
 def test_a_known_mean_without_certainty_is_inconclusive():
     rng = np.random.default_rng(0)
     candidate = replicates(rng, scene(), noise=0.01)
-    known = Known(scene(), np.where(STILL, 0.0, 0.1) * np.ones(3))
-    result = compare(candidate, known)
+    loud = Known(scene(), np.where(STILL, 0.0, 0.1) * np.ones(3))
+    result = compare(candidate, loud)
     assert result.status == "inconclusive"
-    assert standard_error(candidate, known)[20:].min() == pytest.approx(math.sqrt(0.1), rel=0.01)
+    assert standard_error(candidate, loud)[20:].min() == pytest.approx(math.sqrt(0.1), rel=0.01)
 
 
 @pytest.mark.parametrize("gain", [0.95, 0.98, 0.995, 1.005, 1.02, 1.05])
@@ -185,14 +181,11 @@ def test_a_known_mean_whose_pixels_share_a_filter(width: float, runs: int) -> No
     """Its variance does not show that the errors of neighbours add."""
     for seed in range(runs):
         rng = np.random.default_rng([seed, 3])
-        known = known_through_a_filter(rng, width)
+        reference = known_through_a_filter(rng, width)
         candidate = scene() + 0.05 * scene() * rng.standard_normal((8, *scene().shape))
-        found = compare(candidate, known)
+        found = compare(candidate, reference)
         assert found.status in ("agree", "inconclusive"), found.reason
-        spread = np.sqrt(known.variance)
-        sides = candidate, np.stack([known.mean + spread, known.mean - spread])
-        means = Images(candidate.mean(axis=0), known.mean)
-        found = images_rung(means, image_metrics(means), sides)
+        found = as_wholes(*of_replicates(candidate, reference, {}).resampled)
         assert found.status == "agree", found.reason
         assert width < 0.5 or "share noise, as through a filter" in found.reason
 
@@ -206,8 +199,8 @@ def test_noise_of_hues_against_a_known_mean(channels: int) -> None:
         rng = np.random.default_rng(seed)
         errors = rng.standard_normal((9, *noise.shape[:2], channels))
         candidate = scene() + noise * errors[:8]
-        known = scene() + noise * errors[8]
-        sides = candidate, np.stack([known + noise, known - noise])
-        flip = [each[1] for each in noise_alone(Images(candidate.mean(axis=0), known), sides)]
+        mean = scene() + noise * errors[8]
+        sides = candidate, np.stack([mean + noise, mean - noise])
+        flip = [each[1] for each in noise_alone(Images(candidate.mean(axis=0), mean), sides)]
         found.append(flip[0] / flip[1])
     assert np.mean(found) == pytest.approx(1.0, abs=0.04)

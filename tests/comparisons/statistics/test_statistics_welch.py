@@ -7,33 +7,35 @@ import pytest
 from planted import HEIGHT, LAMP, MARGINS, NONE, WIDTH, replicates, scene
 from scipy import stats
 
-from comparisons.statistics import Known, compare
+from comparisons.statistics import Known, compare, ranks
 from comparisons.statistics.advice import _known
+from comparisons.statistics.cells import tiles, whole
+from comparisons.statistics.order import ORDER_LEVEL
 from comparisons.statistics.ranks import uniformity
-from comparisons.statistics.scales import IMAGE_LEVEL
-from comparisons.statistics.sides import known_side, side_of
+from comparisons.statistics.scales import IMAGE, PIXELS, SCALES, TILES, Pair, chance_of_parting
+from comparisons.statistics.sides import side_of
 from comparisons.statistics.welch import (
     BiasTest,
     Error,
     bias_test,
-    chance_of_parting,
-    image_test,
     noise_ratio,
-    pixel_test,
     quantiles,
     satterthwaite,
-    tile_test,
     welch_errors,
 )
 
 # ---- Welch's test itself -------------------------------------------------------------------------
 
 
+def of_image(side):
+    return side.of(whole(side.mean))
+
+
 def test_statistic_is_welchs():
     rng = np.random.default_rng(0)
     a, b = rng.normal(1.0, 0.1, (5, 4, 4, 3)), rng.normal(1.1, 0.3, (9, 4, 4, 3))
     one, two = side_of(a), side_of(b)
-    own, pixels = welch_errors(one.of_image(), two.of_image(), one, two)
+    own, pixels = welch_errors(of_image(one), of_image(two), one, two)
     # The side of five is reckoned at least as noisy as that of nine.
     noise_a, noise_b = (x.mean(axis=(1, 2)).var(axis=0, ddof=1) for x in (a, b))
     assert own.value == pytest.approx(np.sqrt(np.maximum(noise_a, noise_b) / 5 + noise_b / 9))
@@ -41,7 +43,7 @@ def test_statistic_is_welchs():
     assert pixels.value == pytest.approx(np.sqrt(np.maximum(summed_a, summed_b) / 5 + summed_b / 9))
     assert np.all((own.dof >= 4) & (own.dof <= 12))
     same = side_of(a[:4]), side_of(b[:4])
-    own, _ = welch_errors(same[0].of_image(), same[1].of_image(), *same)
+    own, _ = welch_errors(of_image(same[0]), of_image(same[1]), *same)
     expected = stats.ttest_ind(
         a[:4].mean(axis=(1, 2)), b[:4].mean(axis=(1, 2)), equal_var=False
     ).statistic
@@ -86,20 +88,22 @@ def test_degrees_of_freedom_are_the_noises():
     """Of normal noise as many as pixels and replicates have; of one firefly about one."""
     rng = np.random.default_rng(0)
     quiet = rng.standard_normal((16, 32, 32, 3))
-    assert side_of(quiet).of_image().pixels_dof == pytest.approx(15 * 1024, rel=0.1)
-    assert np.median(side_of(quiet).of_tiles(16).pixels_dof) == pytest.approx(15 * 256, rel=0.1)
+    assert of_image(side_of(quiet)).pixels_dof == pytest.approx(15 * 1024, rel=0.1)
+    assert np.median(side_of(quiet).of(tiles(quiet, 16)).pixels_dof) == pytest.approx(
+        15 * 256, rel=0.1
+    )
     quiet[3, 8, 9] = 1e6
-    assert np.all(side_of(quiet).of_image().pixels_dof < 2.5)
-    assert np.all(side_of(quiet).of_tiles(16).pixels_dof[0, 0] < 2.5)
+    assert np.all(of_image(side_of(quiet)).pixels_dof < 2.5)
+    assert np.all(side_of(quiet).of(tiles(quiet, 16)).pixels_dof[0, 0] < 2.5)
     variance = np.ones((32, 32, 3))
-    known = known_side(Known(variance, variance))
-    assert known.of_image().pixels_dof == pytest.approx(1024)
+    known = side_of(Known(variance, variance))
+    assert of_image(known).pixels_dof == pytest.approx(1024)
 
 
 def test_means_and_noise_of_tiles_that_the_edges_cut():
     rng = np.random.default_rng(0)
     a, b = rng.random((2, 4, 5, 7, 3))
-    test = tile_test(side_of(a), side_of(b), 4, MARGINS)
+    test = TILES.test(Pair(side_of(a), side_of(b), MARGINS, 4), TILES.level)
     assert test.difference.shape == (2, 2, 3)
     corner = (a - b)[:, 4:, 4:].mean(axis=(0, 1, 2))
     assert test.difference[1, 1] == pytest.approx(corner)
@@ -114,7 +118,7 @@ def test_the_interval_is_the_widest_of_both_reckonings():
     a *= 0.6 / a.mean(axis=(1, 2), keepdims=True)
     b *= 0.5 / b.mean(axis=(1, 2), keepdims=True)
     b[:, ..., 0] *= 1.19
-    test = image_test(side_of(a), side_of(b), NONE)
+    test = IMAGE.test(Pair(side_of(a), side_of(b), NONE), IMAGE.level)
     assert test.errors[0].value == pytest.approx(0.0, abs=1e-6)
     assert test.errors[1].value == pytest.approx(0.015, rel=0.2)
     assert list(test.differs) == [False, True, True]
@@ -147,12 +151,12 @@ def test_a_bias_test_of_its_own():
 def test_the_margin_of_a_pixel_follows_its_noise():
     rng = np.random.default_rng(0)
     a, b = (replicates(rng, scene(), noise=0.02) for _ in range(2))
-    margin = pixel_test(side_of(a), side_of(b), MARGINS).margin
+    margin = PIXELS.test(Pair(side_of(a), side_of(b), MARGINS), PIXELS.level).margin
     assert np.all(margin[:6] == pytest.approx(1e-5))  # black: nothing is rounded
     assert np.all(margin[LAMP] == pytest.approx(1e-5 + 2.0**-11))
     assert np.median(margin[20:]) == pytest.approx(0.01, rel=0.3)
     a, b = (replicates(rng, scene(), noise=0.5) for _ in range(2))
-    margin = pixel_test(side_of(a), side_of(b), MARGINS).margin
+    margin = PIXELS.test(Pair(side_of(a), side_of(b), MARGINS), PIXELS.level).margin
     assert margin.max() == pytest.approx(0.05, rel=1e-3)
 
 
@@ -271,8 +275,13 @@ def test_the_known_part_of_an_error_is_a_lower_bound_at_95_percent():
     assert above == pytest.approx(0.05, abs=6.0 * np.sqrt(0.05 * 0.95 / 20_000))
 
 
+def test_all_levels_add_up_to_one_false_alarm_in_a_thousand():
+    total = sum(scale.level for scale in SCALES) + ranks.LEVEL + 2.0 * ORDER_LEVEL
+    assert total == pytest.approx(1e-3)
+
+
 @pytest.mark.parametrize("level", [1.0, 0.25])
 def test_the_stated_confidence_is_that_of_the_look(level):
     rng = np.random.default_rng(2)
     a, b = rng.normal(1.0, 0.01, (2, 16, 16, 16, 3))
-    assert compare(a, b, level=level).numbers["confidence"] == 1.0 - level * IMAGE_LEVEL
+    assert compare(a, b, level=level).numbers["confidence"] == 1.0 - level * IMAGE.level

@@ -1,6 +1,7 @@
 """Every light that a ray can hit, an environment or a shape of any type: samples have the density
 that `light_pdf` says."""
 
+import itertools
 import math
 
 import numpy as np
@@ -54,11 +55,11 @@ def p_value(scene, p, directions):
 
 @pytest.mark.parametrize("cls", types_of(Primitive), ids=lambda cls: cls.__name__)
 def test_shapes(cls, folder):
-    """Under a map that shears, a sphere also moved alone; from several sides."""
+    """Turned and moved; sheared, too; from several sides."""
     rng, found = np.random.default_rng(31), []
-    for shape in examples(cls):
+    for shape, is_sheared in itertools.product(examples(cls), (False, True)):
         turn, linear = random_turn(rng), np.eye(3) + np.triu(rng.uniform(-0.5, 0.5, (3, 3)), 1)
-        m = np.column_stack([turn if cls is rt.Sphere else turn @ linear, rng.normal(size=3)])
+        m = np.column_stack([turn @ linear if is_sheared else turn, rng.normal(size=3)])
         changes = {"material": "lamp", "transform": (Matrix(matrix=tuple(map(tuple, m.tolist()))),)}
         scene = scene_of(folder, shapes=(shape.model_copy(update=changes),))
         for side in (turn[:, 2], -turn[:, 2], turn @ [0.6, 0.5, 0.6]):

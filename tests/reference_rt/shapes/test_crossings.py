@@ -16,7 +16,7 @@ from reference_rt.shapes.csg import Solid
 CUBE = np.array([-3.0, -4.0, 0.0])
 """Where a mesh is whose edges and vertices rays are aimed at."""
 
-EACH = 12
+EACH = 16
 """Rays that are aimed at each shape."""
 
 FIELDS = ("t", "shape", "primitive", "part", "instance", "p", "n", "ns", "uv")

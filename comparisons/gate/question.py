@@ -1,0 +1,34 @@
+"""What is asked of candidates."""
+
+from dataclasses import dataclass
+
+from comparisons.compare.judge import Lights
+from comparisons.compare.path_length import Lengths
+from comparisons.gate.edges import Edges
+from comparisons.rungs.witness import Witness
+
+LIMIT = 0.005
+"""The smallest relative bias of the image mean that must be detectable."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of candidates, and what helps to answer.
+
+    limit: the smallest relative bias of the image mean that must be detectable;  name: the case's;
+    lights, lengths: for the diagnosis of a difference;  edges: for pictures without noise;
+    witness: a third renderer, where there is no rim;  rim: how many of the outermost pixels are
+    left out on each side.
+    """
+
+    limit: float = LIMIT
+    name: str = "candidate"
+    lights: Lights | None = None
+    lengths: Lengths | None = None
+    edges: Edges | None = None
+    witness: Witness | None = None
+    rim: int = 0
+
+
+USUAL = Question()
+"""Without help, of whole pictures."""

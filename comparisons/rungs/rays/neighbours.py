@@ -1,0 +1,161 @@
+"""Radiance along neighbouring rays: which differences of a ray's two values are those of edges and
+gradients that Mitsuba does not resolve.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from scipy import optimize
+
+from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
+from comparisons.mitsuba.counterpart import Counterpart
+from comparisons.referee.sizes import ShapeSizes
+from comparisons.rungs.rays.arbiter import NEIGHBOURS, RADII, BoolArray, directions
+from comparisons.rungs.rays.rays import Rays
+from reference_rt.core.arrays import FloatArray
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.rendering import query
+from reference_rt.rendering.scene import Scene
+from reference_rt.scene.build import build_tables
+
+MOST_OUTLIERS = (200, 32)
+"""Most pixels that are arbitrated by our tracer and by Mitsuba: each takes 193 ray trees for each
+radius, 30 ms in scalar variants of Mitsuba.  The rest count as differing."""
+
+BENT = 4.0
+"""A normal that is off by an angle turns a mirrored ray by twice that; two surfaces that stand in
+for others, one seen in the other, by twice as much."""
+
+Radiance = Callable[..., FloatArray]
+"""(origins, unit directions) -> radiance, all (n, 3).  Ours also takes the tables of a scene."""
+
+
+class NeighbourContext(NamedTuple):
+    """A scene whose ray trees are compared; depth: most surfaces that bend a ray."""
+
+    scene: Scene
+    tables: SceneTables
+    counterpart: Counterpart
+    sizes: ShapeSizes
+    depth: int
+
+
+def rounding_of(tables: SceneTables, sizes: ShapeSizes, rays: Rays) -> FloatArray:
+    """(m,): float32's error of the hits of rays and of all later hits of their ray trees."""
+    p = query.intersect(tables, rays.o, rays.d).p
+    reach = np.full(len(p), sizes.reach.max(initial=0.0))  # later hits of the tree are anywhere
+    return sizes.frame.delta(rays.o, p, reach)
+
+
+def explained_by_neighbours(
+    context: NeighbourContext,
+    rays: Rays,
+    sides: tuple[tuple[FloatArray, Radiance], tuple[FloatArray, Radiance]],
+    bound: FloatArray,
+) -> BoolArray:
+    """Which of the outliers (m,) have neighbouring rays along which one renderer has the other's
+    value, or values on all sides of it.
+
+    `sides` are ours and Mitsuba's: the value along each ray, and the function that computes it.
+    Where Mitsuba's own value changes that much within its rounding, it is not resolved.  Rays are
+    moved by float32's bound, by Mitsuba's ray epsilon, once and at each surface, and, next to
+    meshes that stand in for shapes, by their errors.
+    """
+    settled = np.zeros(len(bound), bool)
+    if len(bound) == 0:
+        return settled
+    angle = ROUNDINGS * UNIT_ROUNDOFF
+    rounding = rounding_of(context.tables, context.sizes, rays)
+    epsilon = context.sizes.frame.epsilon(query.intersect(context.tables, rays.o, rays.d).p)
+
+    def search(radius: FloatArray, angle: float, only: BoolArray | None = None) -> None:
+        for k in (0, 1):
+            radiance, wanted = sides[k][1], sides[1 - k][0]
+            rows = np.flatnonzero(~settled if only is None else only & ~settled)
+            rows = rows[: MOST_OUTLIERS[k]]
+            if len(rows) == 0:
+                return
+            values = values_around(rays.rows(rows), radius[rows], angle, radiance)
+            settled[rows] = [
+                is_mixture(*row) for row in zip(wanted[rows], values, bound[rows], strict=True)
+            ]
+
+    for radius in (rounding, epsilon, context.depth * epsilon):
+        search(radius, angle)
+    stand_ins = context.counterpart.stand_ins()
+    if stand_ins and not settled.all():
+        errors = [error for some in stand_ins.values() for error in some]
+        sag, turn = (max(getattr(error, name) for error in errors) for name in ("sag", "turn"))
+        if context.tables.materials.oriented is not None:
+            turn += max(error.twist for error in errors)
+        radius, angle = rounding + sag, angle + BENT * turn
+        rows = np.flatnonzero(~settled)[: MOST_OUTLIERS[0]]
+        near = np.zeros(len(bound), bool)
+        near[rows] = _near(
+            context, set(stand_ins), rays.rows(rows), radius[rows], angle, sides[0][1]
+        )
+        search(radius, angle, near)
+    return settled
+
+
+def _near(
+    context: NeighbourContext,
+    shapes: set[int],
+    rays: Rays,
+    radius: FloatArray,
+    angle: float,
+    radiance: Radiance,
+) -> BoolArray:
+    """(m,): whether the radiance along any neighbouring ray depends on these shapes: whether it
+    changes when they are taken away."""
+    scene = context.scene
+    rest = [shape for k, shape in enumerate(scene.shapes) if k not in shapes]
+    tables = build_tables(scene.changed(shapes=rest))
+
+    def without(o: FloatArray, d: FloatArray) -> FloatArray:
+        return radiance(o, d, tables)
+
+    there, gone = (values_around(rays, radius, angle, value) for value in (radiance, without))
+    same = (there == gone) | (np.isnan(there) & np.isnan(gone))
+    return np.asarray(~same.all(axis=(1, 2)))
+
+
+def values_around(rays: Rays, radius: FloatArray, turn: float, value: Radiance) -> FloatArray:
+    """The values `value(origins, directions)` next to m rays: (m, k, 3).
+
+    Origins move by up to `radius` (m,); unit directions stay, or turn by `turn` radians, on the
+    opposite side of the sphere.  All moves of all rays are evaluated in one call.
+    """
+    moves = directions(NEIGHBOURS)
+    ways = np.roll(moves, NEIGHBOURS // 2, axis=0)
+    still = np.zeros((1, 3))
+    move = np.concatenate([still, *(factor * moves for factor in RADII for _ in (0, 1))])
+    way = np.concatenate([still, *(size * ways for _ in RADII for size in (0.0, turn))])
+    origins = rays.o[:, None] + move * radius[:, None, None]
+    turned = rays.d[:, None] + way
+    turned /= np.linalg.norm(turned, axis=2, keepdims=True)
+    return value(origins.reshape(-1, 3), turned.reshape(-1, 3)).reshape(len(rays.o), -1, 3)
+
+
+def is_mixture(wanted: FloatArray, values: FloatArray, slack: float) -> bool:
+    """Whether some weighted mean of `values` (k, 3) is `wanted` (3,), up to `slack` in each
+    channel.
+
+    Between the values of neighbouring rays lie those of a gradient and of edges that cross, but not
+    every colour whose channels each lie between theirs: a fault in one channel of a mirror in which
+    a picture is seen is no mixture of the picture's colours (a linear programme, 3 ms).
+    """
+    values = values[np.isfinite(values).all(axis=1)]
+    off = (np.unique(values, axis=0) - wanted) / max(slack, np.finfo(float).tiny)
+    if not (
+        (off.min(axis=0, initial=np.inf) <= 1.0) & (off.max(axis=0, initial=-np.inf) >= -1.0)
+    ).all():
+        return False
+    if (np.abs(off).max(axis=1) <= 1.0).any():
+        return True
+    sides = np.concatenate([off.T, -off.T])
+    solution = optimize.linprog(
+        np.zeros(len(off)), sides, np.ones(6), np.ones((1, len(off))), np.ones(1), method="highs"
+    )
+    return bool(solution.status == 0)
