@@ -8,6 +8,7 @@ import numpy as np
 
 from comparisons.geometry.frame import UNIT_ROUNDOFF, round32
 from comparisons.integrators import translate_integrator
+from comparisons.integrators.whitted import AMBIENT
 from comparisons.lights.constant import ambient_of
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart, trace
