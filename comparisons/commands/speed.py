@@ -21,7 +21,8 @@ from comparisons.commands.options import (
     table_in,
 )
 from reference_rt.cli.guarded import guarded, say
-from reference_rt.cli.options import Defaults, by_name, size_of
+from reference_rt.cli.options import Defaults, by_name
+from reference_rt.cli.quantities import size_of
 from reference_rt.util.errors import SceneError, UsageError, printable
 
 

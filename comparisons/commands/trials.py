@@ -288,7 +288,8 @@ def fuzz(
         from comparisons.experiments.fuzz.run import Plan, run
         from comparisons.experiments.fuzz.summary import Display, write_page
         from comparisons.runs.provenance import provenance
-    from reference_rt.cli.options import Where, seconds_of
+    from reference_rt.cli.options import Where
+    from reference_rt.cli.quantities import seconds_of
     from reference_rt.util.workers import Threads
 
     where = Where(workers, scheduler, cluster)

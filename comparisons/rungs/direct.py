@@ -17,6 +17,7 @@ from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.coincidence import is_doubled, on_two_surfaces
 from comparisons.rungs.rays.lamp_images import is_beside, magnified, slopes_of_image
 from comparisons.rungs.rays.light_error import (
+    DISTANT,
     POINT_LIKE,
     LightContext,
     bounds,
@@ -28,7 +29,7 @@ from comparisons.rungs.rays.light_error import (
 from comparisons.rungs.rays.rays import Rays, described, mixed_rays
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.lights import AREA, DIRECTIONAL, ENVIRONMENT, PROJECTOR, SPOT
+from reference_rt.lights import AREA
 from reference_rt.materials import any_smooth
 from reference_rt.rendering import query
 from reference_rt.rendering.query import DirectLight
@@ -46,7 +47,7 @@ def mitsuba_direct(
 
     mi, scene, kind = mitsuba(), context.counterpart.lit, kind_of(context, light)
     emitter = _point_emitter(context, light) if kind in POINT_LIKE else None
-    is_far = kind in (ENVIRONMENT, DIRECTIONAL)
+    is_far = kind in DISTANT
 
     def value(o: Any, d: Any, at: Any) -> tuple[Any, ...]:
         si = scene.ray_intersect(mi.Ray3f(mi.Point3f(o), d))
@@ -95,7 +96,7 @@ def is_dark(
     hits, theirs = context.hits, context.theirs
     n = np.where((theirs.shape == hits.shape)[:, None], theirs.n, hits.n)
     kind = kind_of(context, light)
-    is_far = kind in (ENVIRONMENT, DIRECTIONAL)
+    is_far = kind in DISTANT
     w = target if is_far else target - hits.p
     side = np.where(np.sum(w * n, axis=1) < 0.0, -1.0, 1.0)
     height = side * context.counterpart.frame.epsilon(hits.p)
@@ -269,8 +270,10 @@ def _compare(
     bound += slopes_of(context, light, u, value)
     scale = magnified(context, light, target, ours.pdf[known])
     bound += slopes_of_image(context, light, u, value, scale)
-    # Where a spot or projector does not reach, no shadow ray explains that Mitsuba's does.
-    of_shadow = (ours.pdf[known] > 0.0) | (kind_of(context, light) not in (SPOT, PROJECTOR))
+    # Where a light does not shine, no shadow ray explains that Mitsuba's does.
+    kind = kind_of(context, light)
+    is_bounded = kind in POINT_LIKE and POINT_LIKE[kind].is_bounded
+    of_shadow = (ours.pdf[known] > 0.0) | (not is_bounded)
     error = np.abs(theirs - value).max(axis=1)
     wrong = np.flatnonzero(~(error <= bound))
 

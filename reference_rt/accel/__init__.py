@@ -2,10 +2,9 @@
 
 All four find the same hits, to the last bit; only their speed differs:
 
-- brute force (no BVH), `shapes/brute_force.py`: one ray against VECTOR_WIDTH = 8 spheres,
-  rectangles or boxes at once; or, by `shapes/ray_simd.py`, VECTOR_WIDTH rays against one of these,
-  a disk or a quadric at once (all others one ray and one primitive at a time); through a link to
-  shapes, one type of shape after another (`shapes/brute_force.py`);
+- brute force (no BVH), `shapes/brute_force.py`: one type of shape after another.  Of a block of
+  rays VECTOR_WIDTH = 8 at once are tested against a sphere, a rectangle, a box, a disk or a quadric
+  (`shapes/ray_simd.py`); all others, and single rays, one primitive at a time;
 - single-ray traversal: the loop is in `geometry.py`, its steps are in `single_ray.py`;
 - stream traversal, `stream.py`: a block of up to BLOCK = 64 rays, each one step at a time;
 - packet traversal, `packet_traversal.py`: 16 coherent rays that share their box tests.
@@ -19,7 +18,7 @@ Who calls what, and which way it takes:
                                         | rays that are not coherent, instances, no BVH
     query.intersect, first_hits,        |
       more than FEW = 4096 rays     array_query.trace_packet --------> else:      packet
-    query.occluded, more than FEW   array_query.occluded_rays -----'
+    query.occluded, more than FEW   array_query.occluded_rays -------> block_query.any_hits
       at most FEW rays,             array_query.closest_one_by_one
       and of query.occluded         array_query.occluded_one_by_one
                                         v
@@ -43,7 +42,7 @@ Who decides:
 - `block_query.py`, `array_query.py`: block, packet or single ray, as in the diagram.  What a scene
   lacks is None, so all but "coherent" is decided while the caller is compiled.
 - `rendering/query/tracing.py`: FEW, because packets and streams take longer to compile.  All
-  queries call operations on a geometry through a link (`rendering/query/tracing.py`).
+  queries call operations on a geometry through a link (`rendering/query/links.py`).
 - `rendering/kernels.py`: whether a picture's kernels are linked, or specialised for its tables; in
   the latter, whether the stream traversal is compiled separately and called through the function
   pointer `Geometry.tracer` (path, with a BVH, without instances) or is inlined.

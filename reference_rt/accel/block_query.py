@@ -82,7 +82,7 @@ def _trace(geometry: Geometry, rays: RayBlock, hits: HitBlock, n: int, any_hit: 
 @kernel
 def _hit_in_geometry(geometry: Geometry, ray: Ray, hits: HitBlock, j: int) -> Hit:
     if geometry.bvh is None:
-        found: Hit = any_shape.nearest_of_ray(geometry.shapes, ray, hits, j)
+        found: Hit = any_shape.completed(geometry.shapes, ray, hits, j)
         return found
     return hit_in_block(hits, j)
 

@@ -30,7 +30,7 @@ from reference_rt.jit.function_pointer import FunctionPointer
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.links import Linkable
 from reference_rt.jit.simd import VECTOR_WIDTH
-from reference_rt.shapes import TABLES, Packets, Shapes
+from reference_rt.shapes import TABLES, Shapes
 from reference_rt.shapes.csg import Parts, Solids, out_of_solid, ray_near
 from reference_rt.shapes.dispatch import primitive_count
 from reference_rt.shapes.instances import Instances, out_of, ray_in, tangents_out_of
@@ -51,7 +51,6 @@ class Geometry(NamedTuple):
     """
 
     shapes: Shapes
-    packets: Packets
     bvh: Bvh | None
     solids: Solids | None
     instances: Instances | None
@@ -79,7 +78,7 @@ def occluded(geometry: Geometry, ray: Ray) -> bool:
 def _trace(geometry: Geometry, ray: Ray, any_hit: bool) -> Hit:
     if geometry.bvh is None:
         # For a few shapes an early exit of any-hit rays would cost more than it saves.
-        found: Hit = any_shape.nearest(geometry.shapes, geometry.packets, ray)
+        found: Hit = any_shape.nearest(geometry.shapes, ray)
         return found
     return _traverse(geometry, ray, any_hit, None)
 

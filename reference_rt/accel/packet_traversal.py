@@ -247,22 +247,20 @@ def closest_of_packet(
     geometry: Geometry,
     o: Vectors,
     d: Vectors,
-    ends: FloatArray,
     begin: int,
     width: int,
     rays: RayBlock,
     hits: HitBlock,
 ) -> int:
     """`closest_hit` of PACKET_SIZE of the rays with origins o (n, 3) and directions d (n, 3): those
-    of `ray_number`.  ends: empty, or the t_max of each ray (n,): then any hit is found, not the
-    closest.
+    of `ray_number`.
 
     Returns INCOHERENT: nothing is done (they are not coherent, or the scene has no BVH or has
     instances);  MISSED: no ray hits anything;  FOUND: the rays and their hits, some of them misses,
     are the first ones of `rays` and `hits`.
     """
     return _closest_of_packet(
-        geometry.bvh, geometry.instances, geometry, o, d, ends, begin, width, rays, hits
+        geometry.bvh, geometry.instances, geometry, o, d, begin, width, rays, hits
     )
 
 
@@ -273,7 +271,6 @@ def _closest_of_packet(
     geometry: Geometry,
     o: FloatArray,
     d: FloatArray,
-    ends: FloatArray,
     begin: int,
     width: int,
     rays: RayBlock,
@@ -283,7 +280,7 @@ def _closest_of_packet(
         return INCOHERENT
     if instances is not None:  # each of which changes the rays' origins and directions
         return INCOHERENT
-    return _traverse(bvh, geometry, o, d, ends, begin, width, rays, hits)
+    return _traverse(bvh, geometry, o, d, begin, width, rays, hits)
 
 
 @kernel
@@ -292,7 +289,6 @@ def _traverse(
     geometry: Geometry,
     o: FloatArray,
     d: FloatArray,
-    ends: FloatArray,
     begin: int,
     width: int,
     rays: RayBlock,
@@ -304,11 +300,7 @@ def _traverse(
         return INCOHERENT
     stack, waiting = local_integers(STACK), local_floats(STACK)
     distances, seen = local_floats(VECTOR_WIDTH), local_floats(PROJECTION_FLOATS)
-    outcome, t_max, any_hit = MISSED, math.inf, len(ends) > 0
-    if any_hit:
-        t_max = 0.0
-        for j in range(PACKET_SIZE):
-            t_max = max(t_max, ends[ray_number(begin, width, j)])
+    outcome, t_max = MISSED, math.inf
     # A child is identified by its slot, node * VECTOR_WIDTH + lane, which locates its box.
     node, slot, top = 0, -1, 0
     unbounded = bvh.unbounded
@@ -325,18 +317,14 @@ def _traverse(
                 outcome = FOUND
                 for j in range(PACKET_SIZE):
                     i = ray_number(begin, width, j)
-                    ray = Ray(row(o, i), row(d, i), ends[i] if any_hit else math.inf)
+                    ray = Ray(row(o, i), row(d, i), math.inf)
                     put_ray(rays, j, ray)
                     put_hit(hits, j, no_hit(ray))
                 prepare_rays(bvh, packet, rays, per_ray)
             if _nearest_of_leaf(bvh, geometry, node, slot, packet, rays, per_ray, seen, hits):
                 t_max = 0.0
                 for j in range(PACKET_SIZE):
-                    if any_hit and hits.codes[j] >= 0:
-                        hits.numbers[j] = -1.0  # enters no box any more
                     t_max = max(t_max, hits.numbers[j])
-                if any_hit and t_max == 0.0:
-                    return outcome
         node = NOTHING
         while top > 0 and node == NOTHING:
             top -= 1

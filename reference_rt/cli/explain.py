@@ -317,7 +317,7 @@ _OPERATIONS = {
     "camera_ray": "camera rays",
     "closest_hit": "closest hits",
     "closest_hits": "closest hits of blocks",
-    "complete_block": "surface coordinates of hits of blocks",
+    "found": "surface coordinates of hits of blocks",
     "coordinates": "texture coordinates",
     "emitted": "emission",
     "environment_density": "light densities",

@@ -153,7 +153,7 @@ def preview(
 ) -> None:
     """Show a picture of a scene that becomes less noisy until it is closed or interrupted."""
     from reference_rt.cli import preview as previews
-    from reference_rt.cli.options import share_of
+    from reference_rt.cli.quantities import share_of
     from reference_rt.rendering.scene import Scene
 
     def load() -> Scene:

@@ -10,17 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference_rt.cli.options import (
-    Where,
-    bytes_of,
-    duration,
-    percentage,
-    seconds_of,
-    share_of,
-)
+from reference_rt.cli.options import Where
+from reference_rt.cli.quantities import bytes_of, duration, percentage, seconds_of, share_of
 from reference_rt.jit.kernel_cache import cache_root
 from reference_rt.rendering import image
-from reference_rt.rendering.framebuffer import delete_old
+from reference_rt.rendering.checkpoint import delete_old
 from reference_rt.rendering.loop import Limits
 from reference_rt.rendering.query import intersect
 from reference_rt.rendering.render import Session, Storage

@@ -38,14 +38,12 @@ from reference_rt.core.ray import (
     Ray,
     RayBlock,
     add_vector,
-    put_hit,
     put_ray,
     put_vector,
     ray_from,
     ray_of,
     vector_of,
 )
-from reference_rt.core.ray import hit_of as hit_in_block
 from reference_rt.core.vec3 import Vec3, is_black, max_component, to_world
 from reference_rt.integrators.direct_light import (
     light_selection_normal,
@@ -53,11 +51,11 @@ from reference_rt.integrators.direct_light import (
     power_heuristic,
     unshadowed,
 )
+from reference_rt.integrators.look_ahead import look_ahead
 from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
 from reference_rt.integrators.shading import shade_point
 from reference_rt.jit.kernel import ByClass, kernel
-from reference_rt.lights import Ahead, EnvironmentMaps, LightSample, Pick, shadow_ray
-from reference_rt.lights.emitters import environment_map
+from reference_rt.lights import Ahead, LightSample, Pick, shadow_ray
 from reference_rt.materials import Shading
 from reference_rt.sampling import Sample, Samplers, draw_pair, sampler_of
 
@@ -73,7 +71,7 @@ class Scratch(NamedTuple):
     it adds if it is not occluded, and lit (BLOCK,), the sample that it belongs to;  hits;  states
     (STATE_FLOATS,) of the active paths and samples (BLOCK,), the sample of each;  kept
     (`materials.scratch_floats`,), the buffer of `shade`;  sky (AHEAD_FLOATS,): light of an
-    environment map, see `_look_ahead`; of length 0 without one.
+    environment map, see `look_ahead`; of length 0 without one.
     """
 
     rays: RayBlock
@@ -282,8 +280,8 @@ def radiances(
     Ended paths are removed: number j of the active paths belongs to sample `scratch.samples[j]`.
     The other paths of a block do not change a path's bits.
     """
-    rays, shadows, hits = scratch.rays, scratch.shadows, scratch.hits
-    sky = any_light.map_of(scene.lights)
+    rays, shadows, hits, lights = scratch.rays, scratch.shadows, scratch.hits, scene.lights
+    sky = any_light.map_of(lights)
     if path.hides_lamps:
         pass_lamps(scene, rays, hits, n)
     for j in range(n):
@@ -293,14 +291,14 @@ def radiances(
         if n == 0:
             break
         closest_hits(scene.geometry, rays, hits, n)
-        _look_ahead(sky, path, scene, samplers, depth, n, scratch)
-        alive, lit, escaped = 0, 0, 0
+        is_last, samples = depth + 1 >= path.max_depth, scratch.samples
+        look_ahead(sky, samplers, samples, depth, is_last, rays, hits, n, scratch.sky)
+        alive, lit = 0, 0
         for j in range(n):
             k = scratch.samples[j]
             state, ray = state_of(scene, scratch, j), ray_of(rays, j)
-            hit, sampler = _hit_of(sky, scene, ray, hits, j), sampler_of(samplers, k)
-            ahead = _ahead_of(sky, scratch, escaped if hit.kind < 0 else j - escaped)
-            escaped += hit.kind < 0
+            hit, sampler = hit_of(scene.geometry, ray, hits, j), sampler_of(samplers, k)
+            ahead = any_light.ahead_of(lights, scratch.sky, j)
             edge = _edge(path, scene, state, ray, hit, sampler, depth, scratch.kept, ahead)
             add_vector(scratch.totals, 0, k, edge.emitted)
             if not is_black(edge.connection.light):
@@ -314,54 +312,6 @@ def radiances(
                 alive += 1
         add_unoccluded(scene, scratch, lit)
         n = alive
-
-
-@kernel
-def _look_ahead(
-    sky: EnvironmentMaps | None,
-    path: PathSetup,
-    scene: SceneTables,
-    samplers: Samplers,
-    depth: int,
-    n: int,
-    scratch: Scratch,
-) -> None:
-    """Compute the environment map's light for the first n paths ahead, VECTOR_WIDTH at a time: its
-    radiance where the ray escapes, its sample elsewhere, which depends on random numbers alone
-    (measured: a scene lit by a sky renders in 0.6 of the time)."""
-    if sky is None:
-        return
-    is_last, escaped = depth + 1 >= path.max_depth, 0
-    for j in range(n):
-        ray = ray_of(scratch.rays, j)
-        hit = hit_of(scene.geometry, ray, scratch.hits, j)
-        put_hit(scratch.hits, j, hit)
-        if hit.kind < 0:
-            environment_map.put_escaped(scratch.sky, escaped, ray.d)
-            escaped += 1
-        elif not is_last:
-            sampler = sampler_of(samplers, scratch.samples[j])
-            u0, u1 = draw_pair(sampler, sampling.PER_BOUNCE * depth + sampling.LIGHT_POINT)
-            environment_map.put_surface(sky, scratch.sky, j - escaped, u0, u1)
-    environment_map.compute_ahead(sky, scratch.sky, escaped, 0 if is_last else n - escaped)
-
-
-@kernel
-def _hit_of(
-    sky: EnvironmentMaps | None, scene: SceneTables, ray: Ray, hits: HitBlock, j: int
-) -> Hit:
-    """Hit j, which `_look_ahead` has stored if there is an environment map."""
-    if sky is None:
-        found: Hit = hit_of(scene.geometry, ray, hits, j)
-        return found
-    return hit_in_block(hits, j)
-
-
-@kernel
-def _ahead_of(sky: EnvironmentMaps | None, scratch: Scratch, k: int) -> Ahead | None:
-    if sky is None:
-        return None
-    return Ahead(sky, scratch.sky, k)
 
 
 @kernel

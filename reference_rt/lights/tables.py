@@ -180,6 +180,13 @@ map_of = by_class("map_of", {Lights: _map_of, LinkedLights: _no_map})
 
 
 @kernel
+def ahead_of(lights: Any, numbers: FloatArray, j: int) -> environment_map.Ahead | None:
+    """What was computed ahead for path j of a block; None where nothing is."""
+    found: environment_map.Ahead | None = environment_map.ahead_of(map_of(lights), numbers, j)
+    return found
+
+
+@kernel
 def sky_floats(lights: Any) -> int:
     """The size of the scratch buffer for what is computed ahead."""
     return _floats_for(map_of(lights))

@@ -19,7 +19,7 @@ from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.parallel_compile import Report
 from reference_rt.rendering import units
 from reference_rt.rendering.accumulation import Sums, add_samples, jobs_of, widths_of
-from reference_rt.rendering.framebuffer import render_digest, sources_digest
+from reference_rt.rendering.checkpoint import render_digest, sources_digest
 from reference_rt.rendering.kernels import Running, compile_ahead
 from reference_rt.rendering.noise import statistics
 from reference_rt.rendering.units import Unit, tiles_of

@@ -21,7 +21,7 @@ from reference_rt.materials.nested.flattened import flattened_materials
 from reference_rt.materials.textured import Textured
 from reference_rt.rendering.tiles import GivenRays, LinkedView
 from reference_rt.shapes import TABLES as SHAPES
-from reference_rt.shapes import Packets, Shapes
+from reference_rt.shapes import Shapes
 from reference_rt.shapes import tables as shape_tables
 from reference_rt.textures import Textures
 from reference_rt.textures.lookup import lookups
@@ -110,7 +110,7 @@ def _of_geometry(calls: Calls, geometry: Geometry) -> Calls:
     if geometry.solids is None:
         calls = _without(calls, shapes, "spans", "enters")
     if geometry.bvh is not None:
-        return _without(calls, shapes, "nearest_of_type", "nearest_of_block", "complete_block")
+        return _without(calls, shapes, "nearest_of_type", "nearest_of_block", "found")
     if not others & {"closest_hit", "occluded"}:
         calls = _without(calls, shapes, "nearest_of_type")
     if others & _QUERIES or geometry.solids is not None:
@@ -191,12 +191,10 @@ def linked_shapes(linker: Linker, shapes: Shapes, calls: Calls, areas: Areas | N
 
 def linked_geometry(linker: Linker, geometry: Geometry, shapes: Any, calls: Calls) -> Link:
     """A geometry behind a link.  shapes: the link to its shapes."""
-    nothing: Any = np.zeros((0, 1, 8))
-    packets = Packets(*(nothing if p is None else p for p in geometry.packets))
     bvh = geometry.bvh
     if bvh is not None and bvh.corners is None:  # one type less: without triangles none are read
         bvh = bvh._replace(corners=_NO_FLOATS)
-    table = geometry._replace(shapes=shapes, packets=packets, bvh=bvh, tracer=None)
+    table = geometry._replace(shapes=shapes, bvh=bvh, tracer=None)
     return linker.link(geometries.operations, _names(calls, geometries), {0: table})
 
 

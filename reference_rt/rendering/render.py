@@ -18,6 +18,7 @@ from reference_rt.integrators import AnyIntegrator, RayCast
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.parallel_compile import Report
 from reference_rt.rendering.accumulation import layers_of, samples_of, widths_of
+from reference_rt.rendering.checkpoint import Checkpoint, render_digest
 from reference_rt.rendering.executor import (
     Executor,
     Prepared,
@@ -26,7 +27,7 @@ from reference_rt.rendering.executor import (
     build_and_check,
     remote_scene,
 )
-from reference_rt.rendering.framebuffer import Checkpoint, Framebuffer, render_digest
+from reference_rt.rendering.framebuffer import Framebuffer
 from reference_rt.rendering.image import channels
 from reference_rt.rendering.loop import Limits, Loop, Saving
 from reference_rt.rendering.picture import MOST_PLACES, Picture, Taken, Written, header_of, written

@@ -43,11 +43,10 @@ from reference_rt.rendering.accumulation import Job, jobs_of
 from reference_rt.rendering.kernels import Linked, Specialised, cost
 from reference_rt.rendering.linking import EMPTY_SCENE, geometry_of
 from reference_rt.rendering.query.bsdf import scatter_kernel
+from reference_rt.rendering.query.crossings import SOLIDS, crossings_kernel
 from reference_rt.rendering.query.hits import (
     OCCLUDED,
     OCCLUDED_BY_BLOCKS,
-    SOLIDS,
-    crossings_kernel,
     occluded_by_blocks,
     occluded_of_few,
 )

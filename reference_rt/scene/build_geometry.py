@@ -57,7 +57,6 @@ def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
     solids = work.solid_tables(trees, roots)
     return Geometry(
         Shapes(**trees.tables),
-        trees.packets(),
         trees.hierarchy(),
         solids,
         trees.instances(),

@@ -9,7 +9,7 @@ from reference_rt.accel import bvh
 from reference_rt.accel.bvh import Bvh
 from reference_rt.accel.leaf import INSTANCE, SOLID
 from reference_rt.core.arrays import Bounds, FloatArray, IntArray
-from reference_rt.shapes import QUADRIC, TABLES, TRIANGLE, Packets
+from reference_rt.shapes import QUADRIC, TABLES, TRIANGLE
 from reference_rt.shapes.brute_force import SIDE_BY_SIDE
 from reference_rt.shapes.instances import Instances
 from reference_rt.shapes.placement import bounds as placed_bounds
@@ -119,19 +119,6 @@ class HierarchyBuilder:
             return 0
         before = sum(len(self._wide[k].codes) for k in range(tree) if k != self._scene)
         return before + (0 if self._scene is None else len(self._wide[self._scene].codes))
-
-    def packets(self) -> Packets:
-        """The tables packed for vector instructions, if there is no hierarchy (brute force)."""
-        modules = {field: module for _, field, _, module in TABLES}
-        few = self._scene is None
-        return Packets(
-            *(
-                modules[field].pack_all(self.tables[field])
-                if few and self.tables[field] is not None
-                else None
-                for field in Packets._fields
-            )
-        )
 
     def instances(self) -> Instances | None:
         if self._instances is None:

@@ -3,7 +3,7 @@
 - `flat/`, `curved/`, `meshes/`, `box.py`: the primitives, one file each;
 - `csg.py`: solids made of primitives; `instances.py`: copies of groups of shapes;
 - `tables.py`: all tables of a scene; `dispatch.py`: the kernels for any primitive;
-- `brute_force.py`: rays against all primitives of small scenes.
+- `brute_force.py`: rays against all primitives of small scenes, type by type.
 
 A file has a description (a `Shape`), its table (a NamedTuple of arrays, a row for each primitive,
 with the columns of `placement.owners`), `bounds(table)` and kernels.  Contract of the kernels, in
@@ -26,9 +26,8 @@ world coordinates and scene units, for row i of the table or the row of a hit:
 To add a shape: its file, and its lines in `tables.py`.  Step by step: docs/extending.md.
 """
 
-from reference_rt.shapes.brute_force import Packets as Packets
+from reference_rt.shapes.brute_force import completed as completed
 from reference_rt.shapes.brute_force import nearest as nearest
-from reference_rt.shapes.brute_force import nearest_of_ray as nearest_of_ray
 from reference_rt.shapes.brute_force import nearest_of_rays as nearest_of_rays
 from reference_rt.shapes.dispatch import colour as colour
 from reference_rt.shapes.dispatch import enters as enters

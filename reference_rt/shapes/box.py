@@ -19,11 +19,9 @@ from reference_rt.shapes.shape import (
     Spans,
     TabulationContext,
     Tangents,
-    lane_vectors,
     lift,
     no_spans,
     one_span,
-    pack,
     solid_angle_pdf,
 )
 
@@ -62,11 +60,6 @@ def bounds(boxes: Boxes) -> Bounds:
 
 def areas(boxes: Boxes) -> FloatArray:
     return np.asarray(2.0 * boxes.face_areas.sum(axis=1))
-
-
-def pack_all(boxes: Boxes) -> FloatArray:
-    """The arguments of `distance`, as packets."""
-    return pack(boxes.center, boxes.to_local)
 
 
 class Slabs(NamedTuple):
@@ -184,12 +177,6 @@ crossings = spans
 def intersect(boxes: Boxes, i: int, ray: Ray) -> Crossing:
     """Where the ray meets box i."""
     return found(boxes, i, ray, distance(ray, *arguments(boxes, i)))
-
-
-@kernel
-def lane_distance(boxes: Boxes, packets: FloatArray, k: int, lane: int, ray: Ray) -> float:
-    """`distance` for one lane of packet k of `pack_all`."""
-    return distance(ray, *lane_vectors(packets, k, lane))
 
 
 @kernel

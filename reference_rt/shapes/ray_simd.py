@@ -114,36 +114,20 @@ def make_plain_nearer(distance: Callable[..., Any]) -> Callable[..., None]:
     return nearer
 
 
-def _begin(rays: FloatArray, at: int, t: FloatArray, codes: IntArray) -> None:
-    """Initialise for VECTOR_WIDTH rays from number `at` on, without hits: t = t_max, codes = -1."""
-    t[:], codes[:] = rays[6 * BLOCK + at : 6 * BLOCK + at + VECTOR_WIDTH], -1
-
-
-def _resume(
+def _load(
     from_t: FloatArray, from_codes: IntArray, at: int, t: FloatArray, codes: IntArray
 ) -> None:
     """Load the results so far of VECTOR_WIDTH rays from number `at` on."""
     t[:], codes[:] = from_t[at : at + VECTOR_WIDTH], from_codes[at : at + VECTOR_WIDTH]
 
 
-def _end(t: FloatArray, codes: IntArray, at: int, to: FloatArray, to_codes: IntArray) -> None:
+def _store(t: FloatArray, codes: IntArray, at: int, to: FloatArray, to_codes: IntArray) -> None:
     """Store t and codes of VECTOR_WIDTH rays to the results of the rays from number `at` on."""
     to[at : at + VECTOR_WIDTH], to_codes[at : at + VECTOR_WIDTH] = t, codes
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def _begin_lanes(typing_context: Any, rays: Any, at: Any, t: Any, codes: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        writer = _Writer(context, builder)
-        writer.store(t, values[2], writer.column(rays, values[0], 6, values[1]).value)
-        writer.store(codes, values[3], ir.Constant(_WORDS, [-1] * VECTOR_WIDTH))
-        return nothing(context)
-
-    return types.void(rays, types.int64, t, codes), generate
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def _resume_lanes(
+def _load_lanes(
     typing_context: Any, from_t: Any, from_codes: Any, at: Any, t: Any, codes: Any
 ) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
@@ -157,7 +141,7 @@ def _resume_lanes(
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def _end_lanes(typing_context: Any, t: Any, codes: Any, at: Any, to: Any, to_codes: Any) -> Any:
+def _store_lanes(typing_context: Any, t: Any, codes: Any, at: Any, to: Any, to_codes: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         writer = _Writer(context, builder)
         writer.store(to, values[3], writer.load(t, values[0], F64_VECTOR), values[2])
@@ -167,6 +151,5 @@ def _end_lanes(typing_context: Any, t: Any, codes: Any, at: Any, to: Any, to_cod
     return types.void(t, codes, types.int64, to, to_codes), generate
 
 
-begin: Callable[..., None] = _begin if numba.config.DISABLE_JIT else _begin_lanes
-resume: Callable[..., None] = _resume if numba.config.DISABLE_JIT else _resume_lanes
-end: Callable[..., None] = _end if numba.config.DISABLE_JIT else _end_lanes
+load: Callable[..., None] = _load if numba.config.DISABLE_JIT else _load_lanes
+store: Callable[..., None] = _store if numba.config.DISABLE_JIT else _store_lanes

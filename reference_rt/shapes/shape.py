@@ -13,7 +13,6 @@ from reference_rt.core.model import Description, Examples
 from reference_rt.core.transform import FLAT, IDENTITY, Affine, Transform, affine, compose, flattens
 from reference_rt.core.vec3 import Vec3, dot, frame_from_normal
 from reference_rt.jit.kernel import kernel
-from reference_rt.jit.simd import VECTOR_WIDTH
 
 
 def _ignore_warning(owner: int, message: str) -> None:
@@ -103,53 +102,10 @@ class Difference(Solid):
     type: Literal["difference"] = "difference"
 
 
-def pack(*columns: FloatArray) -> FloatArray:
-    """The columns (n, k) of a table in SIMD order: packets
-    (ceil(n / VECTOR_WIDTH), sum of the k, VECTOR_WIDTH).
-
-    Rows of NaN fill the last packet: every comparison with them fails.
-    """
-    table = np.concatenate([c.reshape(len(c), -1) for c in columns], axis=1)
-    padding = np.full((-len(table) % VECTOR_WIDTH, table.shape[1]), np.nan)
-    packets = np.concatenate([table, padding]).reshape(-1, VECTOR_WIDTH, table.shape[1])
-    return np.ascontiguousarray(packets.transpose(0, 2, 1))
-
-
 @kernel
 def in_column(column: Any, i: int) -> int:
     """Number i of a column of integers of any size; a column of one row has that one for all."""
     return int(np.int64(column[min(i, len(column) - 1)]))
-
-
-@kernel
-def lane_vector(packets: FloatArray, packet: int, column: int, lane: int) -> Vec3:
-    """Three columns of one lane of a packet."""
-    return Vec3(
-        packets[packet, column, lane],
-        packets[packet, column + 1, lane],
-        packets[packet, column + 2, lane],
-    )
-
-
-@kernel
-def lane_vectors(packets: FloatArray, packet: int, lane: int) -> tuple[Vec3, Vec3, Vec3, Vec3]:
-    """The first twelve columns of one lane of a packet."""
-    return (
-        lane_vector(packets, packet, 0, lane),
-        lane_vector(packets, packet, 3, lane),
-        lane_vector(packets, packet, 6, lane),
-        lane_vector(packets, packet, 9, lane),
-    )
-
-
-@kernel
-def nearest_lane(d: FloatArray, packet: int, best: int, t: float) -> tuple[int, float]:
-    """Updates (row, distance) of the nearest so far with the distances of a packet's lanes."""
-    for lane in range(VECTOR_WIDTH):
-        nearer = d[lane] < t
-        best = packet * VECTOR_WIDTH + lane if nearer else best
-        t = min(t, d[lane])
-    return best, t
 
 
 class LightPoint(NamedTuple):

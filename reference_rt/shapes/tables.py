@@ -5,11 +5,9 @@ A new shape has a line in `Primitive` and, unless its rows are of a table that i
 `reference_rt.shapes`.
 """
 
-from collections.abc import Callable
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from reference_rt.jit.by_code import ByCode, Table, tables_of
-from reference_rt.jit.kernel import ByClass
 from reference_rt.jit.links import LINK, declare
 from reference_rt.shapes import box
 from reference_rt.shapes.box import Box as Box
@@ -72,13 +70,3 @@ declare(Shapes, LINK)
 
 by_code = ByCode((code, field, module) for code, field, _, module in TABLES)
 """Decorates kernels that choose among the shapes; see `jit/by_code.py`."""
-
-
-def of_table(name: str, without: Callable[..., Any]) -> Callable[..., Any]:
-    """f(table, ...), which calls the kernel `name` of the table's module, or `without` for None and
-    for modules without that kernel."""
-    choice = ByClass(name)
-    choice.register(type(None), without)
-    for _, _, table, module in TABLES:
-        choice.register(table, getattr(module, name, without))
-    return choice.function

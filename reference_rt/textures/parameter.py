@@ -149,6 +149,11 @@ def join(parts: Sequence[Any]) -> Any:
     return type(first)(*columns)
 
 
+def joined(module: Any, tables: Sequence[Any]) -> Any:
+    """One table of several of a type: by the `join` of the type's module, if it has one."""
+    return getattr(module, "join", join)(tables)
+
+
 @kernel
 def colour_at(colours: Colours, i: int, at: At) -> Vec3:
     """The colour of row i at a point of a surface."""

@@ -59,7 +59,7 @@ from reference_rt.core.vec3 import row
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.rendering.query import radiance_without_noise
-from reference_rt.rendering.query.tracing import link_to_geometry
+from reference_rt.rendering.query.links import link_to_geometry
 
 # ---- stacks of surfaces that are close to each other, and the order in which rays meet them ------
 

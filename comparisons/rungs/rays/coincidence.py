@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
+from comparisons.lights import type_of
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.hits import BoolArray, MitsubaHits, rows_of
 from comparisons.referee.sizes import ShapeSizes
@@ -17,7 +18,6 @@ from comparisons.rungs.rays.resolution import slide
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.transform import Translate
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.lights import AnyLight, Projector, Spot
 from reference_rt.materials import Diffuse, Emissive, Material, Wrapper
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
@@ -50,12 +50,7 @@ def is_steep(scene: Scene) -> bool:
         plain = isinstance(material, Diffuse) and not isinstance(material.reflectance, str)
         return plain or not material.smooth
 
-    def projects(light: AnyLight) -> bool:
-        if isinstance(light, Spot):
-            return light.texture is not None
-        return isinstance(light, Projector) and isinstance(light.irradiance, str)
-
-    if any(projects(light) for light in scene.lights):
+    if any(type_of(light).projects(light) for light in scene.lights):
         return True
     return not all(is_flat(material) for material in scene.materials.values())
 

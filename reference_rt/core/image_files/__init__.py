@@ -10,11 +10,12 @@ To add a format: a module with a subclass of `ImageFile` and an `open_*` functio
 in `_BEGINNINGS`; a test with files of it.
 """
 
+import os
 from pathlib import Path
 
 from reference_rt.core.image_files.exr import open_exr
 from reference_rt.core.image_files.float_files import HdrFile, open_hdr, open_npy, open_pfm
-from reference_rt.core.image_files.image_file import ImageFile, Strip
+from reference_rt.core.image_files.image_file import HEADER, Beginning, ImageFile, Strip
 from reference_rt.core.image_files.pillow import open_with_pillow
 from reference_rt.util.files import open_input
 
@@ -35,18 +36,19 @@ def open_image(path: Path, layer: str = "", radiance: bool = False) -> ImageFile
     itself does, see `HdrFile`.  Raises ValueError (what is wrong, what was expected) and
     OSError.
     """
-    with open_input(path) as file:
-        start = file.read(16)
+    with open_input(path) as opened:
+        start = opened.read(HEADER + 64)
+        file = Beginning(path, start, os.fstat(opened.fileno()).st_size)
     if not start:
         raise ValueError("is empty; expected an image")
     if layer and not start.startswith(_BEGINNINGS[0][0]):
         raise ValueError(f"has no layer '{layer}'; expected an .exr file, or no 'layer'")
     if layer:
-        return open_exr(path, layer)
+        return open_exr(file, layer)
     if start.startswith(b"#?"):
-        return open_hdr(path, radiance)
+        return open_hdr(file, radiance)
     reader = next((open_ for beginning, open_ in _BEGINNINGS if start.startswith(beginning)), None)
-    found = open_with_pillow(path) if reader is None else reader(path)
+    found = (reader or open_with_pillow)(file)
     if min(found.width, found.height) < 1:
         raise ValueError(f"has {found.width} x {found.height} pixels; expected at least one")
     return found

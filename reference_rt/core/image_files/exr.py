@@ -6,13 +6,12 @@ else R, G, B, or Y without a prefix; else the only layer that has these; else th
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from reference_rt.core.exr import read_headers, read_planes
-from reference_rt.core.image_files.image_file import ImageFile, StoredStrip
+from reference_rt.core.image_files.image_file import Beginning, ImageFile, StoredStrip
 
 
 @dataclass(frozen=True)
@@ -51,10 +50,10 @@ class ExrFile(ImageFile):
                     plane.resize((rows.start, self.width), refcheck=False)
 
 
-def open_exr(path: Path, layer: str = "") -> ImageFile:
+def open_exr(file: Beginning, layer: str = "") -> ImageFile:
     """layer: the prefix of the channels' names, such as "diffuse" for diffuse.R; "" for the file's
     only one.  Raises ValueError (what is wrong, what was expected)."""
-    headers = read_headers(path)
+    headers = read_headers(file.path)
     parts = [[channel.name for channel in header["channels"]] for header in headers]
     part, names = _chosen(parts, layer)
     header, kinds = headers[part], parts[part]
@@ -62,7 +61,7 @@ def open_exr(path: Path, layer: str = "") -> ImageFile:
     has_opacity = opacity in kinds and opacity not in names
     (x0, y0, x1, y1), display = (_corners(header[n]) for n in ("dataWindow", "displayWindow"))
     return ExrFile(
-        path,
+        file.path,
         x1 - x0 + 1,
         y1 - y0 + 1,
         "float64",  # the library tells the type of channels only with their pixels

@@ -4,7 +4,6 @@ order); NumPy arrays of floats, .npy.
 """
 
 import math
-import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,6 +15,8 @@ import numpy.typing as npt
 
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.image_files.image_file import (
+    HEADER,
+    Beginning,
     ImageFile,
     StoredStrip,
     as_float64,
@@ -24,9 +25,6 @@ from reference_rt.core.image_files.image_file import (
 from reference_rt.util.files import open_input
 
 Rgbe = npt.NDArray[np.uint8]
-
-_HEADER = 4096
-"""The most bytes of a header: its end is searched for in these alone."""
 
 _SIZE = re.compile(rb"([-+])([XY]) (\d{1,9}) ([-+])([XY]) (\d{1,9})\n")
 
@@ -68,13 +66,11 @@ class HdrFile(ImageFile):
             yield StoredStrip(rows, (values / np.array(self.exposure)).astype(self.kind), None)
 
 
-def open_hdr(path: Path, radiance: bool = False) -> ImageFile:
+def open_hdr(file: Beginning, radiance: bool = False) -> ImageFile:
     """radiance: decode as Radiance itself does, see `HdrFile`.  Raises ValueError (what is wrong,
     what was expected)."""
-    with open_input(path) as file:
-        head = file.read(_HEADER + 64)
-        size = os.fstat(file.fileno()).st_size
-    end = head.find(b"\n\n", 0, _HEADER)
+    head = file.head
+    end = head.find(b"\n\n", 0, HEADER)
     match = _SIZE.match(head[end + 2 :])
     if end < 0 or match is None or match[2] == match[5]:
         raise ValueError("has a malformed HDR header; expected its lines and -Y height +X width")
@@ -83,12 +79,12 @@ def open_hdr(path: Path, radiance: bool = False) -> ImageFile:
     start = end + 2 + match.end()
     if _is_new(head[start : start + 2], length):
         # The shortest scanline: a mark, and of each channel runs of 127.
-        if size - start < count * (4 + 8 * math.ceil(length / 127)):
+        if file.size - start < count * (4 + 8 * math.ceil(length / 127)):
             raise ValueError("is truncated: too short for its size; expected whole scanlines")
     columns = match[2] == b"X"
     sign = {match[2]: match[1], match[5]: match[4]}
     return HdrFile(
-        path,
+        file.path,
         count if columns else length,
         length if columns else count,
         # m + 1/2 has nine bits, and the least exponent is a denormal float32's: it is exact.
@@ -212,11 +208,9 @@ class PfmFile(ImageFile):
                 yield StoredStrip(rows, upwards[::-1], None)
 
 
-def open_pfm(path: Path) -> ImageFile:
+def open_pfm(file: Beginning) -> ImageFile:
     """Raises ValueError (what is wrong, what was expected)."""
-    with open_input(path) as file:
-        match = _PATTERN.match(file.read(_HEADER))
-        size = os.fstat(file.fileno()).st_size
+    match = _PATTERN.match(file.head[:HEADER])
     if match is None:
         raise ValueError("has a malformed PFM header; expected PF, width, height and scale")
     channels = 3 if match[1] == b"F" else 1
@@ -231,9 +225,9 @@ def open_pfm(path: Path) -> ImageFile:
             "(big-endian) or -1 (little-endian)"
         )
     if min(width, height) > 0:  # `open_image` refuses images without pixels
-        check_length(size - match.end(), width * height * channels * 4)
+        check_length(file.size - match.end(), width * height * channels * 4)
     order = "<f4" if scale < 0.0 else ">f4"
-    return PfmFile(path, width, height, is_grey=channels == 1, start=match.end(), order=order)
+    return PfmFile(file.path, width, height, is_grey=channels == 1, start=match.end(), order=order)
 
 
 @dataclass(frozen=True)
@@ -257,9 +251,9 @@ class NpyFile(ImageFile):
                 yield StoredStrip(rows, values, opacity)
 
 
-def open_npy(path: Path) -> ImageFile:
+def open_npy(file: Beginning) -> ImageFile:
     """Raises ValueError (what is wrong, what was expected)."""
-    array = map_npy(path)
+    array = map_npy(file.path)
     if array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (3, 4)):
         raise ValueError(
             f"has the shape {array.shape}; expected (height, width), (height, width, 3), or with "
@@ -267,7 +261,7 @@ def open_npy(path: Path) -> ImageFile:
         )
     height, width = array.shape[:2]
     return NpyFile(
-        path,
+        file.path,
         width,
         height,
         kind=f"float{min(64, 8 * array.dtype.itemsize)}",

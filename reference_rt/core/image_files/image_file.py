@@ -17,6 +17,19 @@ _STRIP = 1 << 14
 """Pixels converted at once: few enough that intermediate arrays take little memory."""
 
 
+HEADER = 4096
+"""The most bytes of a header that is searched for its end."""
+
+
+class Beginning(NamedTuple):
+    """A file: its first bytes, with all of the header that formats without a library have; its
+    size in bytes."""
+
+    path: Path
+    head: bytes
+    size: int
+
+
 class StoredStrip(NamedTuple):
     """Some whole rows of an image as its file stores them.
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from reference_rt.core.image_files.image_file import ImageFile, StoredStrip
+from reference_rt.core.image_files.image_file import Beginning, ImageFile, StoredStrip
 from reference_rt.util.files import open_input
 
 _FORMATS = ("PNG", "JPEG", "TIFF", "WEBP", "BMP", "TGA", "PPM", "GIF")
@@ -90,15 +90,14 @@ class PillowFile(ImageFile):
             yield StoredStrip(rows, codes[..., :3], codes[..., 3] if with_opacity else None)
 
 
-def open_with_pillow(path: Path) -> ImageFile:
+def open_with_pillow(file: Beginning) -> ImageFile:
     """Raises ValueError (what is wrong, what was expected), OSError."""
-    with open_input(path) as file:
-        head = file.read(26)
+    head = file.head[:26]
     is_png = head.startswith(_PNG)
     if is_png and (len(head) < 26 or head[12:16] != b"IHDR"):
         raise ValueError("cannot be read as PNG: no header; expected a whole image")
     bits = struct.unpack(">B", head[24:25])[0] if is_png else 8
-    with _opened(path) as image:
+    with _opened(file.path) as image:
         mode, info = str(image.mode), image.info
         packed = str(image.tile[0][3]) if image.tile else ""
         is_deep = bits == 16 or any(";16" in str(tile[3]) for tile in image.tile)
@@ -110,7 +109,7 @@ def open_with_pillow(path: Path) -> ImageFile:
         gamma = info.get("gamma") if is_png and "srgb" not in info else None
         bits = 16 if is_deep or mode in _GREY_OF_16 else 32 if mode == "F" else 8
         return PillowFile(
-            path,
+            file.path,
             image.width,
             image.height,
             kind="float32" if mode == "F" else f"uint{bits}",

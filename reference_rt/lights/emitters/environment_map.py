@@ -281,12 +281,12 @@ def _sampled(table: EnvironmentMaps, found: Arriving) -> LightSample:
 
 # ---- for a block of paths at once: look-ups where rays escape, samples at surfaces ---------------
 
-AHEAD_FLOATS = 16 * BLOCK
+AHEAD_FLOATS = 17 * BLOCK
 """Columns of BLOCK numbers.  Those of rays that escape: the direction, then radiance and light of
 `Arriving`; those of surfaces: x and y of the cell, then u0 and u1, in their place all of
-`Arriving`."""
+`Arriving`; last, the place of each path in the columns of its kind."""
 
-_CELLS, _SAMPLES = 7 * BLOCK, 9 * BLOCK
+_CELLS, _SAMPLES, _PLACES = 7 * BLOCK, 9 * BLOCK, 16 * BLOCK
 
 
 class Ahead(NamedTuple):
@@ -325,14 +325,18 @@ def _in_cell_lanes(
 
 
 @kernel
-def put_escaped(numbers: FloatArray, k: int, d: Vec3) -> None:
-    """Let ray k of those that escape have the direction d."""
+def put_escaped(numbers: FloatArray, j: int, k: int, d: Vec3) -> None:
+    """Let path j be number k of those that escape, in direction d."""
+    numbers[_PLACES + j] = k
     put_vector(numbers, 0, k, d)
 
 
 @kernel
-def put_surface(table: EnvironmentMaps, numbers: FloatArray, k: int, u0: float, u1: float) -> None:
-    """Let the sample of surface k be that of (u0, u1)."""
+def put_surface(
+    table: EnvironmentMaps, numbers: FloatArray, j: int, k: int, u0: float, u1: float
+) -> None:
+    """Let path j be number k of those at surfaces, whose sample is that of (u0, u1)."""
+    numbers[_PLACES + j] = k
     cell = _cell_of(table, u0, u1)
     numbers[_CELLS + k], numbers[_CELLS + BLOCK + k] = cell.x, cell.y
     numbers[_SAMPLES + k], numbers[_SAMPLES + BLOCK + k] = cell.u0, cell.u1
@@ -347,6 +351,14 @@ def compute_ahead(table: EnvironmentMaps, numbers: FloatArray, escaped: int, sur
         _look_up_lanes(texels, heights, to_map, width, last, numbers, k)
     for k in range(0, surfaces, VECTOR_WIDTH):
         _in_cell_lanes(texels, heights, to_map, width, last, numbers, k)
+
+
+@kernel
+def ahead_of(table: EnvironmentMaps | None, numbers: FloatArray, j: int) -> Ahead | None:
+    """What was computed ahead for path j; None without a map."""
+    if table is None:
+        return None
+    return Ahead(table, numbers, int(numbers[_PLACES + j]))
 
 
 @kernel

@@ -7,9 +7,11 @@ kernels are in `nested/flattened.py`.
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from reference_rt.materials.material import Material
+from reference_rt.materials.bsdfs.phong import Phong
+from reference_rt.materials.material import Emissive, Material
 from reference_rt.materials.nested.tilted import Bump, NormalMap
-from reference_rt.materials.nested.wrappers import Blend, Mask, TwoSided
+from reference_rt.materials.nested.wrappers import Blend, Mask, TwoSided, Wrapper
+from reference_rt.textures import Palette
 
 # Codes of steps.  WEIGHT, ONE_MINUS_WEIGHT: times w, 1 - w, for a number w of `weights`;
 # FRONT_ONLY, BACK_ONLY: times 0 when seen from the other side; FACE_VIEWER: the frame flipped to
@@ -104,7 +106,50 @@ def transmits(path: MaterialPath, materials: Mapping[str, Material]) -> bool:
     return path.leaf is None or materials[path.leaf].transmits
 
 
-def needs_tangents(path: MaterialPath, materials: Mapping[str, Material]) -> bool:
-    """Whether the leaf's scattering depends on the directions of u and v."""
-    tilted = any(step.code in (BUMP, NORMAL_MAP) for step in path.steps)
-    return tilted or (path.leaf is not None and materials[path.leaf].oriented)
+class Traits(NamedTuple):
+    """Of a material: the columns of `Materials` of these names."""
+
+    smooth: bool
+    uses_u_lobe: bool
+    behind: bool
+    oriented: bool
+
+
+def traits(paths: list[MaterialPath], materials: Mapping[str, Material]) -> Traits:
+    """What the material with these paths is like."""
+    leaves = [materials[path.leaf] for path in paths if path.leaf is not None]
+    tilted = any(step.code in (BUMP, NORMAL_MAP) for path in paths for step in path.steps)
+    return Traits(
+        any(leaf.smooth for leaf in leaves),
+        len(paths) > 1 or any(leaf.uses_u_lobe for leaf in leaves),
+        any(transmits(path, materials) or path.turns for path in paths),
+        tilted or any(leaf.oriented for leaf in leaves),
+    )
+
+
+def check_energy(
+    paths: list[MaterialPath], materials: Mapping[str, Material], palette: Palette
+) -> None:
+    """Raise ValueError for a Phong material that reflects more light than arrives, which path
+    tracing cannot render."""
+    for path in paths:
+        leaf = materials[path.leaf] if path.leaf is not None else None
+        if isinstance(leaf, Phong) and leaf.energy_bound(palette) > 1.0:
+            raise ValueError(
+                f"creates energy: up to {leaf.energy_bound(palette):.4g} of the light comes back; "
+                "expected at most 1 for path tracing, or the integrator 'whitted'"
+            )
+
+
+def scattering_of(name: str, materials: Mapping[str, Material]) -> str | None:
+    """The name of the material with the BSDF: an emissive one's base, or None without a base."""
+    material = materials[name]
+    return material.base if isinstance(material, Emissive) else name
+
+
+def colour_of(name: str, materials: Mapping[str, Material]) -> tuple[float, float, float] | str:
+    """The colour of a material as it is shown; of a nested one, that of its first base."""
+    material = materials[name]
+    while isinstance(material, Wrapper):
+        material = materials[getattr(material, material.bases[0])]
+    return material.colour

@@ -1,9 +1,10 @@
 """Array queries of a scene: rays, points and directions in, hits, densities and radiance out.
 
-`hits`: first hits, occlusion, and all crossings along a ray;  `bsdf`: evaluate and sample a
-material;  `light`: light samples and densities;  `radiance`: any integrator along given rays;
-`tracing`: the entry kernels, which take a scene's tables behind links, and which of them traces how
-many rays;  `rays`: checks, broadcasting, threads; camera rays.
+`hits`: first hits, and occlusion;  `crossings`: all crossings along a ray;  `bsdf`: evaluate and
+sample a material;  `light`: light samples and densities;  `radiance`: any integrator along given
+rays;  `tracing`: the entry kernels, and which of them traces how many rays;  `links`: a scene's
+tables behind links, as these kernels take them;  `rays`: checks, broadcasting, threads; camera
+rays.
 A scene has the queries as methods; most functions here take the scene's tables instead.
 
 Contract: all arrays are float64 or int64.  Origins and directions are (..., 3) in world coordinates
@@ -14,17 +15,16 @@ ValueError.
 
 To add a query: a function here with its entry kernel, exported below; a line in `scene.py`.  The
 kernel takes links with the operations that it calls (`link_to_geometry`, `link_to_scene` or
-`tracing.linked`), so that all scenes share it.
+`links.linked`), so that all scenes share it.
 """
 
 from reference_rt.rendering.query.bsdf import Bsdf, BsdfSamples
+from reference_rt.rendering.query.crossings import Crossings, crossings
 from reference_rt.rendering.query.hits import (
     Closest,
-    Crossings,
     Hits,
     Intersections,
     closest_primitives,
-    crossings,
     first_hits,
     intersect,
     occluded,

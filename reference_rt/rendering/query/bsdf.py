@@ -17,6 +17,7 @@ from reference_rt.materials import Materials, Shading, scratch_floats
 from reference_rt.materials.textured import evaluate_textures, lookup_cache_size
 from reference_rt.rendering.linking import calls_of, linked_materials, linked_textures
 from reference_rt.rendering.query.hits import BoolArray
+from reference_rt.rendering.query.links import Linked, linked
 from reference_rt.rendering.query.rays import (
     broadcast,
     check_in_unit_cube,
@@ -24,7 +25,6 @@ from reference_rt.rendering.query.rays import (
     numbers,
     shaped,
 )
-from reference_rt.rendering.query.tracing import Linked, linked
 from reference_rt.scene.build import BuiltScene
 from reference_rt.scene.model import no_such
 from reference_rt.shapes import Sphere

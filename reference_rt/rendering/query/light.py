@@ -23,6 +23,12 @@ from reference_rt.lights import TABLES, Constant, EnvironmentMap, Lights
 from reference_rt.materials import scratch_floats
 from reference_rt.rendering.linking import calls_of, linked_lights, linked_shapes, linked_textures
 from reference_rt.rendering.query.hits import BoolArray
+from reference_rt.rendering.query.links import (
+    Linked,
+    link_to_geometry,
+    link_to_scene,
+    linked,
+)
 from reference_rt.rendering.query.rays import (
     broadcast,
     check_in_unit_cube,
@@ -35,12 +41,8 @@ from reference_rt.rendering.query.rays import (
 from reference_rt.rendering.query.tracing import (
     NO_LIMIT,
     FirstHits,
-    Linked,
     empty_hits,
     hit_of,
-    link_to_geometry,
-    link_to_scene,
-    linked,
 )
 from reference_rt.scene.build import BuiltScene
 from reference_rt.shapes import Shapes

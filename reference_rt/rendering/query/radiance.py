@@ -20,8 +20,8 @@ from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.rendering.accumulation import mean_and_variance, radiance_job
 from reference_rt.rendering.kernels import Running
+from reference_rt.rendering.query.links import link_to_scene
 from reference_rt.rendering.query.rays import Rays, in_blocks, rays_of, shaped
-from reference_rt.rendering.query.tracing import link_to_scene
 from reference_rt.rendering.tiles import GivenRays
 from reference_rt.rendering.units import SAMPLES_PER_TILE, Unit, tiles_of
 from reference_rt.sampling import Independent

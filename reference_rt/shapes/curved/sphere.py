@@ -26,11 +26,9 @@ from reference_rt.shapes.shape import (
     TabulationContext,
     Tangents,
     any_tangents,
-    lane_vector,
     no_spans,
     one_span,
     outward,
-    pack,
 )
 
 
@@ -87,11 +85,6 @@ def bounds(spheres: Spheres) -> Bounds:
 
 def areas(spheres: Spheres) -> FloatArray:
     return 4.0 * math.pi * np.square(spheres.radius)
-
-
-def pack_all(spheres: Spheres) -> FloatArray:
-    """The arguments of `distance`, as packets."""
-    return pack(spheres.center, spheres.radius)
 
 
 @kernel
@@ -154,12 +147,6 @@ def found(spheres: Spheres, i: int, ray: Ray, t: float) -> Crossing:
 def intersect(spheres: Spheres, i: int, ray: Ray) -> Crossing:
     """Where the ray meets sphere i."""
     return Crossing(distance(ray, row(spheres.center, i), spheres.radius[i]), 0.0, 0.0)
-
-
-@kernel
-def lane_distance(spheres: Spheres, packets: FloatArray, k: int, lane: int, ray: Ray) -> float:
-    """`distance` for one lane of packet k of `pack_all`."""
-    return distance(ray, lane_vector(packets, k, 0, lane), packets[k, 3, lane])
 
 
 @kernel

@@ -28,9 +28,7 @@ from reference_rt.shapes.shape import (
     Shape,
     TabulationContext,
     Tangents,
-    lane_vectors,
     outward,
-    pack,
     solid_angle_pdf,
 )
 
@@ -199,11 +197,6 @@ def areas(rectangles: Rectangles) -> FloatArray:
     return np.asarray(4.0 * np.linalg.norm(cross, axis=1))
 
 
-def pack_all(rectangles: Rectangles) -> FloatArray:
-    """The arguments of `distance`, as packets."""
-    return pack(rectangles.center, rectangles.normal, rectangles.x_of, rectangles.y_of)
-
-
 @kernel
 def distance(ray: Ray, center: Vec3, normal: Vec3, x_of: Vec3, y_of: Vec3) -> float:
     """The t > 0 at which a ray meets a rectangle, inf for a miss."""
@@ -223,14 +216,6 @@ def intersect(rectangles: Rectangles, i: int, ray: Ray) -> Crossing:
     if (abs(found.u) <= 1.0) & (abs(found.v) <= 1.0):
         return found
     return miss()
-
-
-@kernel
-def lane_distance(
-    rectangles: Rectangles, packets: FloatArray, k: int, lane: int, ray: Ray
-) -> float:
-    """`distance` for one lane of packet k of `pack_all`."""
-    return distance(ray, *lane_vectors(packets, k, lane))
 
 
 surface, unit_normals = base.surface, base.unit_normals

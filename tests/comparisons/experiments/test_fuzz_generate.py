@@ -22,6 +22,7 @@ from comparisons.experiments.fuzz.summary import coverage, table
 from reference_rt.core.model import Positive
 from reference_rt.materials import Diffuse, Mirror
 from reference_rt.rendering.render import render
+from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
 from reference_rt.scene.model import json_schema
 from reference_rt.shapes.meshes.mesh import Mesh
@@ -60,6 +61,10 @@ def test_scenes_are_valid_and_survive_their_text(files, extreme):
         scene = parse(data, number, files)
         build_tables(scene)
         assert parse(data, number, files).digest() == scene.digest()
+        for text in (scene.to_json(), scene.to_yaml()):  # every bit of every number comes back
+            again = Scene.parse(text, folder=files)
+            assert again == scene
+            assert again.digest() == scene.digest()
         assert text_of(data).count("\n") < 60
 
 

@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 import numpy as np
 import reference_rt as rt
-from reference_rt.scene.build import _texture_tables
+from reference_rt.scene.build_textures import texture_tables
 from reference_rt.lights.emitters.environment_map import tabulate
 import reference_rt.core.image_files, OpenEXR
 from PIL import Image
@@ -33,7 +33,7 @@ before = peak()
 if sys.argv[1] == "bitmap":
     files = sys.argv[2:]
     scene = rt.Scene(textures={f"t{k}": rt.Bitmap(file=f) for k, f in enumerate(files)})
-    tables = _texture_tables(scene)
+    tables = texture_tables(scene)
 else:
     tables = rt.EnvironmentMap(file=sys.argv[2]).tabulate(Path())
 print(peak() - before)

@@ -35,7 +35,7 @@ from reference_rt.rendering import query
 from reference_rt.rendering.accumulation import jobs_of
 from reference_rt.rendering.kernels import Running
 from reference_rt.rendering.query import hits, tracing
-from reference_rt.rendering.query.tracing import link_to_geometry
+from reference_rt.rendering.query.links import link_to_geometry
 from reference_rt.scene import build_hierarchies
 
 KINDS = ("sphere", "rectangle", "box", "triangle")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from reference_rt.cli.options import bytes_of, duration, percentage, seconds_of, share_of
+from reference_rt.cli.quantities import bytes_of, duration, percentage, seconds_of, share_of
 from reference_rt.util.errors import UsageError
 
 

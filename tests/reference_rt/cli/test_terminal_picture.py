@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from reference_rt.cli.preview import half_blocks, says_sixels, sixels
+from reference_rt.cli.terminal_picture import half_blocks, says_sixels, sixels
 
 CELL = re.compile(r"\x1b\[38;2;(\d+);(\d+);(\d+);48;2;(\d+);(\d+);(\d+)m▀")
 
@@ -92,7 +92,7 @@ def test_sixels_are_the_pixels(rows, columns):
 
 
 def test_large_pictures_fit_as_sixels(monkeypatch):
-    monkeypatch.setattr("reference_rt.cli.preview._cell", lambda: (4, 8))
+    monkeypatch.setattr("reference_rt.cli.terminal_picture._cell", lambda: (4, 8))
     found = decoded_sixels(sixels(picture(300, 300), 10, 5))
     assert found.shape[:2] == (40, 40)
     assert (found >= 0).all()

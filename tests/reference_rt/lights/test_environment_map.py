@@ -41,9 +41,9 @@ def _ahead(table, u, d, sampled, seen):
     for k in range(len(numbers)):
         numbers[k] = 0.0
     for k in range(len(u)):
-        environment_map.put_surface(table, numbers, k, u[k, 0], u[k, 1])
+        environment_map.put_surface(table, numbers, k, k, u[k, 0], u[k, 1])
     for k in range(len(d)):
-        environment_map.put_escaped(numbers, k, row(d, k))
+        environment_map.put_escaped(numbers, k, k, row(d, k))
     environment_map.compute_ahead(table, numbers, len(d), len(u))
     for k in range(len(u)):
         s = environment_map.sample_ahead(environment_map.Ahead(table, numbers, k))

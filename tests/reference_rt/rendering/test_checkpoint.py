@@ -11,7 +11,7 @@ from builders import SCENES
 
 import reference_rt as rt
 from reference_rt.rendering import framebuffer
-from reference_rt.rendering.framebuffer import Band, Checkpoint, render_digest
+from reference_rt.rendering.checkpoint import Band, Checkpoint, render_digest
 from reference_rt.rendering.noise import COLUMNS
 from reference_rt.util.errors import ImageError
 

@@ -17,9 +17,8 @@ from small_scenes import LAYERS, same, small
 
 import reference_rt as rt
 from reference_rt.jit.kernel import is_compiled
-from reference_rt.jit.links import Linker
 from reference_rt.rendering import kernels
-from reference_rt.rendering.linking import linked_scene
+from reference_rt.rendering.accumulation import jobs_of
 from reference_rt.rendering.render import render
 
 needs_jit = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
@@ -97,10 +96,11 @@ def test_linking_asks_for_all_that_is_called(names):
     assert (done.returncode, last) == (0, ["done"]), done.stderr
     # All is in the cache now: nothing depends on the process.
     for name in names:
-        linker, scene = Linker(), small(name)
-        linked_scene(linker, scene.tables, scene.integrator.type)
-        assert all(is_compiled(*call) for call in linker.calls)
-        assert linker.calls
+        scene = small(name)
+        view = scene.camera.setup(scene.film.width, scene.film.height)
+        linked = kernels.Linked(jobs_of(scene), scene.tables, view, scene.film.filter.setup())
+        assert all(is_compiled(*call) for call in linked.calls)
+        assert linked.calls
 
 
 # ---- the same bits ------------------------------------------------------------------------------

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from fake_executors import Fake, expected, sample
 
-from reference_rt.rendering.framebuffer import Checkpoint, Framebuffer
+from reference_rt.rendering.checkpoint import Checkpoint
+from reference_rt.rendering.framebuffer import Framebuffer
 from reference_rt.rendering.loop import Limits, Loop, Saving
 from reference_rt.rendering.units import BAND, passes
 from reference_rt.util.errors import ImageError

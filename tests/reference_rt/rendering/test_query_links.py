@@ -12,8 +12,8 @@ from builders import SCENES, cube, same_in_plain_python, unit_vectors, write_obj
 from every_shape import every_shape, tilted
 
 import reference_rt as rt
-from reference_rt.rendering.query import bsdf, direct_light, hits, light, tracing
-from reference_rt.rendering.query.hits import solid_crossings
+from reference_rt.rendering.query import bsdf, direct_light, hits, light, links, tracing
+from reference_rt.rendering.query.crossings import solid_crossings
 from reference_rt.rendering.query.radiance import cast_kernel
 from reference_rt.scene.examples import NAMED
 
@@ -194,13 +194,13 @@ def test_all_scenes_have_the_same_kernels():
 
 def test_links_of_a_scene_are_made_once():
     scene = rt.Scene(shapes=(rt.Sphere(), rt.Box()))
-    one = tracing.link_to_geometry(scene.tables, "closest_hit")
-    assert tracing.link_to_geometry(scene.tables, "closest_hit") is one
-    assert tracing.link_to_geometry(scene.tables, "occluded") is not one
-    for _ in range(tracing.SCENES):
-        tracing.link_to_geometry(rt.Scene(shapes=(rt.Sphere(),)).tables, "closest_hit")
-    assert len(tracing._kept) == tracing.SCENES
-    assert tracing.link_to_geometry(scene.tables, "closest_hit") is not one
+    one = links.link_to_geometry(scene.tables, "closest_hit")
+    assert links.link_to_geometry(scene.tables, "closest_hit") is one
+    assert links.link_to_geometry(scene.tables, "occluded") is not one
+    for _ in range(links.SCENES):
+        links.link_to_geometry(rt.Scene(shapes=(rt.Sphere(),)).tables, "closest_hit")
+    assert len(links._kept) == links.SCENES
+    assert links.link_to_geometry(scene.tables, "closest_hit") is not one
 
 
 def test_links_last_as_long_as_the_query():
@@ -208,7 +208,7 @@ def test_links_last_as_long_as_the_query():
     scene = rt.Scene(shapes=(rt.Sphere(radius=0.5), rt.Box()))
     o, d = np.array([[0.0, 0.0, 3.0]]), np.array([[0.0, 0.0, -1.0]])
     traced_later = tracing.FirstHits(scene.tables, 1, surfaces=True)
-    for _ in range(tracing.SCENES):
+    for _ in range(links.SCENES):
         rt.Scene(shapes=(rt.Sphere(),)).intersect(o, d)
     taken = [np.full(n, -1) for n in range(1, 500)]  # the memory of links that are no more
     out = tracing.empty_hits(1, surfaces=True)

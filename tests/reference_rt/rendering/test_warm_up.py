@@ -26,7 +26,7 @@ from reference_rt.rendering import kernels
 from reference_rt.rendering.accumulation import radiance_job
 from reference_rt.rendering.kernels import Linked, operation_of
 from reference_rt.rendering.query import tracing
-from reference_rt.rendering.query.hits import solid_crossings
+from reference_rt.rendering.query.crossings import solid_crossings
 from reference_rt.rendering.query.light import direct_light
 from reference_rt.rendering.query.rays import camera_kernel
 from reference_rt.rendering.tiles import GivenRays

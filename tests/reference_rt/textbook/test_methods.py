@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from method_checks import CUBE, EXAMPLES, L_SHAPE, TRIANGLE, UNIT_SPHERE
+from method_checks import CUBE, EXAMPLES, L_SHAPE, SCENE, TRIANGLE, UNIT_SPHERE
 
 import reference_rt as rt
 from reference_rt import textbook
@@ -60,3 +60,15 @@ def test_refused_families_and_rays():
     for bad in ([0, 0, 1], [[0, 0, 0]], [[0, math.inf, 1]], [[0, 0, 1], [0, 0, 1]]):
         with pytest.raises(ValueError, match=r"expected (two \(n, 3\) arrays|finite)"):
             textbook.intersect("sphere.robust", UNIT_SPHERE, [[0, 0, 0]], bad)
+
+
+def test_hierarchies_find_what_renders():
+    """Bit for bit: `tests/reference_rt/accel` has what each of them builds, and more scenes."""
+    rng = np.random.default_rng(2)
+    o = rng.uniform(-2, 2, (2000, 3))
+    d = rng.uniform(-1, 1, (2000, 3)) - o
+    expected = SCENE.intersect(o, d).t
+    assert 0.2 * len(o) < np.isfinite(expected).sum() < len(o)
+    for name in textbook.names("hierarchy"):
+        t = textbook.intersect(name, textbook.SceneParameters(SCENE), o, d)
+        assert np.array_equal(t, expected), name

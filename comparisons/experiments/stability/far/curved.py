@@ -30,9 +30,8 @@ from comparisons.geometry.frame import round32
 from comparisons.mitsuba.backend import scalar
 from reference_rt.core.arrays import IntArray
 from reference_rt.core.transform import Transform, rotate
-from reference_rt.jit.kernel import entry_kernel
-from reference_rt.shapes import Cone, Cylinder, Quadric, Sphere, Torus
-from reference_rt.shapes.brute_force import intersect_row
+from reference_rt.jit.kernel import ByClass, entry_kernel
+from reference_rt.shapes import TABLES, Cone, Cylinder, Quadric, Sphere, Torus
 from reference_rt.shapes.curved.quadrics import Quadrics
 from reference_rt.shapes.curved.torus import Tori
 from reference_rt.shapes.shape import Shape, TabulationContext
@@ -238,10 +237,16 @@ def answer(rays: Rays) -> FloatArray:
     return t
 
 
+_intersect = ByClass("intersect")
+for _, _, _table, _module in TABLES:
+    _intersect.register(_table, _module.intersect)
+_intersect_row = _intersect.function
+
+
 @entry_kernel
 def _first(table: Any, o: FloatArray, d: FloatArray, t: FloatArray) -> None:
     for i in range(len(o)):
-        t[i] = intersect_row(table, i, ray_of(o, d, i)).t
+        t[i] = _intersect_row(table, i, ray_of(o, d, i)).t
 
 
 IN_MITSUBA = ("ellipsoid", "cylinder")

@@ -17,7 +17,7 @@ from comparisons.referee.sizes import LeafSizes
 from reference_rt import textbook
 from reference_rt.core.arrays import IntArray
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.rendering.query.hits import SolidCrossings, solid_crossings
+from reference_rt.rendering.query.crossings import SolidCrossings, solid_crossings
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import csg
 from reference_rt.shapes.shape import TabulationContext

@@ -20,7 +20,7 @@ from reference_rt.core.ray import Ray, SurfacePoint, ray_from
 from reference_rt.core.transform import Matrix, Rotate, Scale, Translate, Turn
 from reference_rt.core.vec3 import Vec3, dot, row
 from reference_rt.jit.kernel import entry_kernel, kernel
-from reference_rt.rendering.query.tracing import link_to_geometry
+from reference_rt.rendering.query.links import link_to_geometry
 
 # ---- rays, each at a row of a table of its own ---------------------------------------------------
 

@@ -1,0 +1,51 @@
+"""The textures of a scene -> Textures, and the palette by which parameters refer to them."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from reference_rt.scene.model import SceneModel
+from reference_rt.textures import TABLES as TEXTURE_TABLES
+from reference_rt.textures import Palette, Product, Textures, bitmap, product
+from reference_rt.textures.parameter import joined
+
+
+def texture_tables(scene: SceneModel) -> tuple[Textures | None, Palette]:
+    """The textures, and the palette by which material parameters refer to them."""
+    if not scene.textures:
+        return None, Palette({}, ())
+    parts: dict[int, list[Any]] = {}
+    try:
+        room, used = bitmap.room_for(scene.textures.values(), scene.folder), 0
+    except ValueError as error:
+        raise scene.error(str(error), "textures") from None
+    numbers = {name: k for k, name in enumerate(scene.textures)}
+    kinds, rows, maps, greatest = [], [], [], []
+    for name, texture in scene.textures.items():
+        code, module = next((c, m) for c, _, d, m in TEXTURE_TABLES if isinstance(texture, d))
+        try:
+            table: Any
+            if isinstance(texture, bitmap.Bitmap):
+                table = texture.tabulate(scene.folder, room[used:])
+                used += len(table.memory.codes8)
+            elif isinstance(texture, Product):
+                table = product.table_of(texture, numbers)
+            else:
+                table = texture.tabulate(scene.folder)
+        except ValueError as error:
+            raise scene.error(str(error), "textures", name) from None
+        parts.setdefault(code, []).append(table)
+        kinds.append(code)
+        rows.append(len(parts[code]) - 1)
+        maps.append(texture.uv.coefficients())
+        greatest.append(module.greatest(table))
+    for name, texture in scene.textures.items():
+        if isinstance(texture, Product):
+            greatest[numbers[name]] *= math.prod(greatest[numbers[of]] for of in texture.of)
+    tables = {
+        field: joined(module, parts[code]) if code in parts else None
+        for code, field, _, module in TEXTURE_TABLES
+    }
+    textures = Textures(np.array(kinds), np.array(rows), np.array(maps), **tables)
+    return textures, Palette(numbers, greatest)
