@@ -23,7 +23,7 @@ from comparisons.geometry.frame import round32
 from comparisons.mitsuba.backend import scalar
 from reference_rt.core.arrays import IntArray
 from reference_rt.core.transform import Transform, rotate
-from reference_rt.jit.kernel import ByClass, entry_kernel
+from reference_rt.jit.kernel import by_class, entry_kernel
 from reference_rt.shapes import TABLES, Cone, Cylinder, Quadric, Sphere, Torus
 from reference_rt.shapes.curved.quadrics import Quadrics
 from reference_rt.shapes.curved.torus import Tori
@@ -187,10 +187,7 @@ def answer(rays: Rays) -> FloatArray:
     return t
 
 
-_intersect = ByClass("intersect")
-for _code, _field, _table, _module in TABLES:
-    _intersect.register(_table, _module.intersect)
-_intersect_row = _intersect.function
+_intersect_row = by_class("intersect", {one.table: one.module.intersect for one in TABLES})
 
 
 @entry_kernel
