@@ -9,7 +9,7 @@ from stability_runs import measured
 import reference_rt as rt
 from comparisons.experiments.stability.far import curved, spheres
 from comparisons.experiments.stability.far.law import BAND, Truth, gaps, judge_by_moving
-from comparisons.experiments.stability.harness.outcomes import OURS, U
+from comparisons.experiments.stability.harness.outcomes import MITSUBA, OURS, U
 from comparisons.experiments.stability.harness.rays import Rays
 from comparisons.experiments.stability.harness.series import family
 from comparisons.experiments.stability.roots.certified import judge, of_quadratics
@@ -54,6 +54,13 @@ def test_the_band_is_measured(tmp_path):
     found = drawn("F1", "rim", 2.0**50, 2000, tmp_path)
     assert found[OURS].failures == 0
     assert found["sphere.robust"].failures > 200
+
+
+def test_mitsuba_is_held_to_the_law_of_float32(tmp_path):
+    """By its own roundoff: right at a thousand radii, though all it has is rounded."""
+    found = drawn("F1", "body", 1e3, 200, tmp_path, mitsuba=True)[MITSUBA]
+    assert (found.cases, found.failures) == (200, 0)
+    assert 1e-3 < found.worst < 1.0
 
 
 def test_hits_beside_an_apex():

@@ -4,7 +4,13 @@ import numpy as np
 
 from comparisons.experiments.stability.far.law import Truth
 from comparisons.experiments.stability.harness.in_mitsuba import traced
-from comparisons.experiments.stability.harness.outcomes import MITSUBA, OURS, FloatArray, Outcomes
+from comparisons.experiments.stability.harness.outcomes import (
+    MITSUBA,
+    OURS,
+    FloatArray,
+    Outcomes,
+    unit_of,
+)
 from comparisons.experiments.stability.harness.rays import Rays
 from comparisons.experiments.stability.harness.series import Draw
 from comparisons.geometry.affine import across, unit_vectors
@@ -145,5 +151,5 @@ def compete(draw: Draw, rays: Rays, strict: bool = False) -> Outcomes:
     found = {name: truth.judge(t) for name, t in answers(rays).items()}
     if draw.mitsuba:
         rounded = for_mitsuba(rays)
-        found[MITSUBA] = Truth(rounded, strict).judge(mitsubas(rounded))
+        found[MITSUBA] = Truth(rounded, unit_of(MITSUBA), strict).judge(mitsubas(rounded))
     return found

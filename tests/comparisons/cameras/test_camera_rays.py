@@ -1,14 +1,17 @@
-"""Every camera, translated, makes the same rays in both kinds of Mitsuba's variants."""
+"""Every camera makes the same rays in both kinds of Mitsuba's variants, and in scene files."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.backend import variant as in_variant
 from comparisons.rungs import geometry
-from comparisons.rungs.rays.camera import compare_camera
+from comparisons.rungs.rays.camera import camera_rays, compare_camera
 from comparisons.translator import load, to_mitsuba
+from comparisons.translator.writing import write_xml
 from reference_rt.cameras import AnyCamera, Orthographic, Perspective, Pinhole, ThinLens
 from reference_rt.cameras.film import Film
 from reference_rt.rendering.scene import Scene
@@ -76,6 +79,21 @@ def test_cameras_send_the_same_rays(
     assert found.problem == ""
     # Measured over random cameras in both variants: 0.35.
     assert found.numbers["max_camera_direction_error_over_bound"] <= 0.7
+
+
+@pytest.mark.parametrize(("camera", "size"), CASES)
+def test_cameras_in_files_send_the_same_rays(
+    camera: AnyCamera, size: tuple[int, int], tmp_path: Path
+) -> None:
+    scene = seen_by(camera.model_copy(update={"near": 0.3, "far": 9.0}), size)
+    write_xml(scene, tmp_path / "scene.xml")
+    again = Scene.load(tmp_path / "scene.xml")
+    assert (again.camera.near, again.camera.far) == (0.3, 9.0)
+    x, y = (np.linspace(0.01, 0.99, 7) * length for length in size)
+    for ours, theirs in zip(
+        *(camera_rays(one, x, y, (0.8, 0.3)) for one in (scene, again)), strict=True
+    ):
+        np.testing.assert_allclose(theirs, ours, rtol=0.0, atol=1e-12 * np.abs(ours).max())
 
 
 PLAIN = Perspective(**TILTED, fov=70.0)

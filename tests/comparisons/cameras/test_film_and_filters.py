@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import reference_rt as rt
-from comparisons.cameras.translate import translate_filter
+from comparisons.cameras.film import translate_filter
 from comparisons.mitsuba.backend import mitsuba
 from reference_rt.cameras.film import AnyFilter
 

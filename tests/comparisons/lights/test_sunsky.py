@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from comparisons.commands.compare import convert
-from comparisons.lights.reading import HEIGHT, WIDTH
+from comparisons.lights.sunsky import HEIGHT, WIDTH
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from comparisons.translator.reading import read_file
