@@ -12,8 +12,8 @@ import reference_rt as rt
 from reference_rt.core import transform
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3
-from reference_rt.shapes import PLANE
 from reference_rt.shapes.flat import base, plane
+from reference_rt.shapes.tables import CODES
 
 
 def test_signed_distance():
@@ -31,7 +31,7 @@ def test_the_point_is_off_by_no_more_than_its_error_at_the_horizon():
     tables, _ = shapes_in_order([rt.Plane(transform=(random_map(np.random.default_rng(4)),))])
     n = tables.planes.normal[0]
     along = np.cross(n, [0.3, 0.5, -0.8])
-    found = probe(tables, PLANE, [0], [tables.planes.center[0] + n], [along - 1e-15 * n])
+    found = probe(tables, CODES[plane], [0], [tables.planes.center[0] + n], [along - 1e-15 * n])
     assert found.t[0] > 1e14
     assert abs(n @ (found.p[0] - tables.planes.center[0])) <= found.error[0]
     assert found.error[0] <= 1e-14 * np.abs(found.p[0]).max()
