@@ -10,8 +10,7 @@
 
 - A scene: Scene, Film, json_schema; SceneError, SceneWarning
 - Its parts: a class for each type of shape (Sphere, Mesh, ...), solid (Union, ...), material
-  (Diffuse, ...), texture, light, camera, integrator, sampler and filter; `dir(reference_rt)` has
-  them all, and `__init__.pyi` by kind
+  (Diffuse, ...), texture, light, camera, integrator, sampler and filter
 - Pictures: render, Picture, read_image, ImageError
 - Queries: query (array queries, the methods of Scene), transform (affine maps), textbook (the
   textbook's intersection methods), build_tables, SceneTables
@@ -23,9 +22,14 @@ of which may import those before it: util, jit, core, sampling, textures, shapes
 materials, lights, integrators, scene, gltf, rendering, textbook, cli.
 """
 
+import textwrap as _textwrap
+
 import lazy_loader as _lazy_loader
 
 __getattr__, __dir__, _names = _lazy_loader.attach_stub(__name__, __file__)
+
+_all = "All names: " + ", ".join(_names)
+__doc__ = f"{__doc__}\n{_textwrap.fill(_all, 98, subsequent_indent='  ')}\n"  # for `help`
 
 
 class _All(list[str]):

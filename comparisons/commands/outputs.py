@@ -1,6 +1,6 @@
 """What commands write: checked before their work begins, and said at its end."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ class Outputs:
     records: tuple[str, ...] = ()
     markdown: tuple[Path | None, str] = (None, "")
     plots: Path | None = None
-    others: tuple[Path | None, ...] = ()
+    others: Sequence[Path | None] = ()
 
     @property
     def files(self) -> list[Path]:

@@ -63,59 +63,50 @@ def selftest(
     if mutants:
         _mutate(mutants, seed, scenes, out, opened)
         return
-    from rich.console import Console
-
+    from comparisons.commands.outputs import Outputs
     from comparisons.experiments.selftest import FAULTS
     from comparisons.experiments.selftest.run import SUITES, run
-    from reference_rt.util.files import check_writable
 
     patterns = only or ["*"]
     faults = [f for f in FAULTS if any(fnmatchcase(f.name, pattern) for pattern in patterns)]
     if not faults:
         raise UsageError(f"--only: no fault matches {', '.join(patterns)}")
-    files = out / "selftest.json", out / "selftest.md"
-    check_writable(*files)
-    console = Console(stderr=True, highlight=False)
-
-    def say(line: str) -> None:
-        console.print(line, markup=False, soft_wrap=True)
-
+    writes = Outputs(out, ("selftest.json", "selftest.md"))
+    writes.check()
+    tell = partial(say, err=True)
     with closing(opened()) as some:
-        outcome = run(faults, scenes, seeds, out, say, power, some)
+        outcome = run(faults, scenes, seeds, out, tell, power, some)
     for suite in SUITES:
         caught, total = outcome.share(suite)
-        say(f"{suite}: {caught} of {total} faults caught")
+        tell(f"{suite}: {caught} of {total} faults caught")
     for alarms in outcome.alarms:
         if not alarms.holds:
-            say(f"{alarms.kind}, {alarms.name}: {alarms.false_alarms} false alarms")
-    say(", ".join(map(str, files)))
+            tell(f"{alarms.kind}, {alarms.name}: {alarms.false_alarms} false alarms")
+    writes.finish()
     raise typer.Exit(0 if outcome.holds else 1)
 
 
 def _mutate(count: int, seed: int, scenes: Path, out: Path, opened: Callable[[], Workers]) -> None:
     """Mutation testing; writes what is known after each mutant."""
-    from rich.console import Console
-
+    from comparisons.commands.outputs import Outputs
     from comparisons.experiments.selftest.mutation import FILES, mutation, summary, write
     from comparisons.experiments.selftest.run import SUITES, budgets_of
-    from reference_rt.util.files import check_writable
 
-    check_writable(*(out / name for name in FILES))
-    console = Console(stderr=True, highlight=False)
-
-    def say(line: str) -> None:
-        console.print(line, markup=False, soft_wrap=True)
-
+    writes = Outputs(out, FILES)
+    writes.check()
+    tell = partial(say, err=True)
     by_suite = budgets_of(scenes)
     budgets = {suite: by_suite[suite] for suite in reversed(SUITES)}  # the small one first
     fates = []
     with closing(opened()) as workers:
-        for fate in mutation(count, seed, scenes, budgets, say, workers):
+        for fate in mutation(count, seed, scenes, budgets, tell, workers):
             fates.append(fate)
             where = f" ({fate.by}, {fate.rung}, {fate.scene})" if fate.rung else ""
-            say(f"{fate.file}:{fate.line} {fate.what}: {fate.outcome}{where}")
+            tell(f"{fate.file}:{fate.line} {fate.what}: {fate.outcome}{where}")
             write(fates, seed, out)
-    say(summary(fates))
+    for line in summary(fates).splitlines():
+        tell(line)
+    writes.finish()
 
 
 @guarded
@@ -151,14 +142,15 @@ def stability(
     with compare_extra():
         from comparisons.commands.outputs import Outputs
         from comparisons.experiments.stability.harness import outputs, page
-        from comparisons.experiments.stability.harness.core import MODULES, Effort, summaries
-        from comparisons.experiments.stability.harness.core import family as family_of
+        from comparisons.experiments.stability.harness.points import summaries
         from comparisons.experiments.stability.harness.run import (
             Choice,
             mitsuba_is_there,
             run,
             shoot,
         )
+        from comparisons.experiments.stability.harness.series import MODULES, Effort
+        from comparisons.experiments.stability.harness.series import family as family_of
         from comparisons.report import terminal
         from comparisons.runs.provenance import ours, provenance
 
@@ -283,9 +275,10 @@ def fuzz(
     with compare_extra("fuzzing"):
         from comparisons.commands.outputs import Outputs
         from comparisons.experiments.fuzz import summary
-        from comparisons.experiments.fuzz.fields import features as known
-        from comparisons.experiments.fuzz.finding import RUNGS, Effort, Grammar, remove
+        from comparisons.experiments.fuzz.finding import RUNGS, Effort, Grammar
+        from comparisons.experiments.fuzz.results import remove
         from comparisons.experiments.fuzz.run import Plan, run
+        from comparisons.experiments.fuzz.schema import features as known
         from comparisons.experiments.fuzz.summary import Display, write_page
         from comparisons.runs.provenance import provenance
     from reference_rt.cli.options import Where
@@ -341,13 +334,13 @@ def fuzz(
 
 def _plant(pattern: str, out: Path, seed: int, workers: int) -> None:
     """Search for planted faults, and say what became of each."""
+    from comparisons.commands.outputs import Outputs
     from comparisons.experiments.fuzz.planted import FILE, search, source_faults, summary
-    from reference_rt.util.files import check_writable
 
     faults = [fault for fault in source_faults() if fnmatchcase(fault.name, pattern)]
     if not faults:
         raise UsageError(f"--planted: no source fault matches {pattern}")
-    check_writable(out / FILE)
+    Outputs(out, (FILE,)).check()
     found = []
     for one in search(faults, out, seed, workers):
         found.append(one)

@@ -14,7 +14,7 @@ from comparisons.compare.judge import Evidence, Rendered, at_look, check, judge
 from comparisons.compare.path_length import path_lengths
 from comparisons.compare.single_lights import single_lights
 from comparisons.geometry.flatten import copies_of
-from comparisons.lights.translate import in_place_of
+from comparisons.integrators.mistakes import in_place_of
 from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.results.case import Case, RungResult

@@ -1,6 +1,7 @@
 """A case that shows itself in notebooks, and writes its page."""
 
 import os
+from dataclasses import fields
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,11 @@ _Z_SPAN = 5.0
 
 class NotebookCase(Case):
     """The result for one scene, with a view in notebooks."""
+
+    @classmethod
+    def of(cls, case: Case) -> "NotebookCase":
+        """The same case, with that view."""
+        return cls(**{field.name: getattr(case, field.name) for field in fields(case)})
 
     def __repr__(self) -> str:
         return f"<Case {self.scene}: {self.verdict}: {headline(self)}>"

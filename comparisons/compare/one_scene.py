@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Callable
-from dataclasses import fields
 
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, compare_scene
@@ -42,4 +41,4 @@ def compare_one(
     mitsuba()
     budget = Budget(replicates=replicates, seconds=time_limit, limit=limit, witness=witness)
     case = compare_scene(Subject(loaded), budget, say or (lambda line: None), threads)
-    return NotebookCase(**{field.name: getattr(case, field.name) for field in fields(case)})
+    return NotebookCase.of(case)

@@ -21,7 +21,7 @@ import numpy as np
 from scipy import special
 
 from comparisons import statistics
-from comparisons.lights.translate import of_solids
+from comparisons.integrators.mistakes import in_place_of
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.lit_scene import LitScene
@@ -141,7 +141,9 @@ class Effect:
         self.mi_scene, self.passes, self._pairs = counterpart.mi_scene, 0, pairs
         self._spp = max(1, RAYS // (scene.film.width * scene.film.height))
         depth = min(scene.integrator.max_depth or DEPTH, DEPTH)
-        described = of_solids(scene.integrator.model_copy(update={"max_depth": depth}))
+        integrator = scene.integrator.model_copy(update={"max_depth": depth})
+        described = in_place_of(scene.changed(integrator=integrator), has_solids=True)
+        assert described is not None
         self._integrators = [
             mitsuba().load_dict({**described, "starts_close": close}) for close in (True, False)
         ]

@@ -12,7 +12,6 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import singledispatch
 from pathlib import Path
 from typing import Any
 
@@ -20,23 +19,21 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons import shapes
-from comparisons.cameras.translate import focus_of
+from comparisons.cameras import type_of as type_of_camera
 from comparisons.cycles.surfaces import placed_arrays, triangles_of, type_name
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import copies_of, place_of
 from comparisons.geometry.frame import SHARE, round32
+from comparisons.integrators import type_of as type_of_integrator
+from comparisons.lights import type_of as type_of_light
 from comparisons.materials import type_of as type_of_material
 from comparisons.renderers import NoCounterpartError
 from comparisons.renderers.vocabulary import Data, plain_rgb
 from comparisons.shapes.soup import Soup
 from comparisons.textures import type_of as type_of_texture
 from comparisons.translator.moved import frame_of, moved
-from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
 from reference_rt.cameras.film import BoxFilter
 from reference_rt.core.arrays import FloatArray
-from reference_rt.integrators import Direct
-from reference_rt.integrators import Path as PathTracing
-from reference_rt.lights import Constant, Directional, Point
 from reference_rt.materials import Emissive
 from reference_rt.rendering.scene import Scene
 
@@ -125,10 +122,14 @@ def write(scene: Scene, folder: Path, threads: int | None = None) -> None:
         found["camera"] = camera_of(scene.camera, scene.film)
     for light in scene.lights:
         with writing.collected():
-            if isinstance(light, Constant):
-                background += light.radiance
+            to_cycles = type_of_light(light).to_cycles
+            if to_cycles is None:
+                raise NoCounterpartError(f"the light {light.type}")
+            data = to_cycles(light)
+            if data["type"] == "BACKGROUND":
+                background += data["colour"]
             else:
-                found["lights"].append(light_of(light))
+                found["lights"].append(data)
     found["background"] = background.tolist()
     found["meshes"] = _meshes(writing)
     with writing.collected():
@@ -153,15 +154,10 @@ def bounces_of(integrator: Any) -> int:
     """Cycles' bounces: edges of a path without the first and the last one."""
     if getattr(integrator, "hide_emitters", False):
         raise NoCounterpartError("lamps that cameras do not see")
-    if isinstance(integrator, Direct):
-        if not integrator.shadows:
-            raise NoCounterpartError("direct light without shadows")
-        if not (integrator.light_samples and integrator.bsdf_samples):
-            raise NoCounterpartError("direct light by one strategy alone")
-        return 0
-    if not isinstance(integrator, PathTracing):
+    edges_of = type_of_integrator(integrator).edges
+    if edges_of is None:
         raise NoCounterpartError(f"the integrator {integrator.type}")
-    edges = integrator.max_depth
+    edges = edges_of(integrator)
     if edges is not None and edges < 2:
         raise NoCounterpartError("emission alone (max_depth below 2)")
     return MOST_BOUNCES if edges is None else min(edges - 2, MOST_BOUNCES)
@@ -174,8 +170,7 @@ def camera_of(camera: Any, film: Any) -> Data:
     """The camera looks along its -z, with +y up.  width: of what it sees at distance 1, or of an
     orthographic view;  shift: of that rectangle, in widths;  aspect: width over height of a
     pixel."""
-    if not isinstance(camera, Perspective | ThinLens | Pinhole | Orthographic):
-        raise NoCounterpartError(f"the camera {camera.type}")
+    of = type_of_camera(camera)
     if not isinstance(film.filter, BoxFilter):
         raise NoCounterpartError(f"the filter {film.filter.type}")
     eye, target = np.array(camera.eye), np.array(camera.target)
@@ -183,15 +178,13 @@ def camera_of(camera: Any, film: Any) -> Data:
     right = np.cross(camera.up, back)
     axes = np.stack([right, np.cross(back, right), back], axis=1)
     axes /= np.linalg.norm(axes, axis=0)
-    l, r, b, t = _edges(camera, film)
-    if isinstance(camera, Pinhole):  # upside down
+    l, r, b, t = of.edges(camera, film)
+    if of.is_upside_down:
         axes[:, :2] *= -1.0
     width, height = r - l, t - b
-    aperture, focus = 0.0, 1.0
-    if isinstance(camera, ThinLens):
-        aperture, focus = camera.aperture_radius, focus_of(camera)
+    aperture, focus = (0.0, 1.0) if of.lens is None else of.lens(camera)
     return {
-        "type": "ORTHO" if isinstance(camera, Orthographic) else "PERSP",
+        "type": "ORTHO" if of.is_parallel else "PERSP",
         "matrix": np.column_stack([axes, eye]).tolist(),
         "width": width,
         "shift": [(l + r) / 2.0 / width, (b + t) / 2.0 / width],
@@ -202,51 +195,6 @@ def camera_of(camera: Any, film: Any) -> Data:
         "aperture": aperture,
         "focus": focus,
     }
-
-
-def _edges(camera: Any, film: Any) -> tuple[float, float, float, float]:
-    """Left, right, bottom and top edge of what a camera sees, at distance 1 of a central one."""
-    w, h = film.width, film.height
-    if isinstance(camera, Pinhole):
-        x = camera.film_width / camera.film_distance / 2.0
-    elif camera.view is not None:
-        distance = getattr(camera, "distance", None) or 1.0
-        l, r, b, t = (edge / distance for edge in camera.view)
-        return l, r, b, t
-    elif isinstance(camera, Orthographic):
-        x = 1.0 if camera.width is None else camera.width / 2.0
-    else:
-        axis = camera.fov_axis or "x"
-        side = {"x": w, "y": h, "diagonal": math.hypot(w, h), "smaller": min(w, h)}
-        across = side.get(axis, max(w, h))
-        x = math.tan(math.radians(45.0 if camera.fov is None else camera.fov) / 2.0) * w / across
-    return -x, x, -x * h / w, x * h / w
-
-
-# ---- lights --------------------------------------------------------------------------------------
-
-
-@singledispatch
-def light_of(light: Any) -> Data:
-    """A light of Blender: watts of points are 4 pi times their radiant intensity."""
-    raise NoCounterpartError(f"the light {light.type}")
-
-
-@light_of.register
-def _(light: Point) -> Data:
-    place = np.column_stack([np.eye(3), light.position])
-    watts = [4.0 * math.pi * x for x in light.intensity]
-    return {"type": "POINT", "colour": watts, "matrix": place.tolist()}
-
-
-@light_of.register
-def _(light: Directional) -> Data:
-    """A sun shines along its -z."""
-    back = -np.array(light.direction) / np.linalg.norm(light.direction)
-    aside = np.cross(back, np.eye(3)[np.argmin(np.abs(back))])
-    aside /= np.linalg.norm(aside)
-    axes = np.column_stack([aside, np.cross(back, aside), back, np.zeros(3)])
-    return {"type": "SUN", "colour": list(light.irradiance), "matrix": axes.tolist()}
 
 
 # ---- shapes --------------------------------------------------------------------------------------
@@ -308,9 +256,8 @@ def _check_places(writing: Writing) -> None:
     where the camera and all lights are outside.  A view that is much smaller than the scene is too
     coarse in float32."""
     camera = writing.scene.camera
-    points = [
-        np.array([light.position] * 2) for light in writing.scene.lights if isinstance(light, Point)
-    ]
+    places = ((type_of_light(light).at, light) for light in writing.scene.lights)
+    points = [np.array([at(light)] * 2) for at, light in places if at is not None]
     for box in (np.array([camera.eye] * 2), *points, *writing.lamps):
         for glass in writing.glass:
             if np.all(box[0] <= glass[1]) and np.all(glass[0] <= box[1]):

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from comparisons.geometry.exact.dyadic import BoolArray
 from comparisons.geometry.frame import Frame
 from comparisons.translator.moved import moved as in_frame
 from reference_rt.core import transform
@@ -50,6 +51,11 @@ Names = Callable[[Identities], Identities]
 def identities_of(hits: Intersections) -> Identities:
     columns = (hits.shape, hits.instance, hits.part, hits.primitive)
     return np.where(hits.shape[:, None] < 0, -1, np.column_stack(columns))
+
+
+def differ(a: Identities, b: Identities) -> BoolArray:
+    """Which rays (n,) do not hit the same thing."""
+    return np.asarray((a != b).any(axis=1))
 
 
 # ---- all of a scene moved, scaled, turned -------------------------------------------------------

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -129,7 +129,7 @@ def gate(
     settings: dict[str, Any] = {"limit": limit, "noise_free": noise_free, "tone_curve": tone_curve}
     request = Request(known, others, threads=threads, rim=rim, **settings)
     case = gated(request, pictures_of(pictures))
-    return NotebookCase(**{field.name: getattr(case, field.name) for field in fields(case)})
+    return NotebookCase.of(case)
 
 
 @dataclass(frozen=True)

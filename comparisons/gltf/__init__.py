@@ -19,6 +19,8 @@ import numpy as np
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import Copy, Leaf, copies_of
 from comparisons.gltf.surfaces import Surfaces
+from comparisons.lights import type_of
+from comparisons.lights.light import across
 from comparisons.mitsuba.files import (
     Files,
     UnwritableError,
@@ -34,7 +36,6 @@ from comparisons.translator.resolved import (
     placed,
     tessellated,
 )
-from reference_rt import lights
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Plane
@@ -87,8 +88,6 @@ def _glb(document: dict[str, Any], data: bytes) -> bytes:
 NEAR = 1e-3
 """Distance of the near plane over that of the farthest vertex: depths of 24 bits then tell points
 apart that are 6e-5 of the scene apart."""
-
-POINTS = lights.Point | lights.Spot | lights.Directional
 
 
 class _Document(Surfaces):
@@ -163,41 +162,21 @@ class _Document(Surfaces):
         self.node(np.column_stack([axes, eye]), camera=number, name="camera")
 
     def light(self, light: Any, number: int) -> None:
-        name = f"lights[{number}]"
-        if isinstance(light, lights.Ambient):
-            self.note("the ambient light is left out")
-            return
-        if isinstance(light, lights.Constant | lights.EnvironmentMap):
-            self.note(
-                f"the environment ({name}) is left out: renderers of glTF are given one beside it"
-            )
-            return
-        if not isinstance(light, POINTS):
+        name, to_gltf = f"lights[{number}]", type_of(light).to_gltf
+        if to_gltf is None:
             raise UnwritableError(f"a light '{light.type}'")
-        place, axis = (0.0, 0.0, 0.0), np.array([0.0, 0.0, -1.0])
-        found: dict[str, Any] = {"type": light.type, "name": name}
-        power = light.irradiance if isinstance(light, lights.Directional) else light.intensity
-        match light:
-            case lights.Point():
-                place = light.position
-            case lights.Directional():
-                axis = np.array(light.direction) / np.linalg.norm(light.direction)
-            case lights.Spot():
-                if light.texture is not None or light.cutoff_angle > 90.0:
-                    raise UnwritableError("a spot with a texture, or wider than a half-space")
-                place, axis = light.origin, light.axis
-                self.note("renderers choose how spots fall off towards their rims")
-                outer = float(np.radians(light.cutoff_angle))
-                beam = 0.75 * light.cutoff_angle if light.beam_width is None else light.beam_width
-                inner = min(float(np.radians(beam)), outer * (1.0 - 1e-6))
-                found["spot"] = {"innerConeAngle": inner, "outerConeAngle": outer}
-        most = max(power)
-        found |= {"color": [x / most for x in power] if most else [0.0] * 3, "intensity": most}
+        found = to_gltf(light, name, self)
+        if found is None:
+            return
+        axis, most = found.axis, max(found.power)
+        colour = [x / most for x in found.power] if most else [0.0] * 3
+        data = {"type": light.type, "name": name, **(found.data or {})}
+        data |= {"color": colour, "intensity": most}
         self.used.add("KHR_lights_punctual")
-        across = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
-        across /= np.linalg.norm(across)
-        turned = np.column_stack([across, np.cross(-axis, across), -axis, place])
-        which = {"light": self.add("lights", found)}
+        aside = np.cross(axis, across(axis))
+        aside /= np.linalg.norm(aside)
+        turned = np.column_stack([aside, np.cross(-axis, aside), -axis, found.place])
+        which = {"light": self.add("lights", data)}
         self.node(turned, extensions={"KHR_lights_punctual": which}, name=name)
 
     def node(self, m: affine.Affine, **more: Any) -> None:

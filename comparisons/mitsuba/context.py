@@ -66,14 +66,23 @@ class TranslationContext:
         write = self.files.write
         return {"filename": write(f"{stem}.exr", lambda file: write_exr(file, planes, {}))}
 
-    def look_at(self, origin: Any, target: Any, up: Any, scale: Any = (1.0, 1.0, 1.0)) -> Any:
-        """to_world of what looks from a point at another one;  scale: of its own coordinates."""
-        if self.files is None:
-            known = mitsuba().ScalarTransform4f
-            look = known().look_at(list(origin), list(target), list(up))
-            return look @ known().scale(list(scale))
-        look = LookAt(origin, target, up)
-        return (look,) if scale == (1.0, 1.0, 1.0) else (Step("scale", scale), look)
+    def to_world(self, *steps: Step | LookAt, double: bool = False) -> Any:
+        """The map that begins with the first step, of scales, translations and looks;  double: in
+        memory of float64."""
+        if self.files is not None:
+            return steps
+        known = mitsuba().ScalarTransform4d if double else mitsuba().ScalarTransform4f
+        found = known()
+        for step in reversed(steps):
+            if isinstance(step, LookAt):
+                found = found @ known().look_at(*map(list, step))
+            else:
+                found = found @ getattr(known(), step.kind)(list(step.numbers))
+        return found
+
+
+NO_CONTEXT = TranslationContext(materials={}, textures={}, folder=Path())
+"""Of what needs none, such as filters and integrators."""
 
 
 def rgb(colour: tuple[float, float, float]) -> dict[str, Any]:

@@ -308,6 +308,8 @@ class Reading:
     shapes: list[Any] = field(default_factory=list)
     lights: list[Any] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    mirrored_for: Node | None = None
+    """The sensor that mirrors the picture, if there is one."""
     names: dict[Any, str] = field(default_factory=dict)
     """The names of what has been read, by index of its element and what it is read for."""
     attributes: dict[str, str] = field(default_factory=dict)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
 
 from comparisons.mitsuba.colours import colour, index_of_refraction
-from comparisons.mitsuba.context import TranslationContext, rgb
+from comparisons.mitsuba.context import NO_CONTEXT, TranslationContext, rgb
 from comparisons.mitsuba.node import Node, Reading
 
 T = TypeVar("T")
@@ -78,7 +78,7 @@ class PluginTable:
     rows: tuple[Row, ...] = ()
     ignored: tuple[str, ...] = ()
 
-    def write(self, part: Any, context: TranslationContext) -> dict[str, Any]:
+    def write(self, part: Any, context: TranslationContext = NO_CONTEXT) -> dict[str, Any]:
         """The dictionary of a description, in the order of the rows.  Raises UntranslatableError,
         ValueError for a file that cannot be used."""
         values = {row.name: row.kind.write(getattr(part, row.field), context) for row in self.rows}

@@ -83,7 +83,9 @@ def by_second(shape: Mesh | Triangle, folder: Path, ours: Corners) -> Corners | 
         corners = _in_order(known, ours)
     if shape.face_normals:
         corners = replace(corners, normals=None, silent=tuple({*corners.silent} - {"normals"}))
-    elif corners.normals is None and ours.bent is not None:
+    elif corners.normals is None and (
+        ours.bent is not None or (shape.smooth and "normals" not in corners.silent)
+    ):
         # In float32 the small triangles of a mesh that is far away would have other normals.
         points = _refined(corners.points, ours.points)
         uv = ours.uv if "uv" in corners.silent else corners.uv

@@ -1,8 +1,10 @@
 """The words of pbrt-v4's file format, and the names of materials and textures in a file."""
 
+import json
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,14 +29,8 @@ def words(
     return " ".join(found)
 
 
-def _word(value: Any) -> str:
-    match value:
-        case bool():
-            return str(value).lower()
-        case str():
-            escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-            return f'"{escaped}"'
-    return repr(value)
+_word = partial(json.dumps, ensure_ascii=False)
+"""A value of pbrt's, which are written as those of JSON."""
 
 
 @dataclass

@@ -10,18 +10,11 @@ from comparisons.report.table import Table, table_of
 from comparisons.results.case import Case
 from comparisons.results.headline import detectable, percent
 from comparisons.results.naming import named
+from comparisons.statistics.scales import IMAGE, PIXELS, SCALES, TILES
 from reference_rt.util.errors import printable
 
-_FAMILIES = (
-    ("tiles", "tiles"),
-    ("pixels", "pixels"),
-    ("lines", "rows and columns"),
-    ("modes", "smooth patterns"),
-)
-"""The numbers of tests of many biases, and what these are called."""
-
-_MAIN = ("tiles", "pixels")
-"""Those that a table has always; it has the others where they differ."""
+_MAIN = (TILES, PIXELS)
+"""Scales that a table has always; it has the others where they differ."""
 
 
 def biases_of(case: Case) -> Table[Any] | None:
@@ -40,13 +33,13 @@ def biases_of(case: Case) -> Table[Any] | None:
     found = ", ".join(some).replace(" %,", ",")
     known = rung.numbers.get("noise_known", True)
     would = percent(seen) if known else "unknown"
-    columns = [("image mean", found, would, _within(rung.numbers.get("limit")))]
-    for key, what in _FAMILIES:
-        cells = rung.numbers.get(key)
-        if isinstance(cells, Mapping) and (key in _MAIN or cells["differ"]):
+    columns = [(IMAGE.what, found, would, _within(rung.numbers.get("limit")))]
+    for scale in SCALES[1:]:
+        cells = rung.numbers.get(scale.name)
+        if isinstance(cells, Mapping) and (scale in _MAIN or cells["differ"]):
             half = cells.get("median_detectable_bias")
             would = f"{percent(half)} in half of them" if known and half is not None else ""
-            column = (f"{cells['tested']:,} {what}", _worst(cells), would)
+            column = (f"{cells['tested']:,} {scale.what}", _worst(cells), would)
             columns.append((*column, _within(cells.get("worst_margin"))))
     return _transposed(columns)
 

@@ -262,12 +262,12 @@ def write_tests(path: Path, name: str, tests: Iterable[Test]) -> None:
     suite = TestSuite(_legal(name))
     for test in tests:
         written = TestCase(_legal(test.name), _legal(name), round(test.seconds, 3))
+        details = _legal(test.details)
         if test.result is not None:
+            test.result.text = details or None
             written.result = [test.result]
-        if test.details and test.result is None:
-            written.system_out = _legal(test.details)
-        elif test.details:
-            test.result.text = _legal(test.details)
+        elif details:
+            written.system_out = details
         suite.add_testcase(written)
     document = JUnitXml(_legal(name))
     document.add_testsuite(suite)

@@ -18,7 +18,7 @@ from comparisons.rungs.rays.mitsuba_light import _lamp, is_dark, mitsuba_direct
 from comparisons.rungs.rays.rays import described, mixed_rays
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.lights import AREA, PROJECTOR, SPOT
+from reference_rt.lights import AREA
 from reference_rt.materials import any_smooth
 from reference_rt.rendering import query
 from reference_rt.rendering.query import DirectLight
@@ -168,8 +168,10 @@ def _compare(
     bound += slopes_of(context, light, u, value)
     scale = magnified(context, light, target, ours.pdf[known])
     bound += slopes_of_image(context, light, u, value, scale)
-    # Where a spot or projector does not reach, no shadow ray explains that Mitsuba's does.
-    of_shadow = (ours.pdf[known] > 0.0) | (kind_of(context, light) not in (SPOT, PROJECTOR))
+    # Where a light does not shine, no shadow ray explains that Mitsuba's does.
+    kind = kind_of(context, light)
+    is_bounded = kind in POINT_LIKE and POINT_LIKE[kind].is_bounded
+    of_shadow = (ours.pdf[known] > 0.0) | (not is_bounded)
     error = np.abs(theirs - value).max(axis=1)
     wrong = np.flatnonzero(~(error <= bound))
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.cameras.translate import translate_filter
+from comparisons.cameras.film import translate_filter
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.scene import for_rays
 from comparisons.results.case import RungResult

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from comparisons.geometry.frame import UNIT_ROUNDOFF, round32
-from comparisons.lights.translate import ambient_of, translate_integrator
+from comparisons.integrators import translate_integrator
+from comparisons.integrators.whitted import AMBIENT
+from comparisons.lights.constant import ambient_of
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.plugins.whitted import MOST_COMPONENTS
@@ -165,12 +167,9 @@ def plugin_radiance(
     boxes = [
         name for name, p in counterpart.mi_shapes.items() if isinstance(p.leaf, Box | Rectangle)
     ]
-    ambient = dict(
-        zip(("ambient_r", "ambient_g", "ambient_b"), ambient_of(scene.lights), strict=True)
-    )
     described = {
         **(translate_integrator(integrator) or {}),
-        **ambient,
+        **dict(zip(AMBIENT, ambient_of(scene.lights), strict=True)),
         "components": MOST_COMPONENTS * most_branches(tables.materials),
         "unlit": " ".join(unlit),
         "boxes": " ".join(boxes),

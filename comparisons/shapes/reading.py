@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.lights.reading import emission
+from comparisons.lights.area import emission
 from comparisons.materials.reading import material_name
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.parse import as_transform

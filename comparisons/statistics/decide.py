@@ -204,9 +204,9 @@ def _decide(found: Findings, limit: float, advice: str) -> tuple[Status, str]:
     image, spread = found.image, found.uniformity
     differ = [s for s in SCALES if s.name in found.tests and found.tests[s.name].differs.any()]
     for scale in differ[:1]:
-        text = words_of(scale, found.tests[scale.name], found.place(scale), scale.though)
+        text = words_of(scale, found.tests[scale.name], found.place(scale))
         if scale is IMAGE and TILES in differ:
-            text += f"; {words_of(TILES, found.tests[TILES.name], found.place(TILES))}"
+            text += f"; {words_of(TILES, found.tests[TILES.name], found.place(TILES), alone=False)}"
         return "differ", text
     if spread is not None and spread.wide:
         return "differ", (

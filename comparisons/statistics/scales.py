@@ -203,13 +203,14 @@ class Place(NamedTuple):
 class Scale(NamedTuple):
     """A family of tests that share one level (Šidák 1967).
 
-    name: the key of its numbers;  level: chance of a false alarm of all its tests together;  test:
-    at a level; None where the picture is too small;  finds: what is said where some differ, with
-    `though` for what does not;  place: of an index into the tests, for the picture's shape and the
-    side of a tile.
+    name: the key of its numbers;  what: that is tested, for people;  level: chance of a false alarm
+    of all its tests together;  test: at a level; None where the picture is too small;  finds: what
+    is said where some differ;  though: what does not, or is judged before;  place: of an index into
+    the tests, for the picture's shape and the side of a tile.
     """
 
     name: str
+    what: str
     level: float
     test: Callable[[Pair, float], BiasTest | None]
     finds: str
@@ -242,28 +243,15 @@ def _of_mode(at: tuple[int, ...], shape: tuple[int, ...], tile: int) -> Place:
     return Place(" and ".join(waves), {"worst": index})
 
 
-_SOME = "{count} of {tests} %s differ{though}; the worst, {place}: {beyond}"
+_SOME = "{count} of {tests} {what} differ{though}; the worst, {place}: {beyond}"
+_SMOOTH = "brightness differs smoothly over the picture{though}: {place}, {beyond}"
 
 IMAGE, TILES, PIXELS, LINES, MODES = SCALES = (
-    Scale("image", 0.0005, image_test, "the image mean differs: {beyond}"),
-    Scale("tiles", 0.0001, tile_test, _SOME % "tiles", ", though not the image mean", _of_tile),
-    Scale("pixels", 0.0001, pixel_test, _SOME % "pixels", ", though not a whole tile", _of_pixel),
-    Scale(
-        "lines",
-        0.00005,
-        line_test,
-        _SOME % "rows and columns",
-        ", though no tile and no pixel",
-        _of_line,
-    ),
-    Scale(
-        "modes",
-        0.00005,
-        mode_test,
-        "brightness differs smoothly over the picture{though}: {place}, {beyond}",
-        ", though not its mean",
-        _of_mode,
-    ),
+    Scale("image", "image mean", 5e-4, image_test, "the image mean differs: {beyond}"),
+    Scale("tiles", "tiles", 1e-4, tile_test, _SOME, "not the image mean", _of_tile),
+    Scale("pixels", "pixels", 1e-4, pixel_test, _SOME, "not a whole tile", _of_pixel),
+    Scale("lines", "rows and columns", 5e-5, line_test, _SOME, "no tile and no pixel", _of_line),
+    Scale("modes", "smooth patterns", 5e-5, mode_test, _SMOOTH, "not its mean", _of_mode),
 )
 """In the order in which they are told.  Their levels, with those of the ranks (`ranks.LEVEL`) and
 of the order of both sides' replicates (`order.ORDER_LEVEL`), add up to one false alarm in a

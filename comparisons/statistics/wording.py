@@ -43,13 +43,14 @@ def interval(test: BiasTest, at: tuple[int, ...]) -> str:
     return f"{name} {100.0 * test.relative[at]:+.3g} ± {half_width}"
 
 
-def words_of(scale: Scale, test: BiasTest, place: Place, though: str = "") -> str:
-    """That some of a scale's tests differ, and the worst of them."""
+def words_of(scale: Scale, test: BiasTest, place: Place, alone: bool = True) -> str:
+    """That some of a scale's tests differ, and the worst of them;  alone: no scale before does."""
     differ = test.differs.any(axis=-1)
     return scale.finds.format(
         count=np.count_nonzero(differ),
         tests=differ.size,
-        though=though,
+        what=scale.what,
+        though=f", though {scale.though}" if alone else "",
         place=place.words,
         beyond=f"{interval(test, test.worst)}, beyond ±{percent(float(test.margin[test.worst]))}",
     )

@@ -1,9 +1,8 @@
-"""Scene -> Mitsuba: one `singledispatch` function per public type of `reference_rt`.
+"""Scene -> Mitsuba, by what `comparisons` knows of each public type of `reference_rt`.
 
-Contract: a function takes the description and, where it needs textures or other materials, the
-`TranslationContext`, and returns the dict of a Mitsuba plugin (shapes: a list of `Plugin`), with
-radiance and lengths unchanged.  None means that Mitsuba has no place for it.  To translate a new
-type: register a function in the file of its kind; until then it raises `UntranslatableError`, which
+Contract: a type's function takes the description and the `TranslationContext`, and returns the dict
+of a Mitsuba plugin (shapes: a list of `Plugin`), with radiance and lengths unchanged.  None means
+that Mitsuba has no place for it.  A type that no folder knows raises `UntranslatableError`, which
 makes a scene `not-comparable`.
 """
 
@@ -13,22 +12,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.cameras.translate import (
-    translate_camera,
-    translate_film,
-    translate_sampler,
-)
+from comparisons.cameras import translate_camera
+from comparisons.cameras.film import translate_film
+from comparisons.cameras.samplers import translate_sampler
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import Copy, Leaf, Member, copies_of, place_of
 from comparisons.geometry.frame import Frame
-from comparisons.lights.translate import (
-    BLACK,
-    counts_lights_often,
-    drops_light,
-    in_place_of,
-    translate_integrator,
-    translate_light,
-)
+from comparisons.integrators import translate_integrator
+from comparisons.integrators.mistakes import BLACK, counts_lights_often, drops_light, in_place_of
+from comparisons.lights import translate_light
 from comparisons.materials.translate import (
     coloured_parts_of,
     is_oriented,
@@ -122,7 +114,8 @@ def _groups(mi_shapes: Mapping[str, MitsubaShape]) -> dict[str, Any]:
 
 
 def _translated(scene: Scene, native: bool = False) -> _Translated:
-    sensor = translate_camera(scene.camera, scene.film)
+    context = TranslationContext.of(scene, native)
+    sensor = translate_camera(scene.camera, scene.film, context)
     sensor["film"] = translate_film(scene.film)
     sensor["sampler"] = translate_sampler(scene.resolved_sampler)
     plain: dict[str, Any] = {"type": "scene", **ROBUST, "sensor": sensor}
@@ -135,7 +128,6 @@ def _translated(scene: Scene, native: bool = False) -> _Translated:
     copies = copies_of(scene)
     count = {group: sum(c.group == group for c in copies) for group in {c.group for c in copies}}
     shared: dict[Any, Any] = {}
-    context = TranslationContext.of(scene, native)
     reach = _reach(scene, copies)
     for copy in copies:
         try:

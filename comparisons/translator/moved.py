@@ -1,22 +1,23 @@
-"""A scene as float32 can hold it: in its counterpart's frame, every length scaled and every
-radiance unchanged; and with float32 vertices."""
+"""A scene elsewhere: in its counterpart's frame, every length scaled and every radiance unchanged;
+mirrored; and with float32 vertices."""
 
 from collections.abc import Callable
-from functools import singledispatch
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from comparisons.cameras.translate import focus_of
+from comparisons.cameras import type_of as type_of_camera
+from comparisons.cameras.camera import MIRROR
 from comparisons.geometry.frame import Frame, frame_for
+from comparisons.lights import type_of as type_of_light
+from comparisons.lights.light import Motion, with_steps
+from comparisons.mitsuba.node import Node, Reading, Triple, triple
 from comparisons.referee.sizes import ShapeSizes
 from comparisons.shapes.mesh import soup_of
 from comparisons.shapes.soup import Soup
-from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
-from reference_rt.cameras.camera import Camera
 from reference_rt.core.transform import Scale, Translate
-from reference_rt.lights import Point, Projector, Spot
-from reference_rt.materials import Bump
+from reference_rt.materials import Bump, NormalMap
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Mesh, Triangle
 from reference_rt.shapes.meshes.triangle import Triangles
@@ -39,14 +40,18 @@ def moved(scene: Scene, frame: Frame) -> Scene:
     shapes = tuple(
         shape.model_copy(update={"transform": (*shape.transform, *steps)}) for shape in scene.shapes
     )
-    camera = scene.camera
-    there = {"eye": _point(camera.eye, frame), "target": _point(camera.target, frame)}
+    camera, motion = scene.camera, Motion(partial(_into, frame), tuple, frame.scale, ())
+    there = {
+        "eye": motion.point(camera.eye),
+        "target": motion.point(camera.target),
+        "near": camera.near * frame.scale,
+        "far": camera.far and camera.far * frame.scale,
+        **type_of_camera(camera).scaled(camera, frame.scale),
+    }
     return scene.changed(
-        camera=camera.model_copy(
-            update=there | planes_of(camera, frame.scale) | lengths_of(camera, frame.scale)
-        ),
+        camera=camera.model_copy(update=there),
         shapes=shapes,
-        lights=tuple(_light(light, frame) for light in scene.lights),
+        lights=tuple(type_of_light(light).moved(light, motion) for light in scene.lights),
         materials={
             name: material.model_copy(update={"scale": material.scale * frame.scale})
             if isinstance(material, Bump)
@@ -56,55 +61,42 @@ def moved(scene: Scene, frame: Frame) -> Scene:
     )
 
 
-def _point(p: Any, frame: Frame) -> tuple[float, ...]:
-    return tuple(frame.into(np.array([p], dtype=np.float64))[0].tolist())
+def _into(frame: Frame, p: Any) -> Triple:
+    return triple(frame.into(np.array([p], dtype=np.float64))[0])
 
 
-def planes_of(camera: Camera, scale: float) -> dict[str, Any]:
-    """A camera's clipping planes, scaled."""
-    return {"near": camera.near * scale, "far": camera.far and camera.far * scale}
+# ---- cameras that mirror the picture -------------------------------------------------------------
 
 
-@singledispatch
-def lengths_of(camera: Any, scale: float) -> dict[str, Any]:
-    """A camera's lengths, scaled, except those of which only the ratio matters."""
-    raise TypeError(f"lengths_of does not support a {type(camera).__name__}")
+def mirror(reading: Reading, node: Node) -> None:
+    """Mirror the shapes and lights of `reading` by MIRROR for the sensor `node`.  Raises
+    SceneError."""
+    for name, material in reading.materials.items():
+        if isinstance(material, NormalMap):
+            # Their green is along n x dp/du, which a mirror reverses.
+            raise node.error(
+                "'to_world' mirrors the picture, which is not supported together with normal maps "
+                f"('{name}'); expected a rotation: mirror the picture instead"
+            )
+    step = {"matrix": np.column_stack([MIRROR, np.zeros(3)]).tolist()}
+    motion = Motion(_mirrored, _mirrored, 1.0, (step,))
+    lights = [type_of_light(light).moved(light, motion) for light in reading.lights]
+    if None in lights:
+        raise node.error(
+            "'to_world' mirrors the picture, which is not supported together with lights that "
+            "project images; expected a rotation: mirror the picture instead"
+        )
+    reading.lights = lights
+    reading.shapes = [with_steps(shape, motion.steps) for shape in reading.shapes]
+    reading.note(
+        node,
+        "'to_world' mirrors the picture, which our cameras do not: the whole scene is mirrored "
+        "instead, x being -x",
+    )
 
 
-@lengths_of.register(Perspective)
-@lengths_of.register(Pinhole)
-def _(camera: Perspective | Pinhole, scale: float) -> dict[str, Any]:
-    return {}
-
-
-@lengths_of.register
-def _(camera: Orthographic, scale: float) -> dict[str, Any]:
-    if camera.view is not None:
-        return {"view": tuple(scale * x for x in camera.view)}
-    return {"width": scale * (2.0 if camera.width is None else camera.width)}
-
-
-@lengths_of.register
-def _(camera: ThinLens, scale: float) -> dict[str, Any]:
-    return {
-        "aperture_radius": scale * camera.aperture_radius,
-        "focus_distance": scale * focus_of(camera),
-    }
-
-
-def _light(light: Any, frame: Frame) -> Any:
-    """A light, moved; intensity grows with scale², as irradiance falls with distance²."""
-    if isinstance(light, Projector):
-        places = {"origin": _point(light.origin, frame), "target": _point(light.target, frame)}
-        return light.model_copy(update={"scale": light.scale * frame.scale**2, **places})
-    if not isinstance(light, Point | Spot):
-        return light
-    brighter = tuple(x * frame.scale**2 for x in light.intensity)
-    if isinstance(light, Point):
-        places = {"position": _point(light.position, frame)}
-    else:
-        places = {"origin": _point(light.origin, frame), "target": _point(light.target, frame)}
-    return light.model_copy(update={"intensity": brighter, **places})
+def _mirrored(p: Any) -> Triple:
+    return triple(MIRROR @ p)
 
 
 # ---- float32 vertices ----------------------------------------------------------------------------

@@ -13,13 +13,15 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from comparisons.cameras.reading import read_sensor
-from comparisons.lights.reading import belongs_to_shape, read_light
+from comparisons.cameras import read_sensor
+from comparisons.integrators import read_integrator
+from comparisons.lights import read_light
+from comparisons.lights.area import belongs_to_shape
 from comparisons.materials.reading import material_name
 from comparisons.mitsuba.node import MissingError, Node, Reading
 from comparisons.mitsuba.parse import Parsed, module, parse_dict, parse_file
 from comparisons.shapes.reading import read_shape
-from comparisons.translator.integrators import read_integrator
+from comparisons.translator.moved import mirror
 from reference_rt.sampling import AnySampler, Grid, Sobol
 from reference_rt.scene.model import SceneModel
 from reference_rt.util.errors import SceneError, SceneWarning
@@ -150,6 +152,8 @@ def _scene(parsed: Parsed, cls: type[M]) -> M:
     integrator, layers = read_integrator(reading, integrators[0] if integrators else None)
     sampler: AnySampler | None
     camera, film, sampler = read_sensor(reading, sensors[0] if sensors else None)
+    if reading.mirrored_for is not None:
+        mirror(reading, reading.mirrored_for)
     root.finish()
     if not sensors and parsed.file != "<dict>":
         raise root.error("has no sensor; expected one")

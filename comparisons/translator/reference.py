@@ -7,11 +7,12 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-from comparisons.lights.translate import (
+from comparisons.integrators.mistakes import (
     BLACK,
     counts_lights_often,
     drops_light,
     in_place_of,
+    notes_of_integrator,
 )
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.colours import index_of_refraction
@@ -21,7 +22,7 @@ from comparisons.mitsuba.parse import Parsed, parse_file
 from comparisons.mitsuba.plugins.exact_coat import COLOURS, SUBSTITUTE
 from comparisons.renderers import ReferenceSampler
 from comparisons.textures.texture import matrix_of
-from comparisons.translator.notes import note_of, notes_of_integrator
+from comparisons.translator.notes import note_of
 from comparisons.translator.reading import read_supported
 from reference_rt.materials import (
     Blend,

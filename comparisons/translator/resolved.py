@@ -10,13 +10,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from comparisons.cameras import type_of as type_of_camera
 from comparisons.geometry import affine
 from comparisons.geometry.affine import Affine
 from comparisons.geometry.flatten import Leaf, Tree, copies_of
 from comparisons.mitsuba.files import Files, check_name, ply, write_files
 from comparisons.shapes import type_of
 from comparisons.shapes.soup import Soup
-from reference_rt.cameras import Orthographic, Pinhole, ThinLens
+from reference_rt.cameras import Orthographic
 from reference_rt.cameras.view_rectangle import CentralCamera
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IntArray
@@ -139,19 +140,19 @@ def camera_of(scene: Scene) -> dict[str, Any]:
     eye."""
     camera, film = scene.camera, scene.film
     right, up, back = camera.basis.tolist()
+    of = type_of_camera(camera)
     found: dict[str, Any] = {"type": camera.type, "eye": list(camera.eye)}
-    if isinstance(camera, Pinhole):
-        # What it sees, upside down, as a rectangle in front of it.
-        half = camera.film_width / camera.film_distance / 2.0
-        tall = half * film.height / film.width
-        found["type"], edges = "perspective", [-half, half, -tall, tall]
+    if of.is_upside_down:  # what it sees as a rectangle in front of it
+        found["type"] = "perspective"
         right, up = [-x for x in right], [-x for x in up]
+        edges = of.edges(camera, film)
     else:
         assert isinstance(camera, CentralCamera | Orthographic)
-        edges = list(camera.rectangle(film.width, film.height))
-    found |= {"right": right, "up": up, "back": back, "view": edges}
-    if isinstance(camera, ThinLens):
-        found |= {"aperture_radius": camera.aperture_radius, "focus_distance": camera.focus}
+        edges = camera.rectangle(film.width, film.height)
+    found |= {"right": right, "up": up, "back": back, "view": list(edges)}
+    if of.lens is not None:
+        lens = of.lens(camera)
+        found |= {"aperture_radius": lens.radius, "focus_distance": lens.focus}
     return found
 
 

@@ -1,5 +1,5 @@
 """Path tracing as a lecture writes it: one path, one loop, without blocks, light computed ahead, or
-an order of work that saves time (PBR 4ed 13.2: `SimplePathIntegrator`).
+an order of work that saves time (as PBR 4ed, 13.2, has its simple path integrator).
 
 It renders nothing.  Tests hold `path.radiances` to it, bit for bit; docs/course/path.md quotes it.
 """

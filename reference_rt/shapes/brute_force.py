@@ -20,7 +20,7 @@ from reference_rt.core.ray import (
     put_hit,
     ray_of,
 )
-from reference_rt.jit.kernel import ByClass, kernel, local_floats, local_integers
+from reference_rt.jit.kernel import by_class, kernel, local_floats, local_integers
 from reference_rt.jit.links import Link
 from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.shapes.dispatch import found
@@ -91,10 +91,7 @@ def _complete_later(shapes: Shapes, rays: RayBlock, hits: HitBlock, n: int) -> N
     return
 
 
-_completing = ByClass("complete_behind_link")
-_completing.register(Link, _complete)
-_completing.register(Shapes, _complete_later)
-_complete_behind_link = _completing.function
+_complete_behind_link = by_class("complete", {Link: _complete, Shapes: _complete_later})
 """Completes the hits of a block, unless whoever reads them has the shapes' tables."""
 
 

@@ -5,7 +5,7 @@ import os
 import signal
 import time
 
-from comparisons.experiments.fuzz import finding
+from comparisons.experiments.fuzz import results
 from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced, Request
 from comparisons.runs.processes import serve
 
@@ -23,14 +23,14 @@ def scene(request: Request) -> None:
         time.sleep(600.0)
     findings = [FOUND] if request.number in (4, 5) else []
     types = ["shape:sphere", "material:mirror"]
-    finding.add(
+    results.add(
         request.out, Checked(number=request.number, findings=findings, types=types, lit=True)
     )
 
 
 def reduced(request: Request) -> None:
     assert request.finding is not None
-    finding.add(
+    results.add(
         request.out,
         Reduced(
             number=request.number,

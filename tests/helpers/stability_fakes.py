@@ -4,21 +4,23 @@ import math
 import os
 import sys
 import time
+from types import ModuleType
 
 import numpy as np
 
-from comparisons.experiments.stability.harness import core, run
-from comparisons.experiments.stability.harness.core import (
-    MITSUBA,
-    OURS,
+from comparisons.experiments.stability.harness import run
+from comparisons.experiments.stability.harness.outcomes import MITSUBA, OURS, Outcome
+from comparisons.experiments.stability.harness.series import (
+    FAMILIES,
+    MODULES,
     Family,
-    Outcome,
     Series,
-    Shot,
     Sweep,
+    add,
     alone,
     decades,
 )
+from comparisons.experiments.stability.harness.shots import Shot
 
 METHOD = "sphere.algebraic"
 
@@ -56,39 +58,33 @@ def _shoot(contestant, x):
 CASES = 20, 2000
 
 
-def _of(name: str, called: str, law: str, *series: Series) -> Family:
-    return Family(name, called, law, series)
-
-
 FAR = Sweep("distance / radius", decades(0, 12), (1.0, 1e4, 1e8), *CASES)
 END = {"unit": "u", "holds_to": 1e8, "law": "eight decades and no more"}
 CRASH = Sweep("x", decades(0, 2), decades(0, 2), *CASES)
 NEAR = Sweep("x", decades(8, 10), decades(8, 10), *CASES)
 SLEEP = Sweep("s", (0.25, 60.0), (0.25, 60.0), *CASES)
 
-ALL = (
-    _of(
-        *("T1", "growing <errors>", "Errors grow as x."),
+ALL = {
+    Family("T1", "growing <errors>", "Errors grow as x."): (
         Series("far", FAR, "It is far.", _grows, **END, shoot=_shoot),
         Series("alone", alone(*CASES), "One setting.", _grows),
     ),
-    _of("T2", "what breaks", "Nothing.", Series("crash", CRASH, "Dies at 10.", _crashes)),
-    _of("T3", "failing", "Ours must hold.", Series("near", NEAR, "It fails.", _grows)),
-    _of("T4", "slow", "Takes x seconds.", Series("slow", SLEEP, "Sleeps.", _slow)),
-)
-
-FAMILIES = {one.id: one for one in ALL}
+    Family("T2", "what breaks", "Nothing."): (Series("crash", CRASH, "Dies at 10.", _crashes),),
+    Family("T3", "failing", "Ours must hold."): (Series("near", NEAR, "It fails.", _grows),),
+    Family("T4", "slow", "Takes x seconds."): (Series("slow", SLEEP, "Sleeps.", _slow),),
+}
 
 
-def install():
+def install(families=ALL):
     """Let the fakes stand for the families."""
-    module = sys.modules[__name__]
-    for name, one in FAMILIES.items():
-        fake = type(module)(f"comparisons.experiments.stability.{name}")
-        fake.FAMILY = one
+    MODULES.clear()
+    for family, some in families.items():
+        fake = ModuleType(f"{FAMILIES}.{family.id}")
+        fake.FAMILY = family
         sys.modules[fake.__name__] = fake
-    core.MODULES.clear()
-    core.MODULES.update({name: name for name in FAMILIES})
+        MODULES[family.id] = family.id
+        for one in some:
+            add(fake.__name__, one)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from comparisons.experiments.stability.harness.core import Draw, Outcome, family, generator
+from comparisons.experiments.stability.harness.outcomes import Outcome
+from comparisons.experiments.stability.harness.series import Draw, family, generator
 
 
 def measured(

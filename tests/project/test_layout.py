@@ -18,8 +18,9 @@ FLOORS = {
     ),
     "comparisons": (
         *("results", "geometry", "statistics", "renderers", "mitsuba", "textures", "materials"),
-        *("cameras", "lights", "shapes", "referee", "translator", "pbrt", "gltf", "runs", "cycles"),
-        *("rungs", "report", "compare", "gate", "truth", "suites", "experiments", "commands"),
+        *("cameras", "lights", "integrators", "shapes", "referee", "translator", "pbrt", "gltf"),
+        *("runs", "cycles", "rungs", "report", "compare", "gate", "truth", "suites"),
+        *("experiments", "commands"),
     ),
 }
 """The folders of each package from the lowest to the highest: a file may import files of its own

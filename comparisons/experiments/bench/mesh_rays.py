@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.experiments.bench.row import Row, Setting, against, alternate, seconds
+from comparisons.mitsuba.files import ply
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators import RayCast
 from reference_rt.integrators.scene_tables import SceneTables
@@ -18,6 +19,7 @@ from reference_rt.materials import Diffuse
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Mesh
+from reference_rt.shapes.meshes.files import MeshData
 from reference_rt.util.errors import UsageError
 from reference_rt.util.files import replacing, temporary_folder
 
@@ -60,19 +62,8 @@ def blob(triangles: int) -> Blob:
 
 def write_ply(path: Path, mesh: Blob) -> None:
     """A binary .ply file of float32 positions and int32 indices."""
-    header = (
-        "ply\nformat binary_little_endian 1.0\n"
-        f"element vertex {len(mesh.vertices)}\n"
-        "property float x\nproperty float y\nproperty float z\n"
-        f"element face {len(mesh.faces)}\n"
-        "property list uchar int vertex_indices\nend_header\n"
-    )
-    rows = np.empty(len(mesh.faces), np.dtype([("n", "u1"), ("corners", "<i4", 3)]))
-    rows["n"], rows["corners"] = 3, mesh.faces
     with replacing(path) as temporary:
-        temporary.write_bytes(
-            header.encode() + mesh.vertices.astype("<f4").tobytes() + rows.tobytes()
-        )
+        temporary.write_bytes(ply(MeshData(mesh.vertices, mesh.faces), float32=True))
 
 
 # ---- rays and rates -----------------------------------------------------------------------------

@@ -1,14 +1,14 @@
 """Differential fuzzing: random scenes through both renderers, and cases reduced to a few lines.
 
-- `fields.py`, `assets.py`: the types of the scene schema; random values of fields, meshes, and
-  files;
-- `parts.py`, `generate.py`: random parts, and the scene that is made of them;
+- `schema.py`: the types of the scene schema; `fields.py`, `meshes.py`, `assets.py`: random values
+  of fields, meshes, and files;
+- `parts.py`, `generate.py`: random parts, and the scene that is made of them, as `data.py`;
 - `check.py`: one scene through the rungs, `identities.py` through changes that must not matter;
-- `finding.py`: what is asked for, with how much effort, what is found, and results that a run
-  resumes;
+- `finding.py`: what is asked for, with how much effort, and what is found; `results.py`: kept in a
+  folder, so that a run is resumed;
 - `reduce.py`: a failing scene made small while it fails in the same way;
 - `worker.py`, `run.py`: processes that may crash;
-- `summary.py`: what was covered and found, for people and programs;
+- `summary.py`, `coverage.py`: what was found and covered, for people and programs;
 - `planted.py`: how soon faults that are planted in the source are found.
 
 A scene is a function of the run's seed and its number, so a number repeats it.  It is generated as

@@ -13,20 +13,18 @@ import numpy as np
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, gather
 from comparisons.compare.judge import judge
-from comparisons.experiments.fuzz.fields import types_in
+from comparisons.experiments.fuzz.data import Data, copy_of, named_in
 from comparisons.experiments.fuzz.finding import (
     DETERMINISTIC,
     Checked,
-    Data,
     Effort,
     Finding,
-    copy_of,
-    named_in,
     without_numbers,
 )
 from comparisons.experiments.fuzz.generate import parse
 from comparisons.experiments.fuzz.identities import IDENTITIES, Original
 from comparisons.experiments.fuzz.reduce import renamed, without_unused
+from comparisons.experiments.fuzz.schema import types_in
 from comparisons.geometry.flatten import copies_of
 from comparisons.materials.translate import is_textured
 from comparisons.mitsuba.context import TranslationContext

@@ -1,145 +1,16 @@
 """Random values for the fields of a description, from its JSON Schema."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from itertools import combinations
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.fuzz.finding import Data, shapes_of
-from reference_rt.cameras import AnyCamera
-from reference_rt.cameras.film import AnyFilter
+from comparisons.experiments.fuzz.data import Data
+from comparisons.experiments.fuzz.schema import name_of
 from reference_rt.core.model import Description
-from reference_rt.core.transform import Step
-from reference_rt.integrators import AnyIntegrator
-from reference_rt.lights import AnyLight
-from reference_rt.materials import AnyMaterial
-from reference_rt.sampling import AnySampler
-from reference_rt.shapes.csg import AnyShape
-from reference_rt.textures import AnyTexture
-from reference_rt.util.errors import UsageError, meant
-
-# ---- the types of the scene schema by kind, and those that occur in a scene ----------------------
-
-
-KINDS: dict[str, Any] = {
-    "shape": AnyShape,
-    "material": AnyMaterial,
-    "texture": AnyTexture,
-    "light": AnyLight,
-    "camera": AnyCamera,
-    "integrator": AnyIntegrator,
-    "sampler": AnySampler,
-    "filter": AnyFilter,
-    "step": Step,
-}
-"""The unions of types in the schema, by kind."""
-
-ONE_OF = ("camera", "integrator", "sampler", "filter")
-"""Kinds of which a scene has one."""
-
-GROUPS: dict[str, tuple[str, ...]] = {
-    "csg": ("union", "intersection", "difference"),
-    "glass": ("dielectric", "thin_dielectric", "rough_dielectric"),
-    "metal": ("conductor", "rough_conductor", "mirror"),
-    "lamps": ("emissive",),
-    "meshes": ("mesh", "triangle"),
-    "groups": ("instance",),
-    "textures": ("bitmap", "checker", "vertex_colours", "product"),
-    "nested": ("mask", "two_sided", "blend", "bump", "normal_map"),
-    "sky": ("constant", "environment_map"),
-}
-"""Names for several types, which `--features` takes beside the names of types."""
-
-
-def _classes(annotation: Any) -> Iterator[type[Description]]:
-    if isinstance(annotation, type):
-        yield annotation
-        return
-    for part in get_args(annotation):
-        if isinstance(part, type) or get_args(part):
-            yield from _classes(part)
-
-
-def name_of(cls: type[Description]) -> str:
-    """The word for a type in scene files: its `type`, or the only key of a transform step."""
-    fields = cls.model_fields
-    return str(fields["type"].default) if "type" in fields else next(iter(fields))
-
-
-@cache
-def types(kind: str) -> dict[str, type[Description]]:
-    """The types of a kind by name."""
-    found = (c for c in _classes(KINDS[kind]) if issubclass(c, Description))
-    return {name_of(c): c for c in found}
-
-
-@cache
-def all_types() -> tuple[tuple[str, str], ...]:
-    """All (kind, name)."""
-    return tuple((kind, name) for kind in KINDS for name in types(kind))
-
-
-def features(names: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
-    """The (kind, name) of types and GROUPS; of a group one in turn is drawn for a scene, so a group
-    stays a word.  Raises UsageError."""
-    known = {name for _, name in all_types()} | GROUPS.keys()
-    for name in names:
-        if name not in known:
-            listed = ", ".join(sorted(known))
-            message = f"--features: there is no '{name}'; expected some of {listed}"
-            raise UsageError(message + meant(name, sorted(known)))
-    return tuple(("group" if n in GROUPS else kind_of(n), n) for n in names)
-
-
-def kind_of(name: str) -> str:
-    """The kind of the first type with this name; 'box' is a shape and a filter."""
-    return next(kind for kind, other in all_types() if other == name)
-
-
-def types_in(scene: Data) -> set[tuple[str, str]]:
-    """The (kind, name) that occur in a scene's data, unused materials included."""
-    found: set[tuple[str, str]] = set()
-    for shape in shapes_of(scene):
-        found.add(("shape", shape["type"]))
-        found |= {("step", key) for step in shape.get("transform", ()) for key in step}
-    for key, kind in (("materials", "material"), ("textures", "texture")):
-        found |= {(kind, one["type"]) for one in scene.get(key, {}).values()}
-    for light in scene.get("lights", ()):
-        found.add(("light", light["type"]))
-        found |= {("step", key) for step in light.get("transform", ()) for key in step}
-    for kind in ("camera", "integrator", "sampler"):
-        if kind in scene:
-            found.add((kind, scene[kind]["type"]))
-    if "filter" in scene.get("film", {}):
-        found.add(("filter", scene["film"]["filter"]["type"]))
-    return found
-
-
-def possible_pairs() -> list[tuple[tuple[str, str], tuple[str, str]]]:
-    """Pairs of types that one scene can have."""
-    return [pair for pair in combinations(all_types(), 2) if _together(*pair)]
-
-
-_SKIES = {("light", "constant"), ("light", "environment_map")}
-
-
-def _together(a: tuple[str, str], b: tuple[str, str]) -> bool:
-    if a[0] == b[0] and a[0] in ONE_OF:
-        return False
-    if {a, b} == _SKIES:
-        return False
-    pair = {a, b}
-    if ("sampler", "grid") in pair:
-        (other,) = pair - {("sampler", "grid")}
-        integrator = types("integrator").get(other[1])
-        random = other[0] == "integrator" and not getattr(integrator, "deterministic", True)
-        return not random
-    return True
-
 
 DIGITS = 3
 """Significant digits of random numbers: findings stay readable."""
@@ -189,9 +60,6 @@ class Draw:
 def rounded(x: float) -> float:
     """x with DIGITS digits."""
     return float(f"{x:.{DIGITS}g}")
-
-
-# ---- from the schema ----------------------------------------------------------------------------
 
 
 def values(cls: type[Description], draw: Draw, names: Names) -> Data:

@@ -8,12 +8,16 @@ from typing import Any
 import numpy as np
 
 from comparisons.experiments.fuzz import assets, parts
-from comparisons.experiments.fuzz.fields import GROUPS, Draw, Names, kind_of, rounded, types, values
-from comparisons.experiments.fuzz.finding import Data, Grammar, text_of
+from comparisons.experiments.fuzz.data import Data, text_of
+from comparisons.experiments.fuzz.fields import Draw, Names, rounded, values
+from comparisons.experiments.fuzz.finding import Grammar
 from comparisons.experiments.fuzz.parts import REACH, RefusedError
+from comparisons.experiments.fuzz.schema import GROUPS, kind_of, types
 from reference_rt.integrators import RayCast
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
+from reference_rt.shapes import Plane
+from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.shape import Solid
 from reference_rt.util.errors import SceneWarning
 
@@ -250,7 +254,7 @@ class Assembly:
     def _lamp(self) -> Data:
         draw = self.draw
         place = draw.between(2.5, 4.0) * parts.direction(draw, 0.0)
-        kind = draw.pick([k for k in self._some("shape", 16, 16) if k in LAMPS])
+        kind = draw.pick([k for k in self._some("shape", 16, 16) if _can_stand_before(k)])
         size = draw.between(0.02, 0.1) if draw.extreme and draw.chance(0.3) else 0.5
         try:
             found = parts.shape(draw, kind, self.names, self.folder)
@@ -260,11 +264,10 @@ class Assembly:
         return found | {"material": self._material(lamp=True), "transform": steps}
 
 
-LAMPS = (
-    *("sphere", "rectangle", "disk", "box", "triangle", "mesh", "polygon"),
-    *("cylinder", "cone", "torus", "quadric"),
-)
-"""Shapes that stand before the scene as lamps."""
+def _can_stand_before(kind: str) -> bool:
+    """Whether a lamp of this type of shape is small, and is lit as a light: no plane, no copy, no
+    solid."""
+    return not issubclass(types("shape")[kind], Solid | Instance | Plane)
 
 
 def _is_lit(integrator: Data, lights: list[Data]) -> bool:

@@ -2,7 +2,7 @@
 
 An identity is a function of the `Original` scene.  It returns "agree", None if it does not apply,
 or the `Finding`.  What changes in the scene is in `comparisons.experiments.relations`.  To add one:
-the function, and a line in `IDENTITIES`.
+a function with the decorator `identity`.
 """
 
 import dataclasses
@@ -15,8 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.experiments import relations
-from comparisons.experiments.fuzz.finding import Data, Finding, named_in, shapes_of
-from comparisons.experiments.relations import HIERARCHIES, REACH, Motion, identities_of
+from comparisons.experiments.fuzz.data import Data, named_in, shapes_of
+from comparisons.experiments.fuzz.finding import Finding
+from comparisons.experiments.relations import HIERARCHIES, REACH, Motion, differ, identities_of
 from comparisons.geometry.frame import Frame
 from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays.rays import pixel_rays
@@ -87,6 +88,18 @@ class Original:
         return bench(self.scene, self.rng, self.rays)
 
 
+Identity = Callable[[Original], str | Finding | None]
+
+IDENTITIES: dict[str, Identity] = {}
+"""By name, in the order in which a scene is put through them."""
+
+
+def identity(check: Identity) -> Identity:
+    """Register a function as the identity of its name."""
+    IDENTITIES[check.__name__] = check
+    return check
+
+
 def words(hits: Intersections, k: int) -> str:
     """A hit, for people."""
     if hits.shape[k] < 0:
@@ -114,6 +127,7 @@ def _again(scene: Scene, data: Data) -> Scene:
     return Scene.parse(json.dumps(data), "other.json", scene.folder)
 
 
+@identity
 def written(original: Original) -> str | Finding:
     """Written as YAML or JSON and read again, the scene is the same."""
     scene = original.scene
@@ -126,6 +140,7 @@ def written(original: Original) -> str | Finding:
     return "agree"
 
 
+@identity
 def renamed(original: Original) -> str | Finding:
     """Other names for materials, textures and groups, defined in another order."""
     data = _data(original.scene)
@@ -147,11 +162,13 @@ def renamed(original: Original) -> str | Finding:
     return _same_picture("renamed", original, _again(original.scene, data))
 
 
+@identity
 def threads(original: Original) -> str | Finding:
     """Two threads in place of one."""
     return _same_picture("threads", original, original.scene, 2)
 
 
+@identity
 def hierarchy(original: Original) -> str | Finding:
     """Other acceleration structures, two of all: rays, and the picture for one of them."""
     at = original.bench
@@ -164,6 +181,7 @@ def hierarchy(original: Original) -> str | Finding:
     return _same_picture("hierarchy", original, other)
 
 
+@identity
 def reordered(original: Original) -> str | Finding | None:
     """Shapes in another order."""
     scene, at = original.scene, original.bench
@@ -188,6 +206,7 @@ def _is_tie(scene: Scene, at: Bench, k: int, other: int) -> bool:
     return bool(found.t[0] == at.hits.t[k])
 
 
+@identity
 def split(original: Original) -> str | Finding | None:
     """Meshes in two halves."""
 
@@ -208,6 +227,7 @@ def split(original: Original) -> str | Finding | None:
     return _of_rays("split meshes", "split", at, hits, bad)
 
 
+@identity
 def scaled(original: Original) -> str | Finding:
     """All lengths times a power of two: the same t along rays scaled likewise, and the same light
     of Whitted ray tracing."""
@@ -247,8 +267,7 @@ def _unlike(a: FloatArray, b: FloatArray) -> Any:
 
 def _unequal(a: Intersections, b: Intersections) -> Any:
     """Rays that do not hit the same thing at the same t."""
-    differ = (identities_of(a) != identities_of(b)).any(axis=1)
-    return np.flatnonzero(_unlike(a.t, b.t) | differ)
+    return np.flatnonzero(_unlike(a.t, b.t) | differ(identities_of(a), identities_of(b)))
 
 
 def _of_rays(how: str, identity: str, at: Bench, hits: Intersections, bad: Any) -> str | Finding:
@@ -295,6 +314,7 @@ NORMAL = 1e-6
 curvature of ordinary scenes are below 1e-9; a wrong formula is off by 1e-3 and more."""
 
 
+@identity
 def moved(original: Original) -> str | Finding:
     """Everything moved by the same vector."""
     at = original.bench
@@ -305,6 +325,7 @@ def moved(original: Original) -> str | Finding:
     return _judged("moved", f"moved by {offset.tolist()}", at, hits, float(np.abs(offset).max()))
 
 
+@identity
 def grouped(original: Original) -> str | Finding | None:
     """Shapes under one more map each, against an instance of a group of them under that map."""
     scene, rng = original.scene, original.rng
@@ -389,19 +410,3 @@ def _excused(at: Bench, hits: Intersections, k: int, shift: float) -> bool:
         return False
     spread = SPREAD * np.ptp(near.n[alike], axis=0).max() + NORMAL
     return bool((np.abs(near.n[alike] - hits.n[k]).max(axis=1) <= spread).any())
-
-
-Identity = Callable[[Original], str | Finding | None]
-
-IDENTITIES: dict[str, Identity] = {
-    "written": written,
-    "renamed": renamed,
-    "threads": threads,
-    "hierarchy": hierarchy,
-    "reordered": reordered,
-    "split": split,
-    "scaled": scaled,
-    "moved": moved,
-    "grouped": grouped,
-}
-"""By name, in the order in which a scene is put through them."""

@@ -1,14 +1,17 @@
 """Random parts of a scene: materials, shapes, lights, cameras, placed so that they are seen."""
 
 import warnings
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.fuzz.assets import mesh
-from comparisons.experiments.fuzz.fields import Draw, Names, rounded, types, values
-from comparisons.experiments.fuzz.finding import Data, text_of
+from comparisons.experiments.fuzz.data import Data, text_of
+from comparisons.experiments.fuzz.fields import Draw, Names, rounded, values
+from comparisons.experiments.fuzz.meshes import mesh
+from comparisons.experiments.fuzz.schema import types
+from reference_rt.core.model import Description
 from reference_rt.materials import Emissive, Wrapper
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
@@ -103,39 +106,17 @@ def _tabulates(cls: type, found: Data, folder: Path) -> bool:
     return True
 
 
-def _encloses(kind: str) -> bool:
-    """Whether the shape can be an operand of set operations."""
-    try:
-        one = {"type": "union", "of": [{**_DEFAULTS.get(kind, {}), "type": kind}]}
-        Scene.model_validate({"shapes": [one]})
-    except SceneError:
-        return False
-    return kind not in ("instance", *_FLAT)
-
-
-_FLAT = ("rectangle", "disk", "polygon", "triangle")
-_DEFAULTS: Data = {
-    "mesh": {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
-             "faces": [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]},
-    "quadric": {"coefficients": [1, 1, 1, 0, 0, 0, 0, 0, 0, -1], "lower": [-2, -2, -2],
-                "upper": [2, 2, 2], "capped": True},
-    "triangle": {"v0": [0, 0, 0], "v1": [1, 0, 0], "v2": [0, 1, 0]},
-    "polygon": {"rings": [[[0, 0], [1, 0], [0, 1]]]},
-    "instance": {"group": "none"},
-}  # fmt: skip
-
-_OPERANDS: list[str] = []
-
-
-def operand_types() -> list[str]:
+@cache
+def operand_types() -> tuple[str, ...]:
     """The types that set operations take, set operations included."""
-    if not _OPERANDS:
-        _OPERANDS.extend(kind for kind in types("shape") if _takes_part(kind))
-    return _OPERANDS
+    return tuple(kind for kind, cls in types("shape").items() if _takes_part(kind, cls))
 
 
-def _takes_part(kind: str) -> bool:
-    return issubclass(types("shape")[kind], Solid) or _encloses(kind)
+def _takes_part(kind: str, cls: type[Description]) -> bool:
+    """Whether a solid can be made of an example of the type."""
+    capped = {"capped": True} if "capped" in cls.model_fields else {}
+    solids = ({"type": "union", "of": [{**one, **capped, "type": kind}]} for one in cls.EXAMPLES)
+    return issubclass(cls, Solid) or any(is_valid({"shapes": [s]}, Path()) for s in solids)
 
 
 def _operands(draw: Draw, names: Names, folder: Path, depth: int) -> list[Data]:

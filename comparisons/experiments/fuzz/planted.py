@@ -3,7 +3,6 @@ scenes become that show them."""
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -11,14 +10,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
 
-import reference_rt
-from comparisons.experiments.fuzz.fields import all_types
+from comparisons.experiments.fuzz.schema import all_types
 from comparisons.experiments.selftest import FAULTS
-from comparisons.experiments.selftest.fault import SourceFault
+from comparisons.experiments.selftest.fault import SourceFault, patched
 from comparisons.experiments.selftest.sensitivity import patched_text
 from comparisons.results.files import write_json
 from reference_rt.util.errors import ReferenceRtError
-from reference_rt.util.files import temporary_folder
 from reference_rt.util.processes import tied
 
 MOST_SCENES = 500
@@ -86,17 +83,7 @@ def _search(fault: SourceFault, out: Path, seed: int, workers: int, count: int) 
     """
     text = patched_text(fault)
     folder = out.resolve() / "".join(c if c.isalnum() else "_" for c in fault.name)
-    with temporary_folder() as temporary:
-        package = temporary / "reference_rt"
-        skipped = shutil.ignore_patterns("__pycache__")
-        shutil.copytree(Path(reference_rt.__file__).parent, package, ignore=skipped)
-        (package / fault.file).write_text(text, encoding="utf-8")
-        path = os.environ.get("PYTHONPATH", "")
-        environment = {
-            **os.environ,
-            "PYTHONPATH": f"{temporary}{os.pathsep}{path}".rstrip(os.pathsep),
-            "REFERENCE_RT_CACHE": f"{temporary}/cache",
-        }
+    with patched(fault.file, text) as own:
         words = ["--count", str(count), "--seed", str(seed), "--workers", str(workers), "--stop"]
         words += ["--reduce", str(REDUCE), "--out", str(folder)]
         if feature := feature_of(fault):
@@ -104,10 +91,11 @@ def _search(fault: SourceFault, out: Path, seed: int, workers: int, count: int) 
         run = subprocess.run(
             # -P: do not import from the current folder, which may have a reference_rt.
             [sys.executable, "-P", "-m", "reference_rt", "fuzz", *words],
-            env=environment,
+            env={**os.environ, **own},
             capture_output=True,
             text=True,
-            cwd=temporary,  # workers import from the current folder first
+            # Workers import from the current folder first.
+            cwd=own["PYTHONPATH"].partition(os.pathsep)[0],
             **tied(),
             check=False,
         )

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.fuzz.finding import Data
+from comparisons.experiments.fuzz.data import Data
 from reference_rt.core.arrays import FloatArray
 
 ALONE = ("files",)

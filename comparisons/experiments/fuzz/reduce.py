@@ -10,7 +10,16 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
-from comparisons.experiments.fuzz.finding import Data, copy_of, named_in, shapes_of, text_of
+from comparisons.experiments.fuzz.data import (
+    Data,
+    Way,
+    at,
+    copy_of,
+    named_in,
+    numbers_in,
+    shapes_of,
+    text_of,
+)
 
 # ---- structure: an edit may yield invalid scenes ------------------------------------------------
 
@@ -171,14 +180,11 @@ def fewer_fields(scene: Data) -> Iterator[Data]:
     """Fields left out: of those that have a default the scene stays valid."""
     for path in [*_fields(scene, ())]:
         smaller = copy_of(scene)
-        at = smaller
-        for key in path[:-1]:
-            at = at[key]
-        del at[path[-1]]
+        del at(smaller, path[:-1])[path[-1]]
         yield smaller
 
 
-def _fields(part: Any, path: tuple[Any, ...]) -> Iterator[tuple[Any, ...]]:
+def _fields(part: Any, path: Way) -> Iterator[Way]:
     if isinstance(part, dict):
         for key, value in part.items():
             there = *path, key
@@ -190,13 +196,13 @@ def _fields(part: Any, path: tuple[Any, ...]) -> Iterator[tuple[Any, ...]]:
             yield from _fields(value, (*path, k))
 
 
-def fixes_view(path: tuple[Any, ...]) -> bool:
+def fixes_view(path: Way) -> bool:
     """Whether a number says where the camera is: its default may lie on a surface, and the scene
     would then fail for that reason."""
     return path[:2] in (("camera", "eye"), ("camera", "target"))
 
 
-def _is_named(path: tuple[Any, ...]) -> bool:
+def _is_named(path: Way) -> bool:
     """Whether the path's keys are names, not fields."""
     return len(path) == 1 and path[0] in ("materials", "textures", "groups")
 
@@ -234,16 +240,16 @@ EDITS: tuple[Edit, ...] = (
 # ---- numbers and pictures -----------------------------------------------------------------------
 
 
-_FIXED = {"faces", "seed", "spp", "width", "height"}
+_FIXED = frozenset(("faces", "seed", "spp", "width", "height"))
 
 
 def simpler_numbers(scene: Data) -> Iterator[Data]:
     """Each number as 0, 1, a whole number, or one of fewer digits."""
-    for path in [*_numbers(scene, ())]:
-        value = _at(scene, path)
+    for path in [*numbers_in(scene, but=_FIXED)]:
+        value = at(scene, path)
         for other in simpler(float(value), digits_only=fixes_view(path)):
             smaller = copy_of(scene)
-            _at(smaller, path[:-1])[path[-1]] = other
+            at(smaller, path[:-1])[path[-1]] = other
             yield smaller
 
 
@@ -263,26 +269,6 @@ def simpler(x: float, digits_only: bool = False) -> list[float]:
 
 def _short(x: float) -> str:
     return repr(x).replace("-", "").removesuffix(".0")
-
-
-def _numbers(part: Any, path: tuple[Any, ...]) -> Iterator[tuple[Any, ...]]:
-    if isinstance(part, bool):
-        return
-    if isinstance(part, int | float):
-        yield path
-    elif isinstance(part, dict):
-        for key, value in part.items():
-            if key not in _FIXED:
-                yield from _numbers(value, (*path, key))
-    elif isinstance(part, list):
-        for k, value in enumerate(part):
-            yield from _numbers(value, (*path, k))
-
-
-def _at(part: Any, path: tuple[Any, ...]) -> Any:
-    for key in path:
-        part = part[key]
-    return part
 
 
 def smaller_pictures(scene: Data) -> Iterator[Data]:

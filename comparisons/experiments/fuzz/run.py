@@ -7,12 +7,10 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from comparisons.experiments.fuzz import assets
-from comparisons.experiments.fuzz import finding as stored
-from comparisons.experiments.fuzz.fields import types_in
+from comparisons.experiments.fuzz import assets, results
+from comparisons.experiments.fuzz.data import Data
 from comparisons.experiments.fuzz.finding import (
     Checked,
-    Data,
     Effort,
     Finding,
     Grammar,
@@ -22,6 +20,7 @@ from comparisons.experiments.fuzz.finding import (
 )
 from comparisons.experiments.fuzz.generate import generate
 from comparisons.experiments.fuzz.reduce import reduce
+from comparisons.experiments.fuzz.schema import types_in
 from comparisons.runs import engine
 from comparisons.runs.processes import Ended
 from reference_rt.util.errors import UsageError
@@ -108,14 +107,14 @@ def run(plan: Plan, tell: Tell, say: Callable[[str], None] = lambda line: None) 
     Raises UsageError for a folder with results of other settings, ReferenceUnavailableError.
     """
     plan.out.mkdir(parents=True, exist_ok=True)
-    if not stored.check_settings(plan.out, plan.settings):
+    if not results.check_settings(plan.out, plan.settings):
         raise UsageError(
             f"{plan.out}: has results of another seed or other settings; expected the same, or "
             "another folder by --out"
         )
     assets.write(plan.files)
-    known = {checked.number: checked for checked in stored.every(plan.out, Checked)}
-    found = Run(known, [*stored.every(plan.out, Reduced)])
+    known = {checked.number: checked for checked in results.every(plan.out, Checked)}
+    found = Run(known, [*results.every(plan.out, Reduced)])
     start = time.monotonic()
     try:
         for checked in _checked(plan, found.scenes, start):
@@ -166,7 +165,7 @@ def _checked(plan: Plan, done: dict[int, Checked], start: float) -> Iterator[Che
                         continue
                     if found is None:
                         found = _dead(request, ended)
-                        stored.add(plan.out, found)
+                        results.add(plan.out, found)
                     yield found
                     if is_late():
                         return
@@ -225,16 +224,16 @@ def _reduce_all(plan: Plan, found: Run, say: Callable[[str], None]) -> None:
     limit = 3.0 * plan.shrink + plan.limit
     for request, _, ended in engine.measured(inside, _nothing, plan.workers, limit, WORKER):
         if ended.failure is not None:
-            stored.add(plan.out, _unreduced(plan, request))
+            results.add(plan.out, _unreduced(plan, request))
         say(f"scene {request.number}: reduced ({ended.wall:.0f} s)")
     for request in requests:
         if _died(request):
-            stored.add(plan.out, _outside(plan, request))
-    found.reduced = [*stored.every(plan.out, Reduced)]
+            results.add(plan.out, _outside(plan, request))
+    found.reduced = [*results.every(plan.out, Reduced)]
 
 
 def _stored(request: Request) -> Checked | None:
-    return stored.read(request.out, Checked, request.number)
+    return results.read(request.out, Checked, request.number)
 
 
 def _nothing(request: Request) -> None:

@@ -12,22 +12,20 @@ from pathlib import Path
 import numpy as np
 
 from comparisons.compare.pictures import mitsuba_cast
-from comparisons.experiments.fuzz import assets, random_files
-from comparisons.experiments.fuzz import finding as stored
+from comparisons.experiments.fuzz import assets, random_files, results
 from comparisons.experiments.fuzz.check import FAILED, check, of_rung
-from comparisons.experiments.fuzz.fields import types_in
+from comparisons.experiments.fuzz.data import Data, text_of
 from comparisons.experiments.fuzz.finding import (
     Checked,
-    Data,
     Effort,
     Finding,
     Reduced,
     Request,
-    text_of,
     without_numbers,
 )
 from comparisons.experiments.fuzz.generate import generate, parse
 from comparisons.experiments.fuzz.reduce import reduce
+from comparisons.experiments.fuzz.schema import types_in
 from comparisons.gate.driver import Command, Driver, RendererError
 from comparisons.gate.reference import is_noise_free
 from comparisons.gate.request import Request as GateRequest
@@ -199,7 +197,7 @@ def do_scene(request: Request) -> None:
     assets.write(request.files)
     scene = scene_of(request)
     found = checked(request, scene, request.effort)
-    stored.add(request.out, found)
+    results.add(request.out, found)
     is_ours = request.scene is None and request.effort.rungs == random_files.ALONE
     if is_ours and not found.findings:
         for name in assets.named(scene):
@@ -226,7 +224,7 @@ def do_reduce(request: Request) -> None:
         effort = request.effort
     found = reduce(scene, fails, seconds=request.seconds)
     fails(found.scene)
-    stored.add(
+    results.add(
         request.out,
         Reduced(
             number=request.number,

@@ -3,12 +3,14 @@
 Sensitivity: faults are planted in pictures (`of_pictures`), scenes (`of_scenes`) and the renderer's
 source (`of_sources`, and `of_readers`: faults that both renderers would share), and compared with a
 suite's budgets; a `fault.Finding` says whether a fault was caught, and at which rung.  `power`: the
-fraction of runs that catch a fault, by its size, and how often the bias that a verdict states as
-detectable is detected.  `mutation`: random changes of the kernels, and what the rungs say to them.
-`specificity`: right renderers of twelve kinds are judged with many seeds, and false alarms are
-counted.
+fraction of runs that catch a fault, by its size; `calibration`: how often the bias that a verdict
+states as detectable is detected.  `mutation`: random changes of the kernels (`mutants`), and what
+the rungs say to them.  `specificity`: right renderers of twelve kinds (`right`) are judged with
+many seeds, and false alarms are counted.
 
-To add a fault, add it to the tuple of its file; a source fault's old text must occur exactly once.
+To add a fault of pictures: a function with `planted`, or a row of `FAULTS`, in `of_pictures`.  Of
+scenes and sources: a row of their tables, which says what is planted, where, and if one rung must
+see it, which; a source fault's old text must occur exactly once.
 """
 
 from comparisons.experiments.selftest import of_pictures, of_readers, of_scenes, of_sources

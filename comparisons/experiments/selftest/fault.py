@@ -7,7 +7,8 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -69,13 +70,18 @@ class SceneFault:
 
 @dataclass(frozen=True)
 class SourceFault:
-    """The text `old`, which must occur once in `file` of the package, is replaced by `new`."""
+    """The text `old`, which must occur once in `file` of the package, is replaced by `new`.
+
+    rung: that must see it, where one must: of faults that both renderers would share it is the one
+    that has a second source.
+    """
 
     name: str
     scene: str
     file: str
     old: str
     new: str
+    rung: str = ""
 
 
 Fault = PictureFault | SceneFault | SourceFault
@@ -156,17 +162,24 @@ def run_patched(
 ) -> Any:
     """What the module `worker` answers to `task`, both JSON, if `file` of the package has `text`.
 
-    The copy has a kernel cache of its own.  Raises subprocess.TimeoutExpired after so many seconds,
+    Raises subprocess.TimeoutExpired after so many seconds,
     and ReferenceRtError with the last line of the worker's errors if it fails.
     """
+    with patched(file, text) as own:
+        return run_worker(worker, task, {**(environment or {}), **own}, seconds)
+
+
+@contextmanager
+def patched(file: str, text: str) -> Iterator[dict[str, str]]:
+    """The variables of processes whose `reference_rt` is a copy in which `file` has `text`, and
+    whose kernel cache is the copy's own."""
     with temporary_folder() as folder:
         package = folder / "reference_rt"
         skipped = shutil.ignore_patterns("__pycache__", "*.nbi", "*.nbc")
         shutil.copytree(PACKAGE, package, ignore=skipped)
         (package / file).write_text(text, encoding="utf-8")
         path = os.pathsep.join(filter(None, (str(folder), os.environ.get("PYTHONPATH", ""))))
-        own = {"PYTHONPATH": path, "REFERENCE_RT_CACHE": f"{folder}/cache"}
-        return run_worker(worker, task, {**(environment or {}), **own}, seconds)
+        yield {"PYTHONPATH": path, "REFERENCE_RT_CACHE": f"{folder}/cache"}
 
 
 def run_worker(

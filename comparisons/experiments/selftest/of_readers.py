@@ -11,8 +11,14 @@ CHECKED = "MeshData(vertices, faces, _unit(mesh.normals), uv, colours,"
 KNOT, PETAL, MOVED = "mesh_knot", "mesh_colours", "transforms"
 
 
+def _shared(
+    name: str, scene: str, file: str, old: str, new: str, rung: str = "files"
+) -> SourceFault:
+    return SourceFault(name, scene, file, old, new, rung)
+
+
 def _read(name: str, scene: str, new: str) -> SourceFault:
-    return SourceFault(name, scene, DATA, CHECKED, f"MeshData({new},")
+    return _shared(name, scene, DATA, CHECKED, f"MeshData({new},")
 
 
 OF_MESHES = (
@@ -32,6 +38,10 @@ OF_MESHES = (
         "corners of faces turned by one", PETAL,
         "vertices, faces[:, [1, 2, 0]], _unit(mesh.normals), uv, colours",
     ),
+    _read(
+        "uv of meshes made up", KNOT,
+        "vertices, faces, _unit(mesh.normals), vertices[:, :2], colours",
+    ),
     _read("normals of meshes lost", KNOT, "vertices, faces, None, uv, colours"),
     _read(
         "v of meshes upside down", PETAL,
@@ -40,23 +50,23 @@ OF_MESHES = (
     _read("colours of meshes grey", PETAL,
         "vertices, faces, _unit(mesh.normals), uv, colours[:, [1, 1, 1]]",
     ),
-    SourceFault(
+    _shared(
         "normals of meshes inwards", KNOT, DATA,
         "ascontiguousarray(n / np.linalg", "ascontiguousarray(-n / np.linalg",
     ),
-    SourceFault(
+    _shared(
         "colours of .ply not decoded", PETAL, "shapes/meshes/files/ply.py",
         "return linear(colours / white)", "return colours / white",
     ),
-    SourceFault(
+    _shared(
         "`smooth` ignored", "layers", MESH,
         "return self.smooth and data.normals is None", "return False",
     ),
-    SourceFault(
+    _shared(
         "smooth normals not smooth", "layers", "shapes/meshes/topology.py",
         "np.linalg.norm(sums, axis=1) > error", "np.linalg.norm(sums, axis=1) < error",
     ),
-    SourceFault(
+    _shared(
         "mirrored meshes turned inside out", PETAL, "shapes/meshes/triangle_table.py",
         "if not transform.flips_orientation(m):", "if True:",
     ),
@@ -68,45 +78,45 @@ OF_MESHES = (
 MAPS = "core/transform.py"
 
 OF_TRANSFORMS = (
-    SourceFault(
+    _shared(
         "normals by the matrix", MOVED, MAPS,
         "normals @ invert(m)[:, :3]", "normals @ m[:, :3].T",
     ),
-    SourceFault(
+    _shared(
         "degrees for radians", MOVED, MAPS,
         "math.cos(math.radians(degrees)), math.sin(math.radians(degrees))",
         "math.cos(degrees), math.sin(degrees)",
     ),
-    SourceFault(
+    _shared(
         "rotations backwards", MOVED, MAPS,
         "c * np.eye(3) + s * cross", "c * np.eye(3) - s * cross",
     ),
-    SourceFault(
+    _shared(
         "steps in reverse order", MOVED, MAPS,
         "m[:, :3] @ total[:, :3], m[:, :3] @ total[:, 3] + m[:, 3]",
         "total[:, :3] @ m[:, :3], total[:, :3] @ m[:, 3] + total[:, 3]",
     ),
-    SourceFault(
+    _shared(
         "the first factor of a scale for all", MOVED, MAPS,
         "np.diag(factors)", "np.diag([factors[0]] * 3)",
     ),
-    SourceFault(
+    _shared(
         "row for column", PETAL, MAPS,
         "x * m[:, 0] + y * m[:, 1] + z * m[:, 2]", "x * m[0, :3] + y * m[1, :3] + z * m[2, :3]",
     ),
-    SourceFault(
+    _shared(
         "spheres under a transform 5 % too large", MOVED, "shapes/curved/sphere.py",
         "self.radius * factor * size", "1.05 * self.radius * factor * size",
     ),
-    SourceFault(
+    _shared(
         "cylinders too long", MOVED, "shapes/curved/quadric.py",
         "(r, r, self.z_max)", "(r, r, 1.05 * self.z_max)",
     ),
-    SourceFault(
+    _shared(
         "tori too thick", MOVED, "shapes/curved/torus.py",
         "minor=np.array([self.minor_radius])", "minor=np.array([1.05 * self.minor_radius])",
     ),
-    SourceFault(
+    _shared(
         "instances without their scale", "instances", "shapes/instances.py",
         "own = affine(self.transform)", "own = affine(self.transform[1:])",
     ),
@@ -119,50 +129,50 @@ READING, SKY, TILES = "textures/image_file.py", "environment", "texture_filters"
 STRIP = "np.ascontiguousarray(values).view(kind)"
 
 OF_IMAGES = (
-    SourceFault(
+    _shared(
         "sRGB by a power of 2.2", TILES, READING, "/ 1.055, 2.4)", "/ 1.055, 2.2)"
     ),
-    SourceFault(
+    _shared(
         "sRGB decoded twice", TILES, READING,
         "decoded = decoding(kind, curve) * scale",
         "decoded = linear(decoding(kind, curve)) * scale",
     ),
-    SourceFault(
+    _shared(
         "raw images decoded", "material_bump", READING,
         'is_srgb = image.is_integer if encoding == "auto" else encoding == "srgb"',
         "is_srgb = image.is_integer",
     ),
-    SourceFault(
+    _shared(
         "red and blue exchanged", TILES, READING,
         STRIP, "np.ascontiguousarray(values[:, :, ::-1]).view(kind)",
     ),
-    SourceFault(
+    _shared(
         "grey for colour", TILES, READING,
         STRIP, "np.ascontiguousarray(np.repeat(values[:, :, :1], 3, axis=2)).view(kind)",
     ),
-    SourceFault(
+    _shared(
         "images moved by a texel", TILES, READING,
         STRIP, "np.ascontiguousarray(np.roll(values, 1, axis=1)).view(kind)",
     ),
-    SourceFault(
+    _shared(
         "images upside down", TILES, READING,
         STRIP, "np.ascontiguousarray(values[::-1]).view(kind)",
     ),
-    SourceFault(
+    _shared(
         "a sky's texels to the power of 1.2", SKY, READING,
         "np.multiply(values, scale, out=colours[rows])",
         "np.power(values * scale, 1.2, out=colours[rows])",
     ),
-    SourceFault(
+    _shared(
         "scale of a sky ignored", SKY, "lights/emitters/environment_map.py",
         "read_image(path, self.encoding, self.scale, self.layer)",
         "read_image(path, self.encoding, 1.0, self.layer)",
     ),
-    SourceFault(
+    _shared(
         "a sky turned backwards", SKY, "lights/emitters/environment_map.py",
         "return np.asarray(left @ right)", "return np.asarray(left @ right).T",
     ),
-    SourceFault(
+    _shared(
         "wrap of images ignored", TILES, "textures/bitmap.py",
         "map(_WRAPS.index, self.wraps)", "0, 0",
     ),
@@ -174,35 +184,43 @@ OF_IMAGES = (
 VIEW = "cameras/view_rectangle.py"
 
 OF_UNITS = (
-    SourceFault(
-        "fov along the other axis", "light_spot", VIEW, '"x": n_x,', '"x": n_y,'
+    _shared(
+        "fov along the other axis", "light_spot", VIEW, '"x": n_x,', '"x": n_y,',
+        "geometry",
     ),
-    SourceFault(
+    _shared(
         "half the fov", "cornell_box", VIEW,
         "half = math.tan(math.radians(fov) / 2.0)", "half = math.tan(math.radians(fov) / 4.0)",
+        "geometry",
     ),
-    SourceFault(
-        "the camera's right is its left", "cornell_box", MAPS, "    u /= sine", "    u /= -sine"
+    _shared(
+        "the camera's right is its left", "cornell_box", MAPS, "    u /= sine", "    u /= -sine",
+        "geometry",
     ),
-    SourceFault(
+    _shared(
         "a lens in focus at half the distance", "camera_thin_lens", "cameras/thin_lens.py",
         "or math.dist(self.eye, self.target)", "or math.dist(self.eye, self.target) / 2.0",
+        "geometry",
     ),
-    SourceFault(
+    _shared(
         "textures turned backwards", TILES, "textures/texture.py",
         "[c * a, -s * b, du, s * a, c * b, dv]", "[c * a, s * b, du, -s * a, c * b, dv]",
+        "direct",
     ),
-    SourceFault(
+    _shared(
         "another default of a spot's beam", "light_spot", "lights/emitters/spot.py",
         "beam = 0.75 * self.cutoff_angle", "beam = 0.5 * self.cutoff_angle",
+        "direct",
     ),
-    SourceFault(
+    _shared(
         "half the angle of a projector", "projectors", "lights/emitters/projector.py",
         "math.tan(math.radians(self.fov) / 2.0)", "math.tan(math.radians(self.fov) / 4.0)",
+        "direct",
     ),
-    SourceFault(
+    _shared(
         "scale of a projector ignored", "projectors", "lights/emitters/projector.py",
         "scale=np.array([self.scale])", "scale=np.array([1.0])",
+        "direct",
     ),
 )  # fmt: skip
 

@@ -9,62 +9,93 @@ from typing import Any
 
 from comparisons.experiments.selftest.fault import SceneFault
 from reference_rt.cameras.film import TentFilter
-from reference_rt.core.transform import Rotate, Scale, Turn
+from reference_rt.core.transform import Rotate, Scale, Translate, Turn
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Box, Cone, Cylinder, Mesh, Quadric, Torus
 from reference_rt.util.files import read_text, temporary_folder
 
+Change = Callable[[Scene], Scene]
 
-def material(name: str, **fields: Any) -> Callable[[Scene], Scene]:
-    """Change fields of a material."""
+
+def _with(part: Any, fields: dict[str, Any]) -> Any:
+    """A part with other fields, each a value or a function of the value that it has."""
+    new = {key: x(getattr(part, key)) if callable(x) else x for key, x in fields.items()}
+    return part.model_copy(update=new)
+
+
+def part(name: str, **fields: Any) -> Change:
+    """Change fields of the camera, the film or the integrator."""
+    return lambda scene: scene.changed(**{name: _with(getattr(scene, name), fields)})
+
+
+def named(section: str, name: str, fields: dict[str, Any]) -> Change:
+    """Change fields of one of the "materials" or "textures"."""
 
     def change(scene: Scene) -> Scene:
-        changed = scene.materials[name].model_copy(update=fields)
-        return scene.changed(materials={**scene.materials, name: changed})
+        parts = getattr(scene, section)
+        return scene.changed(**{section: {**parts, name: _with(parts[name], fields)}})
 
     return change
 
 
-def entry(of: str, index: int, /, **fields: Any) -> Callable[[Scene], Scene]:
+def material(name: str, **fields: Any) -> Change:
+    """Change fields of a material."""
+    return named("materials", name, fields)
+
+
+def texture(name: str, **fields: Any) -> Change:
+    """Change fields of a texture."""
+    return named("textures", name, fields)
+
+
+def uv(name: str, **fields: Any) -> Change:
+    """Change fields of a texture's map of uv."""
+    return texture(name, uv=lambda place: _with(place, fields))
+
+
+def entry(of: str, index: int, /, **fields: Any) -> Change:
     """Change fields of an entry of the "shapes" or "lights"."""
 
     def change(scene: Scene) -> Scene:
         entries = list(getattr(scene, of))
-        entries[index] = entries[index].model_copy(update=fields)
+        entries[index] = _with(entries[index], fields)
         return scene.changed(**{of: tuple(entries)})
 
     return change
 
 
-def part(name: str, **fields: Any) -> Callable[[Scene], Scene]:
-    """Change fields of the camera, the film or the integrator."""
+def transformed(of: str, index: int, *steps: Any) -> Change:
+    """Add transforms to an entry of the "shapes" or "lights", before its own."""
+    return entry(of, index, transform=lambda own: (*steps, *own))
+
+
+def first(kind: type, **fields: Any) -> Change:
+    """Change fields of the first shape of a kind."""
 
     def change(scene: Scene) -> Scene:
-        return scene.changed(**{name: getattr(scene, name).model_copy(update=fields)})
+        index = next(k for k, shape in enumerate(scene.shapes) if isinstance(shape, kind))
+        return entry("shapes", index, **fields)(scene)
 
     return change
 
 
+def without(index: int) -> Change:
+    """Leave out a shape."""
+    return lambda scene: scene.changed(shapes=scene.shapes[:index] + scene.shapes[index + 1 :])
+
+
+def operand(**fields: Any) -> Change:
+    """Change fields of the first operand of the first solid."""
+    return entry("shapes", 0, of=lambda own: (_with(own[0], fields), *own[1:]))
+
+
+def turned(degrees: float) -> Rotate:
+    """About the y axis."""
+    return Rotate(rotate=Turn(axis=(0.0, 1.0, 0.0), degrees=degrees))
+
+
 LAMP = 5
 """Index of the lamp among the shapes of `colour_bleeding`."""
-
-
-def _lamp_moved(scene: Scene) -> Scene:
-    from reference_rt.core.transform import Translate
-
-    lamp = scene.shapes[LAMP]
-    moved = lamp.model_copy(
-        update={"transform": (*lamp.transform, Translate(translate=(0.02, 0.0, 0.0)))}
-    )
-    shapes = list(scene.shapes)
-    shapes[LAMP] = moved
-    return scene.changed(shapes=tuple(shapes))
-
-
-def _texture_turned(scene: Scene) -> Scene:
-    tiles = scene.textures["tiles"]
-    uv = tiles.uv.model_copy(update={"scale": (6.0, -6.0)})
-    return scene.changed(textures={**scene.textures, "tiles": tiles.model_copy(update={"uv": uv})})
 
 
 @functools.cache
@@ -93,7 +124,11 @@ def _one_face_flipped(scene: Scene) -> Scene:
 
 FAULTS = (
     SceneFault("one face flipped in a mesh", "mesh_knot", _one_face_flipped),
-    SceneFault("stale reference: the lamp 2 cm aside", "colour_bleeding", _lamp_moved),
+    SceneFault(
+        "stale reference: the lamp 2 cm aside", "colour_bleeding",
+        entry("shapes", LAMP,
+              transform=lambda own: (*own, Translate(translate=(0.02, 0.0, 0.0)))),
+    ),
     SceneFault("a light lost", "caustic_glass", lambda scene: scene.changed(lights=())),
     SceneFault("max_depth less by one", "cornell_box", part("integrator", max_depth=7)),
     SceneFault("direct light alone", "colour_bleeding", part("integrator", max_depth=2)),
@@ -112,35 +147,12 @@ FAULTS = (
     SceneFault(
         "anisotropy turned", "material_rough_conductor", material("sample", alpha=(0.3, 0.05))
     ),
-    SceneFault("texture turned", "material_rough_conductor", _texture_turned),
+    SceneFault("texture turned", "material_rough_conductor", uv("tiles", scale=(6.0, -6.0))),
     SceneFault("sky +1 %", "environment", entry("lights", 0, scale=0.808)),
     SceneFault(
         "filter of another width", "filter_tent", part("film", filter=TentFilter(radius=1.1))
     ),
 )  # fmt: skip
-
-
-# ---- materials and textures ---------------------------------------------------------------------
-
-
-def texture(name: str, **fields: Any) -> Callable[[Scene], Scene]:
-    """Change fields of a texture."""
-
-    def change(scene: Scene) -> Scene:
-        changed = scene.textures[name].model_copy(update=fields)
-        return scene.changed(textures={**scene.textures, name: changed})
-
-    return change
-
-
-def uv(name: str, **fields: Any) -> Callable[[Scene], Scene]:
-    """Change fields of a texture's map of uv."""
-
-    def change(scene: Scene) -> Scene:
-        place = scene.textures[name].uv.model_copy(update=fields)
-        return texture(name, uv=place)(scene)
-
-    return change
 
 
 OF_MATERIALS = (
@@ -193,59 +205,6 @@ OF_MATERIALS = (
 )  # fmt: skip
 
 
-# ---- shapes, instances, cameras, lights ---------------------------------------------------------
-
-
-def transformed(of: str, index: int, *steps: Any) -> Callable[[Scene], Scene]:
-    """Add transforms to an entry of the "shapes" or "lights", before its own."""
-
-    def change(scene: Scene) -> Scene:
-        return entry(of, index, transform=(*steps, *getattr(scene, of)[index].transform))(scene)
-
-    return change
-
-
-def first(kind: type, **fields: Any) -> Callable[[Scene], Scene]:
-    """Change fields of the first shape of a kind."""
-
-    def change(scene: Scene) -> Scene:
-        index = next(k for k, shape in enumerate(scene.shapes) if isinstance(shape, kind))
-        return entry("shapes", index, **fields)(scene)
-
-    return change
-
-
-def without(index: int) -> Callable[[Scene], Scene]:
-    """Leave out a shape."""
-
-    def change(scene: Scene) -> Scene:
-        return scene.changed(shapes=scene.shapes[:index] + scene.shapes[index + 1 :])
-
-    return change
-
-
-def operand(**fields: Any) -> Callable[[Scene], Scene]:
-    """Change fields of the first operand of the first solid."""
-
-    def change(scene: Scene) -> Scene:
-        solid = scene.shapes[0]
-        operands = getattr(solid, "of")  # noqa: B009
-        changed = operands[0].model_copy(update=fields)
-        return entry("shapes", 0, of=(changed, *operands[1:]))(scene)
-
-    return change
-
-
-def _operands_turned_round(scene: Scene) -> Scene:
-    operands = getattr(scene.shapes[0], "of")  # noqa: B009
-    return entry("shapes", 0, of=(operands[1], operands[0], *operands[2:]))(scene)
-
-
-def turned(degrees: float) -> Rotate:
-    """About the y axis."""
-    return Rotate(rotate=Turn(axis=(0.0, 1.0, 0.0), degrees=degrees))
-
-
 OF_SHAPES = (
     SceneFault("lens 5 % wider", "camera_thin_lens", part("camera", aperture_radius=0.231)),
     SceneFault("focus 5 % too far", "camera_thin_lens", part("camera", focus_distance=5.29)),
@@ -268,8 +227,7 @@ OF_SHAPES = (
     SceneFault("mirrored instance not mirrored", "layers",
                transformed("shapes", 4, Scale(scale=(-1.0, 1.0, 1.0)))),
     SceneFault("transforms of an instance in reverse", "transforms",
-               lambda scene: entry(
-                   "shapes", 5, transform=tuple(reversed(scene.shapes[5].transform)))(scene)),
+               entry("shapes", 5, transform=lambda own: own[::-1])),
     SceneFault("flat shading of a smooth mesh", "mesh_knot",
                entry("shapes", 0, face_normals=True)),
     SceneFault("fill rule even-odd for non-zero", "polygons_fill_rules",
@@ -280,7 +238,8 @@ OF_SHAPES = (
     SceneFault("cylinder 0.1 % shorter", "cylinders_and_cones", first(Cylinder, z_max=0.7992)),
     SceneFault("mixed term of a quadric off by 1 %", "quadrics",
                first(Quadric, coefficients=(1, 1, 2, 0.505, 0, 0, 0, 0, 0, -1))),
-    SceneFault("difference of a solid in reverse", "csg_inside", _operands_turned_round),
+    SceneFault("difference of a solid in reverse", "csg_inside",
+               entry("shapes", 0, of=lambda own: (own[1], own[0], *own[2:]))),
     SceneFault("operand of a solid 0.1 % larger", "csg_inside", operand(radius=3.003)),
     SceneFault("box of a solid lost its turn", "transforms", first(Box, transform=())),
 )  # fmt: skip

@@ -75,7 +75,7 @@ OF_KERNELS = (
     ),
     SourceFault(
         "mirrored wrap that repeats the edge twice", IMAGES, "textures/bitmap.py",
-        "        return min(i, 2 * n - 1 - i)\n", "        return min(i, 2 * n - i) % n\n",
+        "        return min(i, 2 * n - 1 - i)\n", "        return min(i, 2 * n - i) % n\n", "files",
     ),
     SourceFault(
         "slope of bumps along v turned", "material_bump", "textures/bitmap.py",
@@ -284,11 +284,12 @@ FAULTS = (
     SourceFault(
         "repeated images clamped at their last texel", IMAGES, "textures/bitmap.py",
         "        return min(i, 2 * n - 1 - i)\n    return i % n\n",
-        "        return min(i, 2 * n - 1 - i)\n    return n - 1 if i == n else i % n\n",
+        "        return min(i, 2 * n - 1 - i)\n    return n - 1 if i == n else i % n\n", "files",
     ),
     SourceFault(
         "a sky clamped at its seam", SKY, "lights/emitters/environment_map.py",
         "    beside, row = select(x + 1.0 < sky.width, x + 1.0, 0.0), y * sky.width\n",
         "    beside, row = smaller(x + 1.0, sky.width - 1.0), y * sky.width\n",
+        "files",
     ),
 )  # fmt: skip

@@ -7,15 +7,10 @@ from typing import Any
 
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Say
+from comparisons.experiments.selftest.calibration import Calibration, calibration
 from comparisons.experiments.selftest.fault import Fault, Finding
-from comparisons.experiments.selftest.sensitivity import (
-    Budgets,
-    Calibration,
-    Curve,
-    calibration,
-    power_curves,
-    sensitivity,
-)
+from comparisons.experiments.selftest.power import Curve, power_curves
+from comparisons.experiments.selftest.sensitivity import Budgets, sensitivity
 from comparisons.experiments.selftest.specificity import Alarms, specificity
 from comparisons.report.table import Column, Table
 from comparisons.results.files import write_json

@@ -2,7 +2,7 @@
 
 Law.
 - closed: in a room whose walls emit 1 and reflect a, 1 / (1 - a) arrives from everywhere: the mean
-  of 1024 pixels, to its noise (see `harness.worlds`) and to a tenth.  Both trace with Russian
+  of 1024 pixels, to its noise (see `harness.chance`) and to a tenth.  Both trace with Russian
   roulette from the fifth edge on.  Ours goes on with a chance of up to 0.999, Mitsuba of up to
   0.95: beyond an albedo of 0.975 the variance of its weights is infinite.
 - open: a surface under a white sky sends back, in power, no more than arrives: the mean of weights
@@ -25,7 +25,7 @@ import math
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness import worlds
+from comparisons.experiments.stability.harness import chance
 from comparisons.experiments.stability.harness.bsdfs import (
     ALPHA,
     LOSSLESS,
@@ -33,30 +33,42 @@ from comparisons.experiments.stability.harness.bsdfs import (
     Bsdf,
     contestants,
     index_of,
-    integral,
     towards,
 )
-from comparisons.experiments.stability.harness.core import (
+from comparisons.experiments.stability.harness.half_vectors import integral
+from comparisons.experiments.stability.harness.outcomes import (
     MITSUBA,
     OURS,
-    Draw,
-    Family,
-    Outcome,
-    Series,
-    Sweep,
+    Outcomes,
     of_errors,
     one_case,
     plain,
     together,
     unit_of,
 )
+from comparisons.experiments.stability.harness.series import Draw, Family, Sweep, series
 from comparisons.experiments.stability.harness.worlds import closed, measure, ours, shells, theirs
 from reference_rt.materials import Material
 
-# ---- the series ----------------------------------------------------------------------------------
+FAMILY = Family(
+    "F10",
+    "furnaces",
+    "where everything shines equally, 1 / (1 - albedo) arrives in a closed room, no more than "
+    "all comes back from a surface, and lossless bodies are invisible",
+    "Nori: albedos 0.5 and 0.8; pbrt: to 2.5 %, switched off for microfacets",
+)
 
 
-def _closed(draw: Draw, x: float) -> dict[str, Outcome]:
+@series(
+    Sweep("1 / (1 - albedo)", (1.0, 2.0, 5.0, 10.0, 30.0, 1e2, 3e2, 1e3), (1.0, 10.0, 1e3), 1, 1),
+    unit="of the value",
+    explained="the range ends at an albedo of 0.999, where Mitsuba fails, 0.86 of the value off.  "
+    "Its roulette lets 95 % of all paths go on at most: the variance is infinite from an albedo of "
+    "0.975 on, and few paths are as long as most light needs.  Ours lets 99.9 % go on",
+)
+def closed_furnace(draw: Draw, x: float) -> Outcomes:
+    """A room whose walls emit 1: the mean of its pixels against 1 / (1 - albedo). A case is a
+    picture."""
     albedo = 1.0 - 1.0 / x
     # Paths are some x long.
     least, most, edges = (2, 16, 2e3) if draw.effort == "quick" else (16, 256, 16e3)
@@ -111,7 +123,19 @@ def _power(
     return mean, error, most, total, doubt
 
 
-def _open(draw: Draw, x: float) -> dict[str, Outcome]:
+@series(
+    ALPHA(10_000, 200_000),
+    unit="of the light, above all",
+    explained="the range ends at alpha 1e-4, and Mitsuba fails within it.  It evaluates Beckmann's "
+    "masking by a fit in place of the error function, which is off by -0.29 to 0.29 %, and samples "
+    "visible normals without: values and samples disagree by as much, which 200,000 samples and "
+    "10,000 that weigh all alike see (glass of index 1.0001 at 1/3).  At 1e-4 that glass is up to "
+    "1.85 times as bright as the sky: float32 loses the half vector, which is 1e-4 long",
+)
+def open_furnace(draw: Draw, x: float) -> Outcomes:
+    """White metals, glasses, plastics and principled materials under a white sky, seen at cosines
+    of 1 to 1e-3: no more comes back than arrives, and what evaluate() says. A case is a material
+    seen from a direction."""
     alpha = 1.0 / x
     found = []
     materials = _white(alpha)
@@ -125,7 +149,7 @@ def _open(draw: Draw, x: float) -> dict[str, Outcome]:
                 )
                 # Half vectors in floats move densities by a few u / (alpha cos).
                 rounding = 64.0 * unit_of(who) * (1.0 + 1.0 / (own * cosine))
-                allowed = worlds.bernstein(error, most, draw.cases) + rounding
+                allowed = chance.bernstein(error, most, draw.cases) + rounding
                 off = max(0.0, mean - 1.0 - allowed)
                 if not math.isnan(total):
                     off = max(
@@ -139,8 +163,17 @@ def _open(draw: Draw, x: float) -> dict[str, Outcome]:
     return together(found)
 
 
-def _lossless(draw: Draw, x: float) -> dict[str, Outcome]:
-    """A case is a pixel."""
+@series(
+    Sweep(
+        "surfaces on the way in", (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0), (1.0, 10.0, 50.0), 1, 1
+    ),
+    unit="of the value",
+    explained="the range ends at 100 surfaces.  A path's weight is a product of ones, and the law "
+    "allows for 4 u for each surface; what Mitsuba loses is whole paths: from 5 surfaces on, in 4 "
+    "to 14 of 4,096 pixels one of 16",
+)
+def lossless(draw: Draw, x: float) -> Outcomes:
+    """Spheres of glass within each other under a white sky: every pixel is 1. A case is a pixel."""
     world, seed = shells(int(x)), int(draw.rng.integers(1, 2**31))
     side, spp = (16, 4) if draw.effort == "quick" else (64, 16)
     pictures = {OURS: ours(world, side, spp, seed)}
@@ -152,51 +185,3 @@ def _lossless(draw: Draw, x: float) -> dict[str, Outcome]:
         off = np.abs(pixels - 1.0).max(axis=1)
         found[who] = of_errors(off, 64.0 * 4.0 * x * unit_of(who), shown)
     return found
-
-
-CLOSED = Series(
-    "closed furnace",
-    Sweep("1 / (1 - albedo)", (1.0, 2.0, 5.0, 10.0, 30.0, 1e2, 3e2, 1e3), (1.0, 10.0, 1e3), 1, 1),
-    "A room whose walls emit 1: the mean of its pixels against 1 / (1 - albedo).  A case is a "
-    "picture.",
-    _closed,
-    unit="of the value",
-    explained="the range ends at an albedo of 0.999, where Mitsuba fails, 0.86 of the value off.  "
-    "Its roulette lets 95 % of all paths go on at most: the variance is infinite from an albedo of "
-    "0.975 on, and few paths are as long as most light needs.  Ours lets 99.9 % go on",
-)
-OPEN = Series(
-    "open furnace",
-    ALPHA(10_000, 200_000),
-    "White metals, glasses, plastics and principled materials under a white sky, seen at cosines "
-    "of 1 to 1e-3: no more comes back than arrives, and what evaluate() says.  A case is a "
-    "material seen from a direction.",
-    _open,
-    unit="of the light, above all",
-    explained="the range ends at alpha 1e-4, and Mitsuba fails within it.  It evaluates Beckmann's "
-    "masking by a fit in place of the error function, which is off by -0.29 to 0.29 %, and samples "
-    "visible normals without: values and samples disagree by as much, which 200,000 samples and "
-    "10,000 that weigh all alike see (glass of index 1.0001 at 1/3).  At 1e-4 that glass is up to "
-    "1.85 times as bright as the sky: float32 loses the half vector, which is 1e-4 long",
-)
-SHELLS = Series(
-    "lossless",
-    Sweep(
-        "surfaces on the way in", (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0), (1.0, 10.0, 50.0), 1, 1
-    ),
-    "Spheres of glass within each other under a white sky: every pixel is 1.  A case is a pixel.",
-    _lossless,
-    unit="of the value",
-    explained="the range ends at 100 surfaces.  A path's weight is a product of ones, and the law "
-    "allows for 4 u for each surface; what Mitsuba loses is whole paths: from 5 surfaces on, in 4 "
-    "to 14 of 4,096 pixels one of 16",
-)
-
-FAMILY = Family(
-    id="F10",
-    name="furnaces",
-    law="where everything shines equally, 1 / (1 - albedo) arrives in a closed room, no more than "
-    "all comes back from a surface, and lossless bodies are invisible",
-    anchors="Nori: albedos 0.5 and 0.8; pbrt: to 2.5 %, switched off for microfacets",
-    series=(CLOSED, OPEN, SHELLS),
-)

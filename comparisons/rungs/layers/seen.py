@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.cameras.translate import translate_filter
+from comparisons.cameras.film import translate_filter
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.counterpart import Counterpart

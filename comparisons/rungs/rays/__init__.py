@@ -4,7 +4,7 @@
 - Shadow rays: `any_hit`.
 - How large an error float32 explains: `slide` (of a hit), `slopes` (of radiance), `light_error`.
 - What a difference means: `comparer` (error over bound), `arbiter` (hits of neighbouring rays),
-  `neighbours` (their radiance), `coincidence` (coincident surfaces), `judgement` (by exact numbers).
+  `neighbours` (their radiance), `coincidence` (coincident surfaces), `judgement` (exactly).
 - Mitsuba's precision as a whole: `resolution`.
 
 Rays are arrays (n, 3) of float32 values held in float64, so that both tracers get the same numbers;

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.cameras.translate import FAR, NEAR
+from comparisons.cameras import type_of
+from comparisons.cameras.camera import FAR, NEAR
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.scene import for_rays
-from reference_rt.cameras import LENS_CENTRE, ThinLens
+from reference_rt.cameras import LENS_CENTRE
 from reference_rt.cameras.film import Film
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
@@ -84,7 +85,8 @@ def compare_camera(scene: Scene, counterpart: Counterpart, most: int) -> CameraC
     """
     camera, film = scene.camera, scene.film
     x, y = pixel_centres(film, most)
-    samples = LENS_SAMPLES if isinstance(camera, ThinLens) else (LENS_CENTRE,)
+    lens_of = type_of(camera).lens
+    samples = (LENS_CENTRE,) if lens_of is None else LENS_SAMPLES
     o, d = _stacked(camera_rays(scene, x, y, lens) for lens in samples)
     their_o, their_d, their_end = _stacked(sensor_rays(counterpart, x, y, lens) for lens in samples)
     their_o, their_end = counterpart.frame.out(their_o), counterpart.frame.out(their_end)
@@ -95,8 +97,9 @@ def compare_camera(scene: Scene, counterpart: Counterpart, most: int) -> CameraC
     corners = np.array([[0.0, 0.0, 1.0, 1.0], [0.0, 1.0, 0.0, 1.0]])
     _, rim = camera_rays(scene, corners[0] * film.width, corners[1] * film.height)
     steepest = 1.0 / (rim @ forward).min()
-    if isinstance(camera, ThinLens):
-        steepest += camera.aperture_radius / camera.focus
+    if lens_of is not None:
+        lens = lens_of(camera)
+        steepest += lens.radius / lens.focus
     direction = np.linalg.norm(their_d - d, axis=1)
     direction_bound = ROUNDINGS * UNIT_ROUNDOFF * (1.0 + (d @ forward) * steepest)
     shift = their_o - o

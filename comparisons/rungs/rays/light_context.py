@@ -2,33 +2,24 @@
 
 from typing import Any, NamedTuple
 
+from comparisons.lights import BY_TYPE
+from comparisons.lights.light import LightType
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.hits import MitsubaHits, rows_of
 from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays.rays import Rays
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.lights import (
-    DIRECTIONAL,
-    POINT,
-    PROJECTOR,
-    SPOT,
-    Directional,
-    Point,
-    Projector,
-    Spot,
-)
+from reference_rt.lights import ENVIRONMENT, TABLES
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
 
-POINT_LIKE: dict[int, type] = {
-    POINT: Point,
-    SPOT: Spot,
-    PROJECTOR: Projector,
-    DIRECTIONAL: Directional,
-}
-"""Descriptions of the lights without extent, by kind: from a point each has one direction, which
-Mitsuba's emitter itself gives."""
+POINT_LIKE: dict[int, LightType[Any]] = {code: BY_TYPE[of] for code, _, of, _ in TABLES}
+"""The lights without extent, by kind: from a point each has one direction, which Mitsuba's emitter
+itself gives."""
+
+DISTANT = {ENVIRONMENT, *(kind for kind, of in POINT_LIKE.items() if of.along is not None)}
+"""Kinds of lights whose `target` is a direction, not a point."""
 
 
 class LightContext(NamedTuple):
@@ -70,5 +61,5 @@ def number_of(context: LightContext, light: int) -> int:
     """Its index in the scene's lights: rows of our tables count those of its kind."""
     choice = context.tables.lights.choice
     row = 0 if choice is None else int(choice.row[light])
-    described = POINT_LIKE[kind_of(context, light)]
-    return [i for i, x in enumerate(context.scene.lights) if isinstance(x, described)][row]
+    of = POINT_LIKE[kind_of(context, light)].description
+    return [i for i, x in enumerate(context.scene.lights) if isinstance(x, of)][row]

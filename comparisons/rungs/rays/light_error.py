@@ -6,20 +6,21 @@ from functools import partial
 import numpy as np
 
 from comparisons.geometry.frame import UNIT_ROUNDOFF
+from comparisons.lights import type_of
 from comparisons.materials.coat import PASSED
-from comparisons.rungs.rays.light_context import LightContext, described, kind_of
+from comparisons.rungs.rays.light_context import (
+    DISTANT,
+    POINT_LIKE,
+    LightContext,
+    described,
+    kind_of,
+)
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.rays.slide import slide
 from comparisons.rungs.rays.slopes import is_steep, moved, slopes, turned
 from comparisons.translator.accuracy import accuracy, coat_error, is_tilted
 from reference_rt.core.arrays import FloatArray
-from reference_rt.lights import (
-    DIRECTIONAL,
-    ENVIRONMENT,
-    SPOT,
-    EnvironmentMap,
-    Spot,
-)
+from reference_rt.lights import ENVIRONMENT
 from reference_rt.materials import Emissive
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
@@ -58,7 +59,7 @@ def bounds(
     rays, hits = context.rays, context.hits
     e = slide(context.sizes, rays.o, rays.d, hits, context.off_by("sag"))
     kind = kind_of(context, light)
-    if kind in (ENVIRONMENT, DIRECTIONAL):
+    if kind in DISTANT:
         w, distance = target, np.full(len(target), np.inf)
     else:
         w = target - hits.p
@@ -83,8 +84,9 @@ def bounds(
     bound += np.where(through, np.maximum(value, theirs).max(axis=1), 0.0) * _of_critical(
         context, rays.d, w, hits.ns
     )
-    if kind == SPOT:
-        bound += np.maximum(value, theirs).max(axis=1) * _of_falloff(context, light)
+    float32 = POINT_LIKE[kind].float32 if kind in POINT_LIKE else None
+    if float32 is not None:
+        bound += np.maximum(value, theirs).max(axis=1) * float32(described(context, light), hits.p)
     return np.asarray(bound)
 
 
@@ -102,7 +104,7 @@ def of_direct_light(context: LightContext) -> FloatArray:
         if len(lit) == 0:
             continue
         value, target = ours.contribution[lit] / ours.pdf[lit, None], ours.target[lit]
-        distant = kind_of(context, light) == DIRECTIONAL
+        distant = kind_of(context, light) in DISTANT
         w = target if distant else target - hits.p[lit]
         cosine = np.sum(w * hits.ns[lit], axis=1) / np.linalg.norm(w, axis=1)
         some = context.of(lit)
@@ -124,13 +126,8 @@ def cut_off(scene: Scene) -> float:
     for images.
     """
     lamps = [m for m in scene.materials.values() if isinstance(m, Emissive)]
-    sizes = [0.0]
-    for light in (*scene.lights, *lamps):
-        scale = getattr(light, "scale", 1.0)
-        for name in ("radiance", "irradiance", "intensity"):
-            value = getattr(light, name, 0.0)
-            sizes.append(scale * (1.0 if isinstance(value, str) else float(np.max(value))))
-        sizes.append(scale * float(isinstance(light, EnvironmentMap)))
+    sizes = [0.0, *(type_of(light).brightest(light) for light in scene.lights)]
+    sizes += [1.0 if isinstance(m.radiance, str) else float(np.max(m.radiance)) for m in lamps]
     return 1e-18 * max(sizes)
 
 
@@ -161,24 +158,6 @@ def _of_critical(context: LightContext, d: FloatArray, w: FloatArray, n: FloatAr
             error = ROUNDED * max(index, 1.0 / index) ** 2 / np.minimum(*cosines) ** 2
         largest = np.maximum(largest, np.nan_to_num(error, nan=1.0))
     return np.minimum(largest, 1.0)
-
-
-def _of_falloff(context: LightContext, light: int) -> FloatArray:
-    """(n,): the relative error of Mitsuba's spot falloff, at most 1: it computes the angle from the
-    cosine, whose rounding turns the angle by 4 u over its sine, and divides by the width of the
-    rim; the falloff itself goes to 0 at the outer edge, beyond which no light is excused."""
-    spot = described(context, light)
-    assert isinstance(spot, Spot)
-    beam = 0.75 * spot.cutoff_angle if spot.beam_width is None else spot.beam_width
-    width, sine = np.radians(spot.cutoff_angle - beam), np.sin(np.radians(max(beam, 1.0)))
-    if not (width > 0.0 and sine > 0.0):
-        return np.zeros(len(context.theirs.height))
-    axis, out = np.subtract(spot.target, spot.origin), context.hits.p - spot.origin
-    across = np.linalg.norm(np.cross(axis, out), axis=1)
-    angle = np.arctan2(across, np.sum(axis * out, axis=1))
-    falloff = (np.radians(spot.cutoff_angle) - angle) / width
-    error = 4.0 * UNIT_ROUNDOFF / (sine * width)
-    return np.where(falloff < -error, 0.0, error / np.clip(falloff, error, 1.0))
 
 
 def slopes_of(

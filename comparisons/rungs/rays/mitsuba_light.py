@@ -9,10 +9,16 @@ from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.plugins.whitted import without
 from comparisons.mitsuba.scene import for_rays, light_id
 from comparisons.rungs.rays import arbiter
-from comparisons.rungs.rays.light_context import POINT_LIKE, LightContext, kind_of, number_of
+from comparisons.rungs.rays.light_context import (
+    DISTANT,
+    POINT_LIKE,
+    LightContext,
+    kind_of,
+    number_of,
+)
 from comparisons.rungs.rays.rays import Rays
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.lights import AREA, DIRECTIONAL, ENVIRONMENT
+from reference_rt.lights import AREA
 from reference_rt.rendering import query
 
 
@@ -25,7 +31,7 @@ def mitsuba_direct(
 
     mi, scene, kind = mitsuba(), context.counterpart.lit, kind_of(context, light)
     emitter = _point_emitter(context, light) if kind in POINT_LIKE else None
-    is_far = kind in (ENVIRONMENT, DIRECTIONAL)
+    is_far = kind in DISTANT
 
     def value(o: Any, d: Any, at: Any) -> tuple[Any, ...]:
         si = scene.ray_intersect(mi.Ray3f(mi.Point3f(o), d))
@@ -74,7 +80,7 @@ def is_dark(
     hits, theirs = context.hits, context.theirs
     n = np.where((theirs.shape == hits.shape)[:, None], theirs.n, hits.n)
     kind = kind_of(context, light)
-    is_far = kind in (ENVIRONMENT, DIRECTIONAL)
+    is_far = kind in DISTANT
     w = target if is_far else target - hits.p
     side = np.where(np.sum(w * n, axis=1) < 0.0, -1.0, 1.0)
     height = side * context.counterpart.frame.epsilon(hits.p)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from comparisons.lights import type_of
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.hits import BoolArray, rows_of
 from comparisons.referee.sizes import ShapeSizes
@@ -20,7 +21,6 @@ from comparisons.rungs.rays.rays import Rays, mixed_rays
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import UNIT_ROUNDOFF
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.lights import Directional, Point, Projector, Spot
 from reference_rt.materials import Dielectric, RoughDielectric, ThinDielectric
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
@@ -193,14 +193,9 @@ def _ways(
     random /= np.linalg.norm(random, axis=1)[:, None]
     random *= np.where(np.sum(random * front, axis=1) < 0.0, -1.0, 1.0)[:, None]
     ways = [random]
-    lights = [
-        light for light in scene.lights if isinstance(light, Directional | Point | Projector | Spot)
-    ]
+    lights = [light for light in scene.lights if type_of(light).has_no_extent]
     for light in lights[:MOST_LIGHTS]:
-        if isinstance(light, Directional):
-            to_light = np.broadcast_to(-np.array(light.direction), d.shape)
-        else:
-            to_light = (light.position if isinstance(light, Point) else light.origin) - hits.p
+        to_light = type_of(light).towards(light, hits.p)
         length = np.linalg.norm(to_light, axis=1)[:, None]
         faces = np.sum(to_light * front, axis=1) > 0.0
         ways.append(np.where(faces[:, None], to_light / length, 0.0))

@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
+from comparisons.lights import type_of
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.rays import Rays
 from reference_rt.core.arrays import FloatArray
-from reference_rt.lights import AnyLight, Projector, Spot
 from reference_rt.materials import Diffuse, Emissive, Material, Wrapper
 from reference_rt.rendering.scene import Scene
 
@@ -36,12 +36,7 @@ def is_steep(scene: Scene) -> bool:
         plain = isinstance(material, Diffuse) and not isinstance(material.reflectance, str)
         return plain or not material.smooth
 
-    def projects(light: AnyLight) -> bool:
-        if isinstance(light, Spot):
-            return light.texture is not None
-        return isinstance(light, Projector) and isinstance(light.irradiance, str)
-
-    if any(projects(light) for light in scene.lights):
+    if any(type_of(light).projects(light) for light in scene.lights):
         return True
     return not all(is_flat(material) for material in scene.materials.values())
 

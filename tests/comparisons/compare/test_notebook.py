@@ -97,6 +97,6 @@ def test_settings_are_checked(tmp_path):
 
 
 def test_a_page(tmp_path, monkeypatch):
-    monkeypatch.setattr("comparisons.compare.one_scene.provenance", lambda: {"date": "today"})
+    monkeypatch.setattr("comparisons.compare.notebook.provenance", lambda: {"date": "today"})
     case(Images(grey(0.25), grey(1.0))).write_page(tmp_path / "a.html")
     assert "box" in (tmp_path / "a.html").read_text(encoding="utf-8")

@@ -3,10 +3,11 @@
 import pytest
 
 from comparisons.experiments.fuzz import assets
-from comparisons.experiments.fuzz.fields import types_in
-from comparisons.experiments.fuzz.finding import Grammar, shapes_of, text_of
+from comparisons.experiments.fuzz.data import shapes_of, text_of
+from comparisons.experiments.fuzz.finding import Grammar
 from comparisons.experiments.fuzz.generate import generate, parse
 from comparisons.experiments.fuzz.reduce import reduce, simpler, without_unused
+from comparisons.experiments.fuzz.schema import types_in
 from reference_rt.util.errors import SceneError
 
 pytestmark = pytest.mark.filterwarnings("ignore::reference_rt.util.errors.SceneWarning")

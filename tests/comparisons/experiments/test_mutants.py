@@ -7,14 +7,13 @@ from pathlib import Path
 import pytest
 
 from comparisons.experiments.selftest.fault import PACKAGE, run_worker
+from comparisons.experiments.selftest.mutants import functions_of, mutants
 from comparisons.experiments.selftest.mutation import (
     FEW_RAYS,
     PLAIN,
     WORKER,
     Fate,
     by_few_rays,
-    functions_of,
-    mutants,
     summary,
     write,
 )

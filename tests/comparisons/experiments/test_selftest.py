@@ -4,10 +4,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from faulty_sources import SOURCE_FAULTS, plant
 
 import reference_rt
-from comparisons.experiments.selftest import FAULTS, PictureFault, SceneFault, SourceFault
+from comparisons.compare.compare import Subject, gather
+from comparisons.experiments.selftest import (
+    FAULTS,
+    PictureFault,
+    SceneFault,
+    SourceFault,
+    of_readers,
+)
 from comparisons.experiments.selftest.fault import Finding, finding
+from comparisons.experiments.selftest.mutant_worker import BUDGET
 from comparisons.experiments.selftest.run import Outcome, markdown
 from comparisons.experiments.selftest.sensitivity import StaleFaultError, patched_text
 from comparisons.experiments.selftest.specificity import Alarms
@@ -37,6 +46,23 @@ def test_source_fault_fits_the_source_and_is_still_python(fault: SourceFault) ->
 def test_source_fault_whose_text_is_gone_is_told() -> None:
     with pytest.raises(StaleFaultError, match=r"occurs 0 times in core/ray.py"):
         patched_text(SourceFault("gone", "cornell_box", "core/ray.py", "no such text", ""))
+
+
+@pytest.mark.parametrize("name", [f.name for f in of_readers.FAULTS if f.rung not in ("files", "")])
+def test_what_no_second_reader_says_is_seen_by_another_rung(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those that the rung `files` sees are in its own test."""
+    fault = SOURCE_FAULTS[name]
+
+    def statuses() -> list[str]:
+        subject = Subject(Scene.load(SCENES / f"{fault.scene}.yaml"))
+        evidence = gather(subject, BUDGET, lambda step: None, 1, (fault.rung,))
+        return [rung.status for rung in evidence.rungs if rung.name == fault.rung]
+
+    assert statuses() == ["agree"]
+    plant(monkeypatch, fault)
+    assert statuses() == ["differ"]
 
 
 @pytest.mark.parametrize("fault", of(SceneFault))

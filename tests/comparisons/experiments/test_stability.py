@@ -12,31 +12,32 @@ import stability_fakes
 from builders import HELPERS
 from command_line import invoke
 
-from comparisons.experiments.stability.harness import core, outputs, run
-from comparisons.experiments.stability.harness.core import (
-    OURS,
-    Family,
-    Found,
-    Outcome,
-    Series,
-    Sweep,
-    outcome,
-)
-from comparisons.experiments.stability.harness.outputs import summarise
+from comparisons.experiments.stability.harness import outputs, run, series
+from comparisons.experiments.stability.harness.outcomes import OURS, Outcome, outcome
+from comparisons.experiments.stability.harness.points import Found, summarise
+from comparisons.experiments.stability.harness.series import Family, Series, Sweep
 
 
 @pytest.fixture
-def fakes(monkeypatch):
-    monkeypatch.setattr(core, "MODULES", dict(core.MODULES))
+def alone(monkeypatch):
+    """No families."""
+    monkeypatch.setattr(series, "_REGISTERED", {})
+    before = dict(series.MODULES)
+    modules = set(sys.modules)
+    yield
+    series.MODULES.clear()
+    series.MODULES.update(before)
+    for name in set(sys.modules) - modules:
+        if name.startswith(f"{series.FAMILIES}.T"):
+            del sys.modules[name]
+
+
+@pytest.fixture
+def fakes(alone, monkeypatch):
     monkeypatch.setattr(run, "WORKER", ("stability_fakes",))
     before = os.environ.get("PYTHONPATH", "")
     monkeypatch.setenv("PYTHONPATH", f"{HELPERS}{os.pathsep}{before}".rstrip(os.pathsep))
-    modules = set(sys.modules)
     stability_fakes.install()
-    yield
-    for name in set(sys.modules) - modules:
-        if name.startswith("comparisons.experiments.stability.T"):
-            del sys.modules[name]
 
 
 def stability(out, *options):
@@ -113,6 +114,17 @@ def test_usage(fakes, tmp_path, options, said):
     assert said in told
 
 
+def test_the_csv_has_a_row_for_each_contestant_and_infinity_in_words(tmp_path):
+    outcomes = {"a_method": Outcome(2, 1, 0.5), OURS: Outcome(3, 0, math.inf, 1)}
+    found = [Found("T1", "far", 10.0, outcomes, 1.0), Found("T1", "far", 20.0, {}, 1.0, "broke")]
+    outputs.rows_of(found).write_csv(tmp_path / "results.csv")
+    assert (tmp_path / "results.csv").read_text().splitlines() == [
+        "family,series,x,contestant,cases,failures,worst,open",
+        "T1,far,10.0,ours,3,0,inf,1",
+        "T1,far,10.0,a_method,2,1,0.5,0",
+    ]
+
+
 def test_outcomes_add_up_and_refuse_nonsense():
     both = Outcome(3, 1, 2.0, 1, ({"a": 1},)) + Outcome(4, 0, None, 2)
     assert both == Outcome(7, 1, 2.0, 3, ({"a": 1},))
@@ -129,6 +141,24 @@ def test_series_refuse_an_end_without_a_law():
         Series("s", Sweep("x", (2.0, 1.0), (), 1, 1), "", lambda *_: {})
 
 
+def test_a_function_becomes_a_series_of_its_family(alone):
+    def near_by(draw, x):
+        """What is near
+        is drawn."""
+
+    near_by.__module__ = f"{series.FAMILIES}.T.near"
+    sweep = Sweep("x", (1.0, 2.0), (1.0,), 1, 1)
+    assert series.series(sweep, unit="u")(near_by) is near_by
+    series.series(sweep, "by name", "About.")(near_by)
+    series.MODULES["T"] = "T"
+    one, other = Family("T", "", "").series
+    assert (one.name, one.about, one.unit) == ("near by", "What is near is drawn.", "u")
+    assert (other.name, other.about, other.measure) == ("by name", "About.", near_by)
+    near_by.__module__ = f"{series.FAMILIES}.T.far"
+    with pytest.raises(ValueError, match="two series of the name 'near by'"):
+        series.series(sweep)(near_by)
+
+
 def test_rows_of_the_first_failures_are_shown():
     wrong, undecided = np.array([False, True, True, True, True, True]), np.arange(6) == 2
     found = outcome(
@@ -143,7 +173,7 @@ def test_rows_of_the_first_failures_are_shown():
     assert [example["number"] for example in found.examples] == [1, 3, 4]
 
 
-def test_a_lead_that_is_too_small_must_be_explained():
+def test_a_lead_that_is_too_small_must_be_explained(alone, monkeypatch):
     """Ours twice as far as Mitsuba is less than 29 bits allow."""
     found = [
         Found("T", "far", x, {OURS: Outcome(1, int(x > 4)), "mitsuba": Outcome(1, int(x > 2))}, 0.0)
@@ -152,8 +182,10 @@ def test_a_lead_that_is_too_small_must_be_explained():
     for explained in ("", "since it is so"):
         sweep = Sweep("x", (1.0, 2.0, 4.0, 8.0), (), 1, 1)
         end = {"holds_to": 4.0, "law": "four", "explained": explained}
-        series = Series("far", sweep, "", lambda *_: {}, **end)
-        (one,) = summarise(Family("T", "", "", (series,)), found)
+        monkeypatch.setattr(series, "_REGISTERED", {})
+        family = Family("T", "", "")
+        stability_fakes.install({family: (Series("far", sweep, "", lambda *_: {}, **end),)})
+        (one,) = summarise(family, found)
         assert one.further == 2.0
         assert one.holds
         assert one.unexplained == (not explained)

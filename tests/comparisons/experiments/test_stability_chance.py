@@ -6,22 +6,21 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from comparisons.experiments.stability import furnaces as f10_furnaces
+from comparisons.experiments.stability import furnaces
 from comparisons.experiments.stability.bsdfs.samples import PURE
 from comparisons.experiments.stability.furnaces import COSINES
-from comparisons.experiments.stability.harness import worlds
-from comparisons.experiments.stability.harness.core import (
-    FloatArray,
-    family,
-)
-from comparisons.experiments.stability.harness.worlds import Mean, judge
+from comparisons.experiments.stability.harness import chance
+from comparisons.experiments.stability.harness.chance import Mean
+from comparisons.experiments.stability.harness.outcomes import FloatArray
+from comparisons.experiments.stability.harness.series import family
+from comparisons.experiments.stability.harness.worlds import judge
 
 
 def test_the_level_of_a_full_run_is_that_of_all_its_tests() -> None:
-    """The table of `worlds`, counted; the areas and radiances of 1 are drawn once."""
+    """The table of `chance`, counted; the areas and radiances of 1 are drawn once."""
     f10, f11, f12 = (family(name).by_name for name in ("F10", "F11", "F12"))
     closed = len(f10["closed furnace"].values)
-    opened = len(f10["open furnace"].values) * len(f10_furnaces._white(0.1)) * len(COSINES)
+    opened = len(f10["open furnace"].values) * len(furnaces._white(0.1)) * len(COSINES)
     densities = len(f11["densities"].values) * len(PURE) * 3
     lamps = [
         (2 * len(f12[name].values) - 1) * kinds
@@ -29,7 +28,7 @@ def test_the_level_of_a_full_run_is_that_of_all_its_tests() -> None:
     ]
     roulette = 3 * len(f12["roulette"].values)
     assert (closed, opened, densities, *lamps, roulette) == (8, 432, 135, 52, 26, 24)
-    assert 2 * worlds.LEVEL * (closed + 2 * opened + densities + sum(lamps) + roulette) < 2.3e-5
+    assert 2 * chance.LEVEL * (closed + 2 * opened + densities + sum(lamps) + roulette) < 2.3e-5
 
 
 def stages(*means: Mean) -> Callable[[int], Mean]:
@@ -52,18 +51,18 @@ def stages(*means: Mean) -> Callable[[int], Mean]:
     ],
 )
 def test_two_stages(means: list[Mean], failed: bool) -> None:
-    assert worlds.fails(stages(*means), 1.0, 0.0)[0] == failed
+    assert chance.fails(stages(*means), 1.0, 0.0)[0] == failed
 
 
 def test_what_rounding_allows_does_not_fail() -> None:
-    assert not worlds.fails(stages(Mean(1.001, 0.0)), 1.0, 0.01)[0]
+    assert not chance.fails(stages(Mean(1.001, 0.0)), 1.0, 0.01)[0]
 
 
 def test_noise_is_no_excuse_for_everything() -> None:
     vague = stages(Mean(0.5, 0.4), Mean(0.6, 0.4))
-    assert not worlds.fails(vague, 1.0, 0.0)[0]
-    assert worlds.fails(vague, 1.0, 0.0, 0.1)[0]
-    assert not worlds.fails(stages(Mean(0.5, 0.4), Mean(0.95, 0.4)), 1.0, 0.0, 0.1)[0]
+    assert not chance.fails(vague, 1.0, 0.0)[0]
+    assert chance.fails(vague, 1.0, 0.0, 0.1)[0]
+    assert not chance.fails(stages(Mean(0.5, 0.4), Mean(0.95, 0.4)), 1.0, 0.0, 0.1)[0]
 
 
 def test_right_pictures_are_as_seldom_suspect_as_is_said() -> None:
@@ -73,8 +72,8 @@ def test_right_pictures_are_as_seldom_suspect_as_is_said() -> None:
     for _ in range(10):
         pixels = rng.standard_exponential((n // 10, 256))
         error = pixels.std(axis=1, ddof=1) / 16.0
-        suspects += int((np.abs(pixels.mean(axis=1) - 1.0) > worlds.ERRORS * error).sum())
-    assert suspects < 60 * n * math.sqrt(worlds.LEVEL)
+        suspects += int((np.abs(pixels.mean(axis=1) - 1.0) > chance.ERRORS * error).sum())
+    assert suspects < 60 * n * math.sqrt(chance.LEVEL)
 
 
 def test_bernsteins_bound_holds_for_rare_losses() -> None:
@@ -83,7 +82,7 @@ def test_bernsteins_bound_holds_for_rare_losses() -> None:
     lost = rng.binomial(n, 1e-3, 20_000)
     means = 1.0 - lost / n
     errors = np.sqrt(means * (1.0 - means) / (n - 1))
-    allowed = np.array([worlds.bernstein(error, 1.0, n) for error in errors])
+    allowed = np.array([chance.bernstein(error, 1.0, n) for error in errors])
     assert (lost == 0).mean() > 0.3
     assert (np.abs(means - 0.999) <= allowed).all()
 

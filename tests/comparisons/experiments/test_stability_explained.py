@@ -3,16 +3,10 @@
 import pytest
 from stability_runs import measured
 
-from comparisons.experiments.stability.harness.core import (
-    FURTHER,
-    MITSUBA,
-    MODULES,
-    OURS,
-    SeriesSummary,
-    family,
-    summarise,
-)
+from comparisons.experiments.stability.harness.outcomes import MITSUBA, OURS
+from comparisons.experiments.stability.harness.points import FURTHER, SeriesSummary, summarise
 from comparisons.experiments.stability.harness.run import Choice, mitsuba_is_there, run
+from comparisons.experiments.stability.harness.series import MODULES, family
 from reference_rt.util.workers import Threads
 
 # Cases have triangles without area on purpose: what a mesh leaves out is no news here.

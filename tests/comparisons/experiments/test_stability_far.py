@@ -7,12 +7,13 @@ import pytest
 from stability_runs import measured
 
 import reference_rt as rt
-from comparisons.experiments.stability.far import FAMILY as F1
 from comparisons.experiments.stability.far import curved, spheres
-from comparisons.experiments.stability.far.spheres import BAND, Truth, gaps, judge_by_moving
-from comparisons.experiments.stability.harness.core import OURS, U
-from comparisons.experiments.stability.harness.steps import Rays
-from comparisons.experiments.stability.roots import ferrari, judge, numpy_roots, of_quadratics
+from comparisons.experiments.stability.far.law import BAND, Truth, gaps, judge_by_moving
+from comparisons.experiments.stability.harness.outcomes import MITSUBA, OURS, U
+from comparisons.experiments.stability.harness.rays import Rays
+from comparisons.experiments.stability.harness.series import family
+from comparisons.experiments.stability.roots.certified import judge, of_quadratics
+from comparisons.experiments.stability.roots.solvers import ferrari, numpy_roots
 
 
 def drawn(family, name, x, cases, folder, mitsuba=False):
@@ -49,10 +50,17 @@ def test_drawn_gaps_are_those_asked_for():
 
 def test_the_band_is_measured(tmp_path):
     """Right at 2^-50 of the radius, which the law's 5 u allow; the methods are not."""
-    assert F1.by_name["rim"].holds_to * BAND * U < 1.0
+    assert family("F1").by_name["rim"].holds_to * BAND * U < 1.0
     found = drawn("F1", "rim", 2.0**50, 2000, tmp_path)
     assert found[OURS].failures == 0
     assert found["sphere.robust"].failures > 200
+
+
+def test_mitsuba_is_held_to_the_law_of_float32(tmp_path):
+    """By its own roundoff: right at a thousand radii, though all it has is rounded."""
+    found = drawn("F1", "body", 1e3, 200, tmp_path, mitsuba=True)[MITSUBA]
+    assert (found.cases, found.failures) == (200, 0)
+    assert 1e-3 < found.worst < 1.0
 
 
 def test_hits_beside_an_apex():

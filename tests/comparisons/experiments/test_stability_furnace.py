@@ -11,23 +11,13 @@ import numpy as np
 import pytest
 from stability_runs import measured
 
-from comparisons.experiments.stability import bsdfs, radiometry
-from comparisons.experiments.stability import furnaces as f10_furnaces
-from comparisons.experiments.stability.bsdfs import (
-    density_between,
-    fresnel,
-    masking,
-    samples,
-)
+from comparisons.experiments.stability import furnaces
+from comparisons.experiments.stability.bsdfs import reciprocity, samples, values
+from comparisons.experiments.stability.bsdfs.exact import density_between, fresnel, masking
 from comparisons.experiments.stability.harness.bsdfs import Bsdf, Ours, Samples, towards
-from comparisons.experiments.stability.harness.core import (
-    OURS,
-    Draw,
-    FloatArray,
-    of_errors,
-    relative,
-)
-from comparisons.experiments.stability.radiometry import solid_angles
+from comparisons.experiments.stability.harness.outcomes import OURS, FloatArray, of_errors, relative
+from comparisons.experiments.stability.harness.series import Draw
+from comparisons.experiments.stability.radiometry import points, solid_angles
 from reference_rt.lights.emitters import point
 
 
@@ -82,16 +72,16 @@ def planted(fault: str) -> Callable[..., Iterator[tuple[str, Bsdf]]]:
 @pytest.mark.parametrize(
     ("module", "family", "series", "fault", "x", "cases"),
     [
-        (samples, "F11", "grazing", "one-sided", 10.0, 150),
-        (samples, "F11", "roughness", "one-sided", 1.0, 150),
-        (samples, "F11", "matched indices", "one-sided", 1e5, 150),
+        (reciprocity, "F11", "grazing", "one-sided", 10.0, 150),
+        (reciprocity, "F11", "roughness", "one-sided", 1.0, 150),
+        (reciprocity, "F11", "matched indices", "one-sided", 1e5, 150),
         (samples, "F11", "weights", "weight", 1.0, 150),
         (samples, "F11", "weights", "density", 1.0, 150),
         (samples, "F11", "weights", "nan", 1e4, 150),
         (samples, "F11", "densities", "density", 1.0, 20_000),
         (samples, "F11", "densities", "too much", 1.0, 20_000),
         (samples, "F11", "densities", "too little", 1e4, 100_000),
-        (f10_furnaces, "F10", "open furnace", "shines", 1e4, 20_000),
+        (furnaces, "F10", "open furnace", "shines", 1e4, 20_000),
     ],
 )
 def test_faults_of_materials_are_seen(
@@ -110,7 +100,7 @@ def test_faults_of_materials_are_seen(
 def test_the_text_books_fresnel_in_our_place_is_seen(
     series: str, x: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(bsdfs, "_ours", bsdfs._textbook)
+    monkeypatch.setattr(values, "_ours", values._textbook)
     assert run("F11", series, x, 2_000).failures > 0
 
 
@@ -119,14 +109,14 @@ def test_a_faulty_point_light_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
         right = point.sample(points, i, p)
         return right._replace(radiance=right.radiance * (1.0 + 4e-15))
 
-    monkeypatch.setattr(radiometry, "point", SimpleNamespace(sample=sample))
+    monkeypatch.setattr(points, "point", SimpleNamespace(sample=sample))
     assert run("F12", "point light", 1e3).failures > 0
 
 
 def test_wide_spots_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = radiometry.spot.falloff
+    right = points.spot.falloff
     wrong = SimpleNamespace(falloff=lambda table, i, w: min(1.0, right(table, i, w) * 1.01))
-    monkeypatch.setattr(radiometry, "spot", wrong)
+    monkeypatch.setattr(points, "spot", wrong)
     assert run("F12", "spot", 1e6).failures > 0
 
 

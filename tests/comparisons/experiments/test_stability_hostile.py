@@ -10,9 +10,9 @@ import reference_rt as rt
 from comparisons.experiments.fuzz.assets import files, write, write_files
 from comparisons.experiments.stability.harness.solids import Stretch, Truth
 from comparisons.experiments.stability.harness.solids import problem as list_problem
-from comparisons.experiments.stability.hostile import bomb, example, problem, undefined, worker
+from comparisons.experiments.stability.hostile import worker
+from comparisons.experiments.stability.hostile.bases import BASES
 from comparisons.experiments.stability.hostile.damage import (
-    BASES,
     as_text,
     damaged,
     deep,
@@ -20,6 +20,8 @@ from comparisons.experiments.stability.hostile.damage import (
     with_numbers,
     with_structure,
 )
+from comparisons.experiments.stability.hostile.files import bomb, example, problem
+from comparisons.experiments.stability.hostile.rays import undefined
 from comparisons.experiments.stability.hostile.worker import Answer, answers
 from comparisons.experiments.stability.solids.trees import Tree, chain, rewritten
 from reference_rt.rendering.query import Intersections

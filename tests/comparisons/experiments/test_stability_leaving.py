@@ -3,20 +3,15 @@
 import numpy as np
 import pytest
 
-from comparisons.experiments.stability import contact as contact
-from comparisons.experiments.stability import leaving as leaving
-from comparisons.experiments.stability.contact import fresnel, plates
-from comparisons.experiments.stability.harness.core import OURS, Draw
-from comparisons.experiments.stability.harness.steps import bound
+from comparisons.experiments.stability import leaving
+from comparisons.experiments.stability.contact.light import fresnel
+from comparisons.experiments.stability.contact.stacks import FAR, plates
+from comparisons.experiments.stability.harness.outcomes import OURS
+from comparisons.experiments.stability.harness.series import Draw, family
+from comparisons.experiments.stability.harness.shadows import bound
+from comparisons.experiments.stability.leaving.departures import depart, subjects
 from comparisons.experiments.stability.leaving.judge import Judge, Tally, row_of
-from comparisons.experiments.stability.leaving.shapes import (
-    KINDS,
-    Extent,
-    aim,
-    depart,
-    place,
-    subjects,
-)
+from comparisons.experiments.stability.leaving.shapes import KINDS, Extent, aim, place
 from comparisons.referee import first_hit
 
 PLAIN = Extent.of(1.0, 2.0, 1.0, False)
@@ -96,8 +91,8 @@ def test_aimed_rays_meet_the_shape(kind, tmp_path):
 
 def test_gaps_below_the_law_are_lost_at_last(tmp_path):
     """Plates a thousand scales away, closer than floats there are: the family is not blind."""
-    far = contact.FAMILY.by_name["plates, far away"]
-    assert far.holds_to * 4.0 * bound(contact.FAR, 1.0) < 1.0
+    far = family("F13").by_name["plates, far away"]
+    assert far.holds_to * 4.0 * bound(FAR, 1.0) < 1.0
     assert far.measure(draw_of(tmp_path, 80), 1e15)[OURS].failures > 0
 
 

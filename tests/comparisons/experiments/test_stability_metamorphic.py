@@ -9,12 +9,12 @@ import pytest
 
 import reference_rt as rt
 from comparisons.experiments import relations
-from comparisons.experiments.stability import metamorphic as f09_metamorphic
+from comparisons.experiments.stability import metamorphic
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.core import OURS, Draw, family
 from comparisons.experiments.stability.harness.meshes import write_obj
+from comparisons.experiments.stability.harness.outcomes import OURS
+from comparisons.experiments.stability.harness.series import Draw, family
 from comparisons.experiments.stability.metamorphic import light, rays
-from comparisons.experiments.stability.metamorphic import rays as f09_rays
 
 EPSILON = 1e-4
 """What an absolute ray epsilon is."""
@@ -47,15 +47,15 @@ def slow(*setting):
 @pytest.mark.slow
 def test_an_epsilon_is_seen_by_rays(tmp_path, monkeypatch):
     """Hits closer than 1e-4 passed over, as where t_min is a constant."""
-    honest = f09_rays.ours
+    honest = rays.ours
 
     def with_epsilon(tables, o, d):
         found = honest(tables, o, d)
         near = found.t < EPSILON
         identities = np.where(near[:, None], -1, found.identities)
-        return f09_rays.Found(np.where(near, np.inf, found.t), identities)
+        return rays.Found(np.where(near, np.inf, found.t), identities)
 
-    monkeypatch.setattr(f09_rays, "ours", with_epsilon)
+    monkeypatch.setattr(rays, "ours", with_epsilon)
     assert measured("shrunk", 1e3, tmp_path, cases=30)[OURS].failures == 0
     assert measured("shrunk", 1e6, tmp_path, cases=30)[OURS].failures > 50
 
@@ -63,11 +63,11 @@ def test_an_epsilon_is_seen_by_rays(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_exact_arithmetic_judges_both_answers(tmp_path):
     """A name exchanged for another is wrong, whatever rounding may do."""
-    bench = f09_rays.Bench(scenes.things(tmp_path), 60, np.random.default_rng(1))
+    bench = rays.Bench(scenes.things(tmp_path), 60, np.random.default_rng(1))
     wrong = bench.ours.found.identities.copy()
     wrong[:, 3] += 1
-    after = bench.ours._replace(found=f09_rays.Found(bench.ours.found.t, wrong))
-    outcome = f09_rays.judged(bench.ours, after, 1.0, exact=False)
+    after = bench.ours._replace(found=rays.Found(bench.ours.found.t, wrong))
+    outcome = rays.judged(bench.ours, after, 1.0, exact=False)
     hits = np.count_nonzero(np.isfinite(bench.ours.found.t))
     # Of two triangles beside an edge both may be right.
     assert outcome.failures + outcome.open >= hits - 3
@@ -79,7 +79,7 @@ def test_solids_are_judged_by_what_is_resolved(tmp_path):
     """What ours finds passes; another operand, nothing, what is behind, and a t that is off do
     not; of two walls that rounding cannot tell apart either may be first, of others one."""
     scene = scenes.solids(tmp_path)
-    bench = f09_rays.Bench(scene, 90, np.random.default_rng(3))
+    bench = rays.Bench(scene, 90, np.random.default_rng(3))
     o, d, found = bench.ours.o, bench.ours.d, bench.ours.found
     met = rays.Judge(scene).decide(o, d)
     solid = np.flatnonzero(found.identities[:, 0] > 0)
@@ -121,12 +121,12 @@ def test_missing_triangles_are_seen_by_rays(series, x, tmp_path, monkeypatch):
     """Half of each mesh, in what is transformed alone."""
 
     def holed(scene, o, d):
-        found = f09_rays.ours(rt.build_tables(scene), o, d)
+        found = rays.ours(rt.build_tables(scene), o, d)
         gone = found.identities[:, 3] >= 160
         identities = np.where(gone[:, None], -1, found.identities)
-        return f09_rays.Found(np.where(gone, np.inf, found.t), identities)
+        return rays.Found(np.where(gone, np.inf, found.t), identities)
 
-    monkeypatch.setattr(f09_rays.Bench, "found_after", staticmethod(holed))
+    monkeypatch.setattr(rays.Bench, "found_after", staticmethod(holed))
     assert measured(series, x, tmp_path, cases=600)[OURS].failures > 0
 
 
@@ -218,7 +218,7 @@ def test_an_epsilon_of_rays_that_leave_is_seen(factor, tmp_path):
 
 def test_offsets_are_exact():
     """As far as the family says that they are."""
-    moved = f09_metamorphic.offset(f09_metamorphic.EXACT_TO)
+    moved = metamorphic.offset(metamorphic.EXACT_TO)
     p = (7.984375, -7.984375, 0.015625)
     far = moved.points([p])[0].tolist()
     assert tuple(a - b for a, b in zip(far, moved.offset, strict=True)) == p

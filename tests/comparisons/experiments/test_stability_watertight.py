@@ -8,12 +8,14 @@ import pytest
 import stability_runs
 
 import reference_rt as rt
-from comparisons.experiments.stability import hierarchy, watertight
-from comparisons.experiments.stability import watertight as f03
+from comparisons.experiments.stability import watertight
 from comparisons.experiments.stability.harness import meshes
-from comparisons.experiments.stability.harness.core import OURS, Draw, U
+from comparisons.experiments.stability.harness.outcomes import OURS, U
+from comparisons.experiments.stability.harness.series import Draw, family
+from comparisons.experiments.stability.hierarchy import compared
 from comparisons.experiments.stability.slivers.judge import DISTANCES, RING, Judge, Question
-from comparisons.experiments.stability.watertight import crossings
+from comparisons.experiments.stability.watertight import seamed
+from comparisons.experiments.stability.watertight.tracers import crossings
 from comparisons.referee import columns_of
 
 # Cases have triangles without area on purpose: what a mesh leaves out is no news here.
@@ -25,7 +27,7 @@ def measured(folder, family, series, x, cases, mitsuba=False):
 
 
 def test_float64_ends_where_the_law_says(tmp_path):
-    series = f03.FAMILY.by_name["size"]
+    series = family("F3").by_name["size"]
     assert measured(tmp_path, "F3", "size", series.values[-1], 200)[OURS].failures > 0
     assert "2^1024" in series.law
 
@@ -48,7 +50,7 @@ def _faces_in_place_of(folder, faces):
     whole = meshes.ball(2)
     mesh = meshes.Closed("ball", whole.vertices, faces(whole.faces), whole.insides)
     made = Draw(np.random.default_rng(1), 0, False, folder)
-    return f03._measure(made, mesh, 4000, 1.0, others=False)[OURS]
+    return watertight._measure(made, mesh, 4000, 1.0, others=False)[OURS]
 
 
 def test_a_hole_is_seen(tmp_path):
@@ -85,10 +87,10 @@ def _parts(mesh):
 
 def test_seams_of_something_else_are_seen():
     """Rays that hit nothing, or another shape than they start in."""
-    case = watertight.drawn(np.random.default_rng(0), ("box", "sphere"), 1.0, 50)
+    case = seamed.drawn(np.random.default_rng(0), ("box", "sphere"), 1.0, 50)
     shape = case.whose.copy()
     shape[3], shape[70] = -1, 0
-    found = watertight.judged(case, SimpleNamespace(shape=shape, t=np.full(100, math.inf)))
+    found = seamed.judged(case, SimpleNamespace(shape=shape, t=np.full(100, math.inf)))
     assert (found.cases, found.failures) == (100, 2)
     assert found.examples[1]["found"] == "shape 0 at t = inf"
 
@@ -148,7 +150,7 @@ def test_distances_of_other_shapes(kind):
 @pytest.mark.slow
 def test_a_box_that_is_too_small_is_seen(tmp_path, monkeypatch):
     """Planes of boxes moved inwards by a millionth: rays in them miss what they hold."""
-    honest = hierarchy.rt.build_tables
+    honest = compared.rt.build_tables
 
     def damaged(scene):
         tables = honest(scene)
@@ -156,7 +158,7 @@ def test_a_box_that_is_too_small_is_seen(tmp_path, monkeypatch):
         upper[upper < 10.0] -= np.float32(1e-6)
         return tables
 
-    monkeypatch.setattr(hierarchy.rt, "build_tables", damaged)
+    monkeypatch.setattr(compared.rt, "build_tables", damaged)
     assert measured(tmp_path, "F5", "primitives", 100.0, 2000)[OURS].failures > 0
 
 
@@ -167,7 +169,7 @@ def test_of_several_at_one_place_the_first_counts():
     tables = rt.build_tables(rt.Scene(shapes=far + near, hierarchy="sah"))
     o = np.array([[0.0, 0.0, 2.0], [-2.0, 0.0, 2.0], [0.0, 0.0, 2.0]])
     d = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, -1.0], [0.0, 0.0, 1.0]])
-    found = hierarchy.named(tables, hierarchy.every(tables, o, d))
+    found = compared.named(tables, compared.every(tables, o, d))
     assert found[:, :4].tolist() == [
         [2.0, 3.0, 2.0, 0.0],
         [3.0, 3.0, 0.0, 0.0],

@@ -7,25 +7,17 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-import reference_rt as rt
-from comparisons.cycles.translate import bounces_of
-from comparisons.lights.translate import ambient_of
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import trace
 from comparisons.mitsuba.scene import render
-from comparisons.pbrt import write_pbrt
-from comparisons.renderers import NoCounterpartError
 from comparisons.translator import UntranslatableError, load, to_mitsuba
 from reference_rt.cameras.camera import Camera
-from reference_rt.cameras.film import AnyFilter, BoxFilter, Film, GaussianFilter, TentFilter
+from reference_rt.cameras.film import Film
 from reference_rt.core.model import Description
-from reference_rt.integrators import Path as PathTracing
-from reference_rt.integrators import RayCast, Whitted
 from reference_rt.lights import Constant, Point
 from reference_rt.materials import Emissive, Mirror
 from reference_rt.materials.material import Material
 from reference_rt.rendering.scene import Scene
-from reference_rt.sampling import Grid, Independent, Sobol
 from reference_rt.shapes import Mesh, Sphere
 from reference_rt.shapes.shape import Shape
 from reference_rt.util.errors import SceneError
@@ -44,34 +36,6 @@ def test_a_miss_has_no_shape() -> None:
     hits = trace(load(Scene(shapes=(Sphere(),))), np.array([[5.0, 0, 5]]), np.array([[0.0, 0, -1]]))
     assert (hits.t[0], hits.shape[0], hits.primitive[0]) == (np.inf, -1, -1)
     assert not hits.p.any()
-
-
-def test_film_samplers_and_integrators() -> None:
-    def parts(**changes: object) -> tuple[dict[str, object], dict[str, object]]:
-        translated = to_mitsuba(Scene(shapes=(Sphere(),)).changed(**changes))
-        return translated["sensor"], translated.get("integrator", {})
-
-    sensor, integrator = parts(sampler=Sobol(spp=3), integrator=PathTracing(rr_depth=9))
-    assert sensor["sampler"] == {"type": "independent", "sample_count": 3}
-    assert integrator == {"type": "path", "max_depth": -1, "rr_depth": 9}
-    sensor, integrator = parts(sampler=Independent(spp=5), integrator=PathTracing(max_depth=4))
-    assert sensor["sampler"] == {"type": "independent", "sample_count": 5}
-    assert integrator["max_depth"] == 4
-    sensor, integrator = parts(sampler=Grid(spp=9), integrator=Whitted(max_depth=2))
-    assert sensor["sampler"] == {"type": "stratified", "jitter": False, "sample_count": 9}
-    assert (integrator["type"], integrator["max_depth"]) == ("whitted", 2)
-    assert parts(integrator=RayCast())[1] == {}
-
-
-@pytest.mark.cases(1)
-@pytest.mark.parametrize("film_filter", [BoxFilter(), TentFilter(radius=1.5), GaussianFilter()])
-def test_filters_load_and_wide_ones_sample_beyond_the_border(film_filter: AnyFilter) -> None:
-    film = Film(width=8, height=4, filter=film_filter)
-    scene = Scene(film=film, shapes=(Sphere(),), lights=(Constant(radiance=(2.0, 2.0, 2.0)),))
-    mi_film = load(scene).sensors()[0].film()
-    assert mi_film.sample_border() == (film_filter != BoxFilter())
-    picture = render(load(scene).mi_scene, 1, 4).pictures
-    assert picture.shape == (1, 4, 8, 3)
 
 
 def test_replicates_differ_by_seed_alone() -> None:
@@ -154,12 +118,6 @@ def test_the_plugin_is_registered() -> None:
     assert mitsuba().load_dict({"type": "whitted", "max_depth": 3}).max_depth == 3
 
 
-def test_ambient_lights_add_up() -> None:
-    lights = (rt.Ambient(radiance=(1.0, 0.2, 0.0)), Point(position=(0, 0, 0), intensity=9.0))
-    assert ambient_of((*lights, rt.Ambient(radiance=0.5))) == [1.5, 0.7, 0.5]
-    assert ambient_of(lights[1:]) == [0.0, 0.0, 0.0]
-
-
 def test_a_number_in_place_of_absent_vertex_colours_is_their_luminance() -> None:
     scene = Scene.parse(
         """
@@ -173,35 +131,3 @@ def test_a_number_in_place_of_absent_vertex_colours_is_their_luminance() -> None
     number = 0.2126 * 0.9 + 0.7152 * 0.4 + 0.0722 * 0.1
     found = [float(x) for x in re.findall(r"'opacity': .*?'value': ([0-9.e-]+)", translated)]
     assert found == [pytest.approx(number, abs=1e-4)]
-
-
-@pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0, 0, -1), (0.3, -0.9, 0.3)])
-def test_a_spot_along_any_axis_lights_what_lies_there(axis: tuple[float, float, float]) -> None:
-    """Mitsuba's map of a light has no inverse where `up` is along its axis."""
-    spot = rt.Spot(origin=(0, 0, 0), target=axis, intensity=1.0, cutoff_angle=20)
-    scene = Scene(shapes=(Sphere(center=(9, 9, 9)),), lights=(spot,))
-    mi = mitsuba()
-    (light,) = load(scene).mi_scene.emitters()
-    it = mi.SurfaceInteraction3f()
-    direction = np.array(axis) / np.linalg.norm(axis)
-    it.p = mi.Point3f(*(2.0 * direction).tolist())
-    _, weight = light.sample_direction(it, mi.Point2f(0.5, 0.5))
-    np.testing.assert_allclose(np.ravel(weight), 0.25, rtol=1e-5)
-
-
-@pytest.mark.parametrize("masked", [False, True])
-def test_light_without_shadows_has_no_counterpart(masked: bool, tmp_path: Path) -> None:
-    """Nor in the formats of other renderers; masks have an integrator of ours in Mitsuba."""
-    scene = Scene(
-        integrator=rt.Path(max_depth=2) if masked else rt.Direct(shadows=False),
-        materials={"a": rt.Diffuse(), "m": rt.Mask(base="a")},
-        shapes=(rt.Union(of=(Sphere(), Sphere()), material="m") if masked else Sphere(),),
-    ).changed(integrator=rt.Direct(shadows=False))
-    with pytest.raises(UntranslatableError, match="without shadows"):
-        to_mitsuba(scene)
-    with pytest.raises(SceneError) as caught:
-        write_pbrt(scene, tmp_path / "s.pbrt")
-    reasons = str(caught.value), *map(str, caught.value.others)
-    assert sum("direct light without shadows" in reason for reason in reasons) == 1
-    with pytest.raises(NoCounterpartError, match="without shadows"):
-        bounces_of(scene.integrator)

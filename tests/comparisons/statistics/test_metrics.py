@@ -170,6 +170,7 @@ def test_exposures_do_not_run_away_before_a_black_background():
     reference[0, 0] = 1.0
     assert flip_exposures(reference)[1] == first + 4.0
     assert flip_exposures(np.zeros((2, 2, 3))) == (first, first)
+    assert flip_exposures(np.full((2, 2, 3), 4.0)) == (first, first)  # brighter than white
 
 
 @NEEDS_FLIP

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from comparisons.lights.translate import translate_light
+from comparisons.lights import translate_light
 from comparisons.materials.translate import translate_material
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.context import TranslationContext, UntranslatableError

@@ -4,7 +4,15 @@ densities are values.  Those of rough conductors and dielectrics: F11 of the sta
 import numpy as np
 import pytest
 from chi_square import sidak
-from leaf_checks import check_same_bits, check_weights, evaluate, p_values, sample, towards
+from leaf_checks import (
+    check_same_bits,
+    check_weights,
+    evaluate,
+    p_values,
+    random_direction,
+    sample,
+    towards,
+)
 from random_bsdfs import (
     NUMBERS,
     random_gltf,
@@ -14,6 +22,8 @@ from random_bsdfs import (
     random_thin,
 )
 
+from reference_rt.core.model import name_of, types_of
+from reference_rt.materials import Bsdf
 from reference_rt.materials.bsdfs.gltf_pbr import GltfPbr
 from reference_rt.materials.bsdfs.phong import Phong
 from reference_rt.materials.bsdfs.plastic import Plastic
@@ -21,7 +31,8 @@ from reference_rt.materials.bsdfs.principled import Principled
 from reference_rt.materials.bsdfs.rough_conductor import RoughConductor
 from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric
 from reference_rt.materials.bsdfs.rough_plastic import RoughPlastic
-from reference_rt.textures import NO_TEXTURES
+from reference_rt.scene.examples import examples
+from reference_rt.textures import NO_TEXTURES, texture_names
 
 FEW_AND_MANY = (
     (random_phong, 65, (10, 200)),
@@ -66,23 +77,40 @@ def test_weight_times_density_is_the_value(materials, seed, condition):
         check_weights(material, wo, rng, condition, bends=material.type != "principled_thin")
 
 
-OPAQUE = [
-    *(material for material, _ in (*random_phong(4, 63), *random_plastic(4, 49))),
-    Principled(base_colour=0.8, sheen=1, clearcoat=1),
-    GltfPbr(metallic=0.5),
-    RoughConductor(eta=0.2, k=3.9),
-]
+SMOOTH = [of for of in types_of(Bsdf) if of.smooth]
 
 
-@pytest.mark.parametrize("material", OPAQUE, ids=lambda material: material.type)
-def test_what_lets_no_light_pass_is_black_behind(material):
-    table, up, down = material.tabulate(NO_TEXTURES), towards(0.5, 1.0), -towards(0.6, 5.0)
-    for wo, wi in ((down, up), (up, down), (down, down)):
-        value, density = evaluate(table, wo, wi)
-        assert not value.any()
-        assert not density.any()
-    assert evaluate(table, up, up)[0].any()
-    assert not sample(table, down, np.full((1, 3), 0.5))[2].any()
+def plain_examples(of):
+    """Those without textures."""
+    return [example for example in examples(of) if not texture_names(example)]
+
+
+@pytest.mark.parametrize("of", SMOOTH, ids=name_of)
+def test_examples_keep_the_contract(of):
+    """Samples have their density, weights their mean; weight times density is the value; compiled
+    code is plain Python, and finite."""
+    rng, found = np.random.default_rng(110), plain_examples(of)
+    for k, material in enumerate(found):
+        wo = random_direction(rng, k, front=not material.transmits)
+        check_weights(material, wo, rng, 16.0, bends=material.type != "principled_thin")
+    p = [p for material in found[:2] for p in p_values(material, towards(0.6, 0.8), rng, n=10_000)]
+    assert min(p) > sidak(len(p))
+    check_same_bits(found, rng)
+
+
+@pytest.mark.parametrize("of", SMOOTH, ids=name_of)
+def test_what_lets_no_light_pass_is_black_behind(of):
+    up, down = towards(0.5, 1.0), -towards(0.6, 5.0)
+    for material in plain_examples(of):
+        table = material.tabulate(NO_TEXTURES)
+        assert evaluate(table, up, up)[0].any()
+        for wo, wi in ((down, up), (up, down), (down, down)):
+            value, density = evaluate(table, wo, wi)
+            if not material.transmits:
+                assert not value.any()
+                assert not density.any()
+        drawn = sample(table, down, np.full((1, 3), 0.5))[2]
+        assert material.transmits or not drawn.any()
 
 
 ONES = dict.fromkeys(NUMBERS, 1.0) | {"metallic": 0.0}

@@ -54,16 +54,6 @@ def test_png_is_srgb_of_the_shown_layer(picture, tmp_path):
     assert np.abs(shown - np.clip(picture.colour, 0, 1)).max() <= 0.5 / 255 * 2.4 / 1.055
 
 
-def test_what_cannot_be_written(picture, tmp_path):
-    for name in ("a.jpg", "a", "a.exr.txt"):
-        with pytest.raises(rt.UsageError, match=r"expected \.exr or \.png"):
-            picture.save(tmp_path / name)
-    assert not [*tmp_path.iterdir()]
-    (tmp_path / "file").touch()
-    with pytest.raises(rt.ImageError, match=r"a\.exr"):
-        picture.save(tmp_path / "file" / "a.exr")
-
-
 def test_every_layer_as_png(picture):
     for layer in ("colour", *LAYERS):
         pixels = opened(picture.png(layer))

@@ -322,18 +322,3 @@ def test_samples_of_lights_are_where_they_say(lit):
     assert free.sum() > 1000
     pdf = lit.light_pdf(p, found.wi[free])
     np.testing.assert_allclose(pdf, found.pdf[free], rtol=1e-12)
-
-
-def test_light_densities_integrate_to_their_chance(lit):
-    """Over all directions from a point in the open, where the lamp and the sky are all there is."""
-    lit = lit.changed(shapes=lit.shapes[2:])
-    rng = np.random.default_rng(6)
-    n = 400_000
-    pdf = lit.light_pdf((-1.0, 0.3, 1.5), unit_vectors(rng, n))
-    sources = lit.light_sources()
-    soft = sources.probability[[0, 3]].sum()
-    # The lamp covers some of the sky, whose density is missing there.
-    sky = sources.probability[3] / (4 * math.pi)
-    covered = np.mean(lit.first_hits((-1.0, 0.3, 1.5), unit_vectors(rng, n)).hit) * 4 * math.pi
-    mean, error = 4 * math.pi * pdf.mean(), 4 * math.pi * pdf.std() / math.sqrt(n)
-    assert mean == pytest.approx(soft - sky * covered, abs=5 * error)

@@ -102,19 +102,6 @@ def test_rays_find_what_they_find_in_plain_python(tmp_path):
     assert (compiled["1 solid.count"] > 0).any()
 
 
-@pytest.mark.slow
-def test_few_rays_of_every_kind_find_what_many_find(tmp_path):
-    scene, rng = everything(tmp_path), np.random.default_rng(5)
-    o = 6.0 * unit_vectors(rng, 200)
-    rays = o + np.array([4.0, 4.0, 0.0]), 2.0 * (rng.uniform(-0.8, 0.8, (200, 3)) - o)
-    with many_from(200):
-        few = traced(scene, *rays)
-    with many_from(0):
-        many = traced(scene, *rays)
-    few, many = arrays_of(few), arrays_of(many)
-    assert all(few[name].tobytes() == many[name].tobytes() for name in few)
-
-
 BUMPY = rt.Scene(
     textures={"waves": rt.Checker(first=(0.2, 0.2, 0.2), second=(0.9, 0.9, 0.9))},
     materials={

@@ -6,7 +6,6 @@ import signal
 
 import numpy as np
 import pytest
-from fake_executors import die
 from small_scenes import LAYERS, same, small
 
 import reference_rt as rt
@@ -195,14 +194,6 @@ def test_killed_processes_are_replaced(box, monkeypatch):
     found = rt.render(scene, workers=2, progress=kill)
     assert same(found, rt.render(scene))
     assert len(set(killed)) == 2
-
-
-@pytest.mark.slow
-def test_processes_that_cannot_live_end_the_render(box, monkeypatch):
-    monkeypatch.setattr("reference_rt.rendering.executor.compute_remotely", die)
-    monkeypatch.setattr("reference_rt.util.workers._MOST_DEATHS", 1)
-    with pytest.raises(WorkersError, match="died 1 times"):
-        rt.render(box, workers=1)
 
 
 def test_workers_with_other_files_refuse(tmp_path, box):

@@ -5,80 +5,30 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.experiments.stability.far.spheres import (
-    RAYS,
-    SCENES,
-    U_SINGLE,
-    answers,
-    in_mitsuba,
-    judge_by_moving,
-    tangent_gaps,
-)
-from comparisons.experiments.stability.harness.core import (
+from comparisons.experiments.stability.far.law import judge_by_moving
+from comparisons.experiments.stability.far.spheres import RAYS, SCENES, in_mitsuba, tangent_gaps
+from comparisons.experiments.stability.harness.outcomes import (
     MITSUBA,
     OURS,
-    Draw,
     FloatArray,
-    Outcome,
-    Shot,
-    pixel_grid,
+    Outcomes,
+    unit_of,
 )
-from comparisons.experiments.stability.harness.steps import Rays, matrix
+from comparisons.experiments.stability.harness.rays import Rays
+from comparisons.experiments.stability.harness.series import Draw
+from comparisons.experiments.stability.harness.steps import matrix
 from comparisons.geometry.affine import across, unit_vectors
 from comparisons.geometry.exact.dyadic import Dyadic
 from comparisons.geometry.frame import round32
 from comparisons.mitsuba.backend import scalar
 from reference_rt.core.arrays import IntArray
 from reference_rt.core.transform import Transform, rotate
-from reference_rt.jit.kernel import ByClass, entry_kernel
+from reference_rt.jit.kernel import by_class, entry_kernel
 from reference_rt.shapes import TABLES, Cone, Cylinder, Quadric, Sphere, Torus
 from reference_rt.shapes.curved.quadrics import Quadrics
 from reference_rt.shapes.curved.torus import Tori
 from reference_rt.shapes.shape import Shape, TabulationContext
 from reference_rt.textbook.method import ray_of
-
-# ---- a sphere from afar, as a contestant of F1 sees it -------------------------------------------
-
-
-PIXELS = 192
-VIEW = (0.36, 0.48, 0.8)
-
-
-def _heights(contestant: str, x: float) -> FloatArray:
-    """How far in front of the centre's plane the sphere is met, in radii; NaN for misses."""
-    view = np.array(VIEW)
-    right = np.cross([0.0, 0.0, 1.0], view)
-    right /= np.linalg.norm(right)
-    up = np.cross(view, right)
-    u, v = pixel_grid(PIXELS, 1.2)
-    target = u[:, None] * right + v[:, None] * up
-    o = np.broadcast_to(view * x, target.shape).copy()
-    d = target / x - view
-    if contestant == MITSUBA:
-        with scalar():
-            t = in_mitsuba(Sphere(), round32(o), round32(d))
-    else:
-        n = len(o)
-        columns = {"center": np.zeros((n, 3)), "radius": np.ones(n)}
-        t = answers(Rays("spheres", columns, np.ones(n), o, d))[contestant]
-    return np.where(np.isfinite(t), x - t, np.nan)
-
-
-def shoot(contestant: str, x: float) -> Shot:
-    """Brighter is nearer; grey is a miss, red is off the sphere by more than a tenth."""
-    z = _heights(contestant, x)
-    level = np.clip(0.55 + 0.4 * z, 0.0, 1.0)
-    pixels = np.repeat((255.0 * np.nan_to_num(level))[:, None], 3, axis=1)
-    pixels[np.isnan(z)] = 40.0
-    u, v = pixel_grid(PIXELS, 1.2)
-    exact = np.sqrt(np.maximum(1.0 - (u**2 + v**2), 0.0))
-    pixels[np.abs(z - exact) > 0.1] = (200.0, 30.0, 30.0)
-    caption = (
-        f"A sphere from {x:g} radii away: brighter is nearer, red is off by more than a tenth of"
-        " the radius, dark is a miss."
-    )
-    return Shot(pixels.reshape(PIXELS, PIXELS, 3).astype(np.uint8), caption)
-
 
 MINOR = 0.25
 """The tube's radius of a torus whose ring has radius 1."""
@@ -237,10 +187,7 @@ def answer(rays: Rays) -> FloatArray:
     return t
 
 
-_intersect = ByClass("intersect")
-for _, _, _table, _module in TABLES:
-    _intersect.register(_table, _module.intersect)
-_intersect_row = _intersect.function
+_intersect_row = by_class("intersect", {one.table: one.module.intersect for one in TABLES})
 
 
 @entry_kernel
@@ -255,7 +202,7 @@ IN_MITSUBA = ("ellipsoid", "cylinder")
 
 def compete(
     draw: Draw, name: str, distance: FloatArray, offset: float = 0.0, size: float = 1.0
-) -> Mapping[str, Outcome]:
+) -> Outcomes:
     """Ours; and Mitsuba on some of the rays, rounded to float32 with their shapes, against the
     exact answer for these and the law in float32's u."""
     rays, maps = draw_rays(draw.rng, name, distance, offset, size)
@@ -266,7 +213,7 @@ def compete(
         with scalar():
             for k, shape in enumerate(shapes):
                 t[k::SCENES] = in_mitsuba(shape, rounded.o[k::SCENES], rounded.d[k::SCENES])
-        found[MITSUBA] = judge_by_moving(rounded, t, U_SINGLE)
+        found[MITSUBA] = judge_by_moving(rounded, t, unit_of(MITSUBA))
     return found
 
 

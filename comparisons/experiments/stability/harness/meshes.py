@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.core import FloatArray
+from comparisons.experiments.fuzz.assets import files
+from comparisons.experiments.stability.harness.outcomes import FloatArray
 from comparisons.geometry.affine import unit_vectors
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.files import ply
 from reference_rt.core.arrays import IntArray
+from reference_rt.shapes.meshes.files import MeshData
 
 AWAY = np.array([148376.0, 1234.0, -223423.0]) / 148376.0
 """Where Embree's own test puts its meshes, of an offset of 1."""
@@ -155,16 +158,7 @@ def from_inside(
 
 def write(vertices: FloatArray, faces: IntArray, file: Path) -> Path:
     """Vertices (n, 3) and triangles (m, 3) as .ply, with every bit of the vertices."""
-    header = (
-        "ply\nformat binary_little_endian 1.0\n"
-        f"element vertex {len(vertices)}\n"
-        "property double x\nproperty double y\nproperty double z\n"
-        f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
-    )
-    rows = np.empty(len(faces), [("n", "u1"), ("corners", "<i4", 3)])
-    rows["n"], rows["corners"] = 3, faces
-    body = np.ascontiguousarray(vertices, "<f8").tobytes() + rows.tobytes()
-    file.write_bytes(header.encode("ascii") + body)
+    file.write_bytes(ply(MeshData(vertices, faces)))
     return file
 
 
@@ -192,7 +186,4 @@ BALL = "ball.obj"
 
 def write_smallest_ball(folder: Path) -> None:
     """BALL of twenty triangles."""
-    from trimesh.creation import icosphere
-
-    text = icosphere(subdivisions=0).export(file_type="obj")
-    (folder / BALL).write_text(text, encoding="utf-8")
+    (folder / BALL).write_bytes(files()[BALL])

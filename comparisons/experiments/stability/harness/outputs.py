@@ -9,15 +9,11 @@ from typing import Any, NamedTuple
 
 from rich.console import RenderableType
 
-from comparisons.experiments.stability.harness.core import (
-    MITSUBA,
-    OURS,
-    Effort,
+from comparisons.experiments.stability.harness.outcomes import MITSUBA, OURS, Outcome
+from comparisons.experiments.stability.harness.points import (
     Found,
-    Outcome,
     SeriesSummary,
     contestants,
-    family,
     first_failure,
     found_of,
     named,
@@ -25,6 +21,7 @@ from comparisons.experiments.stability.harness.core import (
     summarise,
     total,
 )
+from comparisons.experiments.stability.harness.series import Effort, family
 from comparisons.report.table import Column, Table
 from comparisons.report.values import label, power_of_ten, shown, typeset
 from comparisons.results.files import plain, write_json

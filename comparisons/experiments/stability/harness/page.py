@@ -9,16 +9,6 @@ from typing import Any
 
 from markupsafe import Markup
 
-from comparisons.experiments.stability.harness.core import (
-    Effort,
-    Found,
-    SeriesSummary,
-    contestants,
-    family,
-    found_of,
-    named,
-    summaries,
-)
 from comparisons.experiments.stability.harness.outputs import (
     COLUMNS,
     again,
@@ -26,7 +16,16 @@ from comparisons.experiments.stability.harness.outputs import (
     rows_of,
     series_table,
 )
+from comparisons.experiments.stability.harness.points import (
+    Found,
+    SeriesSummary,
+    contestants,
+    found_of,
+    named,
+    summaries,
+)
 from comparisons.experiments.stability.harness.run import Picture
+from comparisons.experiments.stability.harness.series import Effort, family
 from comparisons.report.plots import Curve, log_log
 from comparisons.report.templates import template, write
 from comparisons.report.values import typeset

@@ -12,17 +12,15 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 from pydantic import BaseModel, ConfigDict
 
-from comparisons.experiments.stability.harness.core import (
-    OURS,
+from comparisons.experiments.stability.harness.outcomes import OURS
+from comparisons.experiments.stability.harness.points import Found, contestants, summarise
+from comparisons.experiments.stability.harness.series import (
     Draw,
     Effort,
     Family,
-    Found,
     Series,
-    contestants,
     family,
     generator,
-    summarise,
 )
 from comparisons.mitsuba.backend import backend
 from comparisons.runs import engine

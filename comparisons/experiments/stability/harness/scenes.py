@@ -1,4 +1,4 @@
-"""The scenes that F9 renders, and pictures that must have the same bits.
+"""The scenes that F9 renders.
 
 All coordinates are multiples of 1/64 below 8 (where shapes are turned: of their centres), so that
 whole-number offsets up to 2^46 and factors 2^k move a scene exactly, in float64; in float32 up to
@@ -17,10 +17,7 @@ from reference_rt.textures.texture import UvMap
 
 if TYPE_CHECKING:
     import trimesh
-from collections.abc import Mapping
 
-from comparisons.experiments.stability.harness.core import FloatArray, Outcome, outcome
-from comparisons.geometry.exact.dyadic import BoolArray
 
 SIZE = 4.0
 """About the radius of each scene about the origin, its eye included."""
@@ -30,9 +27,6 @@ GRID = 64.0
 FILM = rt.Film(width=48, height=36)
 
 CAMERA = rt.Perspective(eye=(1, 2, 7), target=(0, 0, 0), fov=48)
-
-# ---- the scenes ---------------------------------------------------------------------------------
-
 
 FLOOR = (scaled(4.0, 4.0, 1.0), turned(-90.0), at(0.0, -1.0, 0.0))
 
@@ -219,23 +213,3 @@ def _lit_shapes(lamp: bool) -> tuple[Any, ...]:
         return shapes
     glow = rt.Sphere(material="lamp", center=(-2.5, 1.5, 1), radius=0.25)
     return (*shapes, rt.Rectangle(material="lamp", transform=_LAMP), glow)
-
-
-# ---- pictures pixel by pixel, and those that must have the same bits -----------------------------
-
-
-def same_bits(expected: FloatArray, found: FloatArray) -> Outcome:
-    """A case a pixel; worst: the largest relative difference, inf for NaN, which always fails."""
-    other = (expected != found).any(axis=-1)
-    size = np.maximum(np.abs(expected), np.abs(found))
-    off = np.abs(expected - found) / np.where(size > 0.0, size, 1.0)
-    off = np.where(np.isnan(off), np.inf, off)
-    return of_pixels(other, {"expected": expected, "found": found}, float(off.max()))
-
-
-def of_pixels(wrong: BoolArray, pictures: Mapping[str, FloatArray], worst: float) -> Outcome:
-    """wrong (height, width): a case a pixel;  pictures: (height, width, c), of which the examples
-    show the pixels."""
-    y, x = (index.ravel() for index in np.indices(wrong.shape))
-    columns = {name: pixels.reshape(wrong.size, -1) for name, pixels in pictures.items()}
-    return outcome(wrong.ravel(), {"pixel": np.column_stack([x, y]), **columns}, worst=worst)

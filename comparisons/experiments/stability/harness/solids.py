@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.core import OURS, FloatArray
 from comparisons.experiments.stability.harness.meshes import BALL
+from comparisons.experiments.stability.harness.outcomes import OURS, FloatArray
 from comparisons.geometry.exact.dyadic import Dyadic, nearest
 from comparisons.geometry.flatten import Tree, member_of
 from comparisons.referee.referee import crossings_of, evaluated

@@ -23,7 +23,7 @@ import numba
 import numpy as np
 import typer
 
-from comparisons.experiments.stability.harness.core import Outcome, outcome
+from comparisons.experiments.stability.harness.outcomes import Outcome, outcome
 from reference_rt.cli.guarded import guarded
 from reference_rt.cli.options import adjusted
 from reference_rt.integrators import RayCast

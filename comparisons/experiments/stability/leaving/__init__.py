@@ -31,83 +31,41 @@ shapes smaller than 8.9e-3.  While it takes part, all numbers of shapes and rays
 float32 first, for everyone.  The textbook's ray, which begins at o + t d + 1e-4 w, is judged in
 the same way.
 
-`shapes` places shapes, aims rays and traces them; `judge` decides."""
+`shapes` places shapes and aims rays, `departures` traces them; `judge` decides."""
 
 import contextlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from functools import wraps
 from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.core import (
-    MITSUBA,
-    OURS,
-    Draw,
-    Family,
-    Outcome,
-    Series,
-    Shot,
-    Sweep,
-    decades,
-    pixel_grid,
-)
-from comparisons.experiments.stability.harness.steps import EPSILON, PIXELS, light_picture, lit
-from comparisons.experiments.stability.leaving.judge import Judge, Tally
-from comparisons.experiments.stability.leaving.shapes import (
-    KINDS,
+from comparisons.experiments.stability.harness.outcomes import MITSUBA, OURS, Outcomes
+from comparisons.experiments.stability.harness.series import Draw, Family, Sweep, decades, series
+from comparisons.experiments.stability.harness.shadows import EPSILON
+from comparisons.experiments.stability.harness.shots import Shot
+from comparisons.experiments.stability.leaving.departures import (
     MITSUBA_KINDS,
-    WHOLE,
-    Extent,
-    Placed,
-    Rays,
     Ways,
-    aim,
     depart,
     depart_in_mitsuba,
     outer,
-    place,
-    scene_of,
     subjects,
 )
+from comparisons.experiments.stability.leaving.judge import Judge, Tally
+from comparisons.experiments.stability.leaving.shapes import KINDS, WHOLE, Extent, Rays, aim, place
+from comparisons.experiments.stability.leaving.sunlight import shoot
 from comparisons.mitsuba.backend import scalar
-from reference_rt.core.arrays import FloatArray
 from reference_rt.util.files import temporary_folder
 
-# ---- a shape in sunlight: shadows where there are none are seen as speckle -----------------------
-
-
-def shoot(contestant: str, kind: str, extent: Extent, draw: Draw) -> Shot:
-    """One of a kind in a sun that stands beside the eye: everything seen is lit, but what lies on
-    the far side of its terminator."""
-    placed = place(kind, extent, draw)
-    o, d = _view(placed)
-    sun = np.array([0.6, 0.48, 0.64]) @ _frame(placed).T
-    w = np.tile(sun, (len(o), 1))
-    found = lit(contestant, scene_of(placed), o, d, w)
-    dark = int((found[:, 0] == 0.0).sum())
-    caption = (
-        f"{contestant}: a {kind} in sunlight, {dark:,} of {int((found[:, 0] >= 0.0).sum()):,} "
-        "points in shadow"
-    )
-    return Shot(light_picture(found), caption)
-
-
-def _frame(placed: Placed) -> FloatArray:
-    """The axes of a shape, unit; as good as perpendicular."""
-    return np.asarray(placed.linear / np.linalg.norm(placed.linear, axis=0))
-
-
-def _view(placed: Placed) -> tuple[FloatArray, FloatArray]:
-    """Parallel rays (n, 3) along the shape's own -z, in its own proportions."""
-    x, y = pixel_grid(PIXELS, 1.3)
-    local = np.column_stack([x, y, np.full(x.size, 3.0)])
-    d = np.tile(-_frame(placed)[:, 2], (x.size, 1))
-    return local @ placed.linear.T + placed.center, d
-
-
-# ---- the series ----------------------------------------------------------------------------------
-
+FAMILY = Family(
+    "F2",
+    "leaving a surface",
+    "A ray that leaves a surface neither meets it again nor loses what is near.",
+    "pbrt's reintersection test: radii 1e-4 to 1e4, first misses skipped, cones and paraboloids"
+    " switched off.",
+)
 
 FIXED = "fixed epsilon"
 """The textbook's."""
@@ -144,7 +102,7 @@ def ways(rng: np.random.Generator, n: int, cosine: float | None = None) -> Ways:
 
 def measure(
     draw: Draw, kinds: tuple[str, ...], extent: Extent, cosine: float | None = None
-) -> Mapping[str, Outcome]:
+) -> Outcomes:
     """`draw.cases` departures from shapes of these kinds."""
     rays = RAYS if draw.effort == "full" else 100
     shapes = max(1, draw.cases // (rays * len(kinds)))
@@ -168,8 +126,6 @@ def measure(
                     judge(tallies[MITSUBA], first, outer(away, found), found, False)
     return {name: tally.outcome() for name, tally in tallies.items()}
 
-
-# ---- series --------------------------------------------------------------------------------------
 
 ALL = tuple(KINDS)
 STRETCHED = tuple(kind for kind in ALL if kind != "sphere")
@@ -204,51 +160,35 @@ def _extent(
     return Extent(size, ratio, distance, draw.mitsuba and x <= theirs_to)
 
 
-def _distance(draw: Draw, x: float) -> Extent:
-    return _extent(draw, x, distance=(x, x))
+Place = Callable[[Draw, float], Extent]
 
 
-def _large(draw: Draw, x: float) -> Extent:
-    return _extent(draw, x, size=(math.log10(x), math.log10(x)), theirs_to=1e8)
-
-
-def _small(draw: Draw, x: float) -> Extent:
-    return _extent(draw, x, size=(-math.log10(x), -math.log10(x)), theirs_to=1e8)
-
-
-def _ratio(draw: Draw, x: float) -> Extent:
-    return _extent(draw, x, ratio=(x, x))
-
-
-def _plain(draw: Draw, _x: float) -> Extent:
-    return _extent(draw, 1.0)
-
-
-def _everything(draw: Draw, x: float) -> Extent:
-    """Sizes, ratios and distances at once, all up to x in one."""
-    power = math.log10(x)
-    return _extent(draw, x, (-0.8 * power, 0.8 * power), (1.0, 10.0 ** (0.6 * power)), (1.0, x))
-
-
-def _series(
-    name: str,
-    kinds: tuple[str, ...],
+def _departures(
     sweep: Sweep,
-    about: str,
-    extent: Callable[[Draw, float], Extent],
+    kinds: tuple[str, ...] = ALL,
+    name: str = "",
+    about: str = "",
     grazing: bool = False,
     **more: Any,
-) -> Series:
-    def run(draw: Draw, x: float) -> Mapping[str, Outcome]:
-        return measure(draw, kinds, extent(draw, x), 1.0 / x if grazing else None)
+) -> Callable[[Place], Place]:
+    """Register what says where shapes lie as a series of departures from them;  grazing: at the
+    cosine 1 / x."""
 
-    def picture(contestant: str, x: float) -> Shot:
-        with temporary_folder() as folder:
-            draw = Draw(np.random.default_rng(2), 1, contestant == MITSUBA, folder)
-            single = contestant == MITSUBA
-            return shoot(contestant, kinds[0], extent(draw, x)._replace(single=single), draw)
+    def register(extent: Place) -> Place:
+        def shot(contestant: str, x: float) -> Shot:
+            with temporary_folder() as folder:
+                single = contestant == MITSUBA
+                draw = Draw(np.random.default_rng(2), 1, single, folder)
+                return shoot(contestant, kinds[0], extent(draw, x)._replace(single=single), draw)
 
-    return Series(name, sweep, about, run, unit="of the bound B", shoot=picture, **more)
+        @series(sweep, name, about, unit="of the bound B", shoot=shot, **more)
+        @wraps(extent)
+        def run(draw: Draw, x: float) -> Outcomes:
+            return measure(draw, kinds, extent(draw, x), 1.0 / x if grazing else None)
+
+        return extent
+
+    return register
 
 
 DISTANCES = (1e0, 1e2, 1e4, 1e6, 1e8, 1e10, 1e12, 1e14)
@@ -259,65 +199,59 @@ FAR = Sweep("distance / size", DISTANCES, (1e0, 1e4, 1e10), 500, 1_000_000 // le
 OF_ALL = 500 * len(ALL), 150_000
 """Cases of a point."""
 
-FAMILY = Family(
-    id="F2",
-    name="leaving a surface",
-    law="A ray that leaves a surface neither meets it again nor loses what is near.",
-    anchors="pbrt's reintersection test: radii 1e-4 to 1e4, first misses skipped, cones and "
-    "paraboloids switched off.",
-    series=(
-        *(
-            _series(
-                kind,
-                (kind,),
-                FAR,
-                f"Departures from one {kind} each, size 1, so far from the origin.",
-                _distance,
-                holds_to=1e12,
-                law=BOUND,
-            )
-            for kind in ALL
-        ),
-        *(
-            _series(
-                name,
-                ALL,
-                Sweep(axis, SIZES, (1e8, 1e64), *OF_ALL),
-                "All kinds, as far from the origin as they are large.",
-                extent,
-                explained=explained,
-            )
-            for name, axis, extent, explained in (
-                ("small", "1 / size", _small, ""),
-                ("large", "size", _large, OFFSET_GROWS),
-            )
-        ),
-        _series(
-            "anisotropy",
-            STRETCHED,
-            Sweep(
-                *("longest / shortest axis", decades(0, 12, 2), (1e6, 1e12)),
-                *(500 * len(STRETCHED), 140_000),
-            ),
-            "All kinds but round spheres, stretched along their axes and turned.",
-            _ratio,
-        ),
-        _series(
-            "grazing",
-            ALL,
-            Sweep("1 / cosine of the departure", decades(1, 15, 2), (1e5, 1e15), *OF_ALL),
-            "All kinds, left at this cosine to the normal, to either side.",
-            _plain,
-            grazing=True,
-            explained=OFFSET_ALONG_NORMAL,
-        ),
-        _series(
-            "everything",
-            ALL,
-            Sweep("distance / size", decades(0, 10, 2), (1e10,), *OF_ALL),
-            "All kinds, with sizes from x^-0.8 to x^0.8, axes up to x^0.6 times as long as others, "
-            "distances up to x: at 1e10 from 1e-8 to 1e8, 1e6 and 1e10.",
-            _everything,
-        ),
+
+def _distance(draw: Draw, x: float) -> Extent:
+    return _extent(draw, x, distance=(x, x))
+
+
+for _kind in ALL:
+    _departures(
+        FAR,
+        (_kind,),
+        _kind,
+        f"Departures from one {_kind} each, size 1, so far from the origin.",
+        holds_to=1e12,
+        law=BOUND,
+    )(_distance)
+
+
+@_departures(Sweep("1 / size", SIZES, (1e8, 1e64), *OF_ALL))
+def small(draw: Draw, x: float) -> Extent:
+    """All kinds, as far from the origin as they are large."""
+    return _extent(draw, x, size=(-math.log10(x), -math.log10(x)), theirs_to=1e8)
+
+
+@_departures(Sweep("size", SIZES, (1e8, 1e64), *OF_ALL), explained=OFFSET_GROWS)
+def large(draw: Draw, x: float) -> Extent:
+    """All kinds, as far from the origin as they are large."""
+    return _extent(draw, x, size=(math.log10(x), math.log10(x)), theirs_to=1e8)
+
+
+@_departures(
+    Sweep(
+        *("longest / shortest axis", decades(0, 12, 2), (1e6, 1e12)),
+        *(500 * len(STRETCHED), 140_000),
     ),
+    STRETCHED,
 )
+def anisotropy(draw: Draw, x: float) -> Extent:
+    """All kinds but round spheres, stretched along their axes and turned."""
+    return _extent(draw, x, ratio=(x, x))
+
+
+@_departures(
+    Sweep("1 / cosine of the departure", decades(1, 15, 2), (1e5, 1e15), *OF_ALL),
+    grazing=True,
+    explained=OFFSET_ALONG_NORMAL,
+)
+def grazing(draw: Draw, _x: float) -> Extent:
+    """All kinds, left at this cosine to the normal, to either side."""
+    return _extent(draw, 1.0)
+
+
+@_departures(Sweep("distance / size", decades(0, 10, 2), (1e10,), *OF_ALL))
+def everything(draw: Draw, x: float) -> Extent:
+    """All kinds, with sizes from x^-0.8 to x^0.8, axes up to x^0.6 times as long as others,
+    distances up to x: at 1e10 from 1e-8 to 1e8, 1e6 and 1e10."""
+    power = math.log10(x)
+    return _extent(draw, x, (-0.8 * power, 0.8 * power), (1.0, 10.0 ** (0.6 * power)), (1.0, x))

@@ -6,16 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.experiments.stability.harness.core import EXAMPLES, Outcome, hexed
-from comparisons.experiments.stability.harness.steps import CONTACT
-from comparisons.experiments.stability.leaving.shapes import (
-    KINDS,
-    Departures,
-    Placed,
-    Rays,
-    Subject,
-    scene_of,
-)
+from comparisons.experiments.stability.harness.outcomes import EXAMPLES, Outcome, hexed
+from comparisons.experiments.stability.harness.shadows import CONTACT
+from comparisons.experiments.stability.leaving.departures import Departures, Subject
+from comparisons.experiments.stability.leaving.shapes import KINDS, Placed, Rays, scene_of
 from comparisons.geometry.exact.dyadic import NEVER, BoolArray, nearest
 from comparisons.referee import all_hits, columns_of, first_of
 from comparisons.referee.referee import Referee

@@ -22,7 +22,8 @@ Counts.  Rays of a point as in `_CASES`; a picture has 48 x 36 pixels.
 
 Passes.  No failure within each series' guaranteed range.
 
-Scenes are changed by `comparisons.experiments.relations`; `rays` and `light` judge."""
+Scenes are changed by `comparisons.experiments.relations`; `rays` and `light` judge, `pictures`
+show."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -31,34 +32,50 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 import reference_rt as rt
 from comparisons.experiments import relations
 from comparisons.experiments.relations import Motion, moved
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.core import (
+from comparisons.experiments.stability.harness.outcomes import (
     OURS,
-    Draw,
-    Family,
     FloatArray,
-    Series,
-    Shot,
-    Sweep,
-    decades,
+    Outcomes,
+    same_bits,
     together,
 )
-from comparisons.experiments.stability.harness.scenes import SIZE, same_bits
-from comparisons.experiments.stability.harness.steps import matrix
+from comparisons.experiments.stability.harness.scenes import SIZE
+from comparisons.experiments.stability.harness.series import Draw, Family, Sweep, decades, series
+from comparisons.experiments.stability.harness.steps import matrix, turning
 from comparisons.experiments.stability.metamorphic import light, rays
-from comparisons.experiments.stability.metamorphic.rays import Outcomes
-from comparisons.geometry.affine import unit_rows
-from comparisons.geometry.exact.dyadic import BoolArray
-from comparisons.geometry.frame import round32
+from comparisons.experiments.stability.metamorphic.pictures import shoot_light, shoot_rays
 from reference_rt.shapes.csg import FAR
-from reference_rt.util.files import temporary_folder
 
-# ---- the motions of the series -------------------------------------------------------------------
+FAMILY = Family(
+    "F9",
+    "metamorphic images",
+    "a scene that is moved, scaled, turned, mirrored, reordered or grouped shows the same ids "
+    "and, within u times the scene's condition, the same light",
+    "ANARI's test suite has scenes with a Variant axis, compared by image metrics; pbrt, "
+    "Embree and Mitsuba test no such law",
+)
+
+FACTORS = (*decades(0, 12), 1e20, 1e30, 1e50)
+
+_CASES = 600, 6_000
+
+_SCALE = (
+    "float32 scales like float64, and rays from the eye have no epsilon: Mitsuba's hit the same "
+    "until what it computes leaves float32's range, "
+)
+
+_CHANGE = "relative change of t"
+_DIFFERENCE = "largest difference / mean of the picture"
+
+_LIGHT_ENDS = (
+    "64 u (offset + size) is where rounding may put a point: beyond 1e12 sizes that is 3e-2 of the "
+    "size, as large as what the picture shows"
+)
 
 
 def offset(x: float) -> Motion:
@@ -66,11 +83,7 @@ def offset(x: float) -> Motion:
     return Motion(offset=(far, -0.5 * far, 0.25 * far))
 
 
-def grown(x: float) -> Motion:
-    return Motion(x)
-
-
-def shrunk(x: float) -> Motion:
+def shrunk_by(x: float) -> Motion:
     return Motion(1.0 / x)
 
 
@@ -83,87 +96,13 @@ def turns_of(rng: np.random.Generator, x: float) -> list[FloatArray]:
     if x == EXCHANGES:
         return [np.eye(3)[list(order)] for order in permutations(range(3)) if order != (0, 1, 2)]
     mirror = np.diag([1.0, 1.0, -1.0 if x == BOTH_OF_THESE else 1.0])
-    # QR of normal numbers: turns that are spread evenly, up to the signs of columns.
-    found = [np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(6)]
-    return [turn * np.sign(np.linalg.det(turn)) @ mirror for turn in found]
-
-
-# ---- images of F9's failures, 192 pixels wide ----------------------------------------------------
-
-
-WIDTH, HEIGHT = 192, 144
-
-SPP = 16
-
-WRONG = np.array([0.85, 0.10, 0.05])
-
-
-def shoot_light(motion: Callable[[float], Motion], contestant: str, x: float) -> Shot:
-    """The path-traced scene, transformed."""
-    with temporary_folder() as folder:
-        scene = scenes.path(folder).changed(
-            film=rt.Film(width=WIDTH, height=HEIGHT), sampler=rt.Sobol(spp=SPP, seed=3)
-        )
-        first, found = (light.colours(contestant, s) for s in (scene, moved(scene, motion(x))))
-    visible = np.abs(found - first).max(axis=-1) > 0.1 * first.max(axis=-1) + 0.02
-    visible |= ~np.isfinite(found).all(axis=-1)
-    said = f"{contestant} at {x:g}: {_percent(visible)} of the pixels visibly other than at 1"
-    return Shot(_bytes(np.clip(np.nan_to_num(found), 0.0, 1.0) ** (1.0 / 2.2)), said)
-
-
-def shoot_rays(motion: Callable[[float], Motion], contestant: str, x: float) -> Shot:
-    """What the pixels' rays hit in the scene of things, transformed; red where it is not what they
-    hit before."""
-    with temporary_folder() as folder:
-        scene = scenes.things(folder)
-        o = np.tile(scene.camera.eye, (WIDTH * HEIGHT, 1))
-        d = round32(_directions(scene))
-        pixels = rays.Rays(o, d, np.ones(len(o), bool))
-        answers = []
-        for one in (Motion(), motion(x)):
-            other = moved(scene, one)
-            o, d = rays.through(one, pixels)
-            if contestant == OURS:
-                answers.append(rays.ours(rt.build_tables(other), o, d))
-            else:
-                answers.append(rays.mitsubas(other, o, d))
-    first, found = answers
-    wrong = rays.differ(first, found)
-    # A colour a face: the golden ratio spreads hues.
-    face = first.identities @ (7, 5, 3, 1)
-    hue = np.mod(face[:, None] * 0.618 + np.array([0.0, 0.33, 0.67]), 1.0)
-    shown = np.where(first.identities[:, :1] < 0, 0.95, 0.35 + 0.5 * hue)
-    shown[wrong] = WRONG
-    said = f"{contestant} at {x:g}: {_percent(wrong)} of the rays hit something else (red)"
-    return Shot(_bytes(shown.reshape(HEIGHT, WIDTH, 3)), said)
-
-
-def _directions(scene: rt.Scene) -> FloatArray:
-    x, y = np.meshgrid(np.arange(WIDTH) + 0.5, np.arange(HEIGHT) + 0.5)
-    view = scene.camera.setup(WIDTH, HEIGHT)
-    across, down = x.reshape(-1, 1) / WIDTH, y.reshape(-1, 1) / HEIGHT
-    return unit_rows(
-        np.array(view.corner) + np.array(view.right) * across + np.array(view.down) * down
-    )
-
-
-def _percent(some: BoolArray) -> str:
-    return f"{100.0 * np.mean(some):.2g} %"
-
-
-def _bytes(values: FloatArray) -> npt.NDArray[np.uint8]:
-    return np.rint(255.0 * values).astype(np.uint8)
-
-
-# ---- the series ----------------------------------------------------------------------------------
+    return [turning(rng) @ mirror for _ in range(6)]
 
 
 EXACT_TO = 1e12
 """The largest offset / size at which all coordinates are exact: 4e12 and multiples of 1/256, which
 vertices of scaled meshes are."""
 
-
-# ---- rays ---------------------------------------------------------------------------------------
 
 Make = Callable[[Path], rt.Scene]
 
@@ -188,22 +127,96 @@ BOTH = (scenes.things, scenes.curves)
 ALL = (*BOTH, scenes.solids)
 
 
-def _translated(draw: Draw, x: float) -> Outcomes:
+@series(
+    Sweep("offset / size", decades(0, 13), (1.0, 1e8, 1e12), *_CASES),
+    unit=_CHANGE,
+    shoot=partial(shoot_rays, offset),
+)
+def translated(draw: Draw, x: float) -> Outcomes:
+    """Scenes of every primitive, and their rays, moved by whole numbers. A ray that hits something
+    else, or not at exactly the same t, breaks the law."""
     return together(rays_under([offset(x)], x <= EXACT_TO, BOTH, draw))
 
 
-def _translated_solids(draw: Draw, x: float) -> Outcomes:
-    """Solids near the origin round as they are far from it, others as they are large: there the
-    scene before, of which this one is an exact copy, says what is right."""
+@series(Sweep("offset / size", decades(0, 12), (1e4,), 240, 1000), unit=_CHANGE)
+def translated_solids(draw: Draw, x: float) -> Outcomes:
+    """The same of set operations, which are seen from next to them where they are far out. Rays
+    that differ must be right by F7's law: beyond 16 sizes in the scene before it is moved, which
+    allows no error that grows with the offset."""
+    # Solids near the origin round as they are far from it, others as they are large: there the
+    # scene before, of which this one is an exact copy, says what is right.
     return together(rays_under([offset(x)], False, (scenes.solids,), draw, unmoved=x > FAR))
 
 
-def _scaled(motion: Callable[[float], Motion], draw: Draw, x: float) -> Outcomes:
-    return together(rays_under([motion(x)], False, ALL, draw))
+@series(
+    Sweep("offset / size", decades(0, 13), (1e3, 1e9), 1, 1),
+    unit=_DIFFERENCE,
+    holds_to=1e12,
+    law=_LIGHT_ENDS,
+    shoot=partial(shoot_light, offset),
+)
+def translated_light(draw: Draw, x: float) -> Outcomes:
+    """Pictures, path-traced and by Whitted, of scenes moved by whole numbers. A pixel that changes
+    by more than its condition times u (offset + size) breaks the law."""
+    return light.under(offset, draw, x)
 
 
-def _powers(draw: Draw, x: float) -> Outcomes:
-    """Rays and pictures, both ways."""
+@series(
+    Sweep("1 / factor", FACTORS, (1e9,), *_CASES),
+    unit=_CHANGE,
+    explained=_SCALE + "from 1e20 on (163 of 437 rays)",
+    shoot=partial(shoot_rays, shrunk_by),
+)
+def shrunk(draw: Draw, x: float) -> Outcomes:
+    """Scenes of every primitive and of solids, and their rays, made smaller."""
+    return together(rays_under([shrunk_by(x)], False, ALL, draw))
+
+
+@series(
+    Sweep("factor", FACTORS, (1e9,), *_CASES),
+    unit=_CHANGE,
+    explained=_SCALE + "from 1e12 on (132 of 434 rays)",
+    shoot=partial(shoot_rays, Motion),
+)
+def grown(draw: Draw, x: float) -> Outcomes:
+    """Scenes of every primitive and of solids, and their rays, made larger."""
+    return together(rays_under([Motion(x)], False, ALL, draw))
+
+
+@series(
+    Sweep("1 / factor", FACTORS, (1e1, 1e9), 1, 1),
+    unit=_DIFFERENCE,
+    shoot=partial(shoot_light, shrunk_by),
+)
+def shrunk_light(draw: Draw, x: float) -> Outcomes:
+    """Pictures of scenes made smaller, lights such that they look the same."""
+    return light.under(shrunk_by, draw, x)
+
+
+@series(
+    Sweep("factor", FACTORS, (1e9,), 1, 1),
+    unit=_DIFFERENCE,
+    explained="Mitsuba begins rays (1 + |p|) 8.9e-5 off surfaces, which grows with them: its "
+    "pictures are the same up to 1e8 and fail from 1e9 on (778 of 1,728 pixels)",
+    shoot=partial(shoot_light, Motion),
+)
+def grown_light(draw: Draw, x: float) -> Outcomes:
+    """Pictures of scenes made larger, lights such that they look the same."""
+    return light.under(Motion, draw, x)
+
+
+@series(
+    Sweep(
+        "|k| of the factors 2^k and 2^-k",
+        (1.0, 3.0, 10.0, 30.0, 60.0, 100.0, 160.0),
+        (160.0,),
+        *_CASES,
+    ),
+    unit=_CHANGE,
+    explained=_SCALE + "from 2^60 on (238 of 434 rays); x is an exponent",
+)
+def powers_of_two(draw: Draw, x: float) -> Outcomes:
+    """Rays and pictures of scenes scaled by powers of two: the same to the last bit."""
     motions = [Motion(2.0**x), Motion(2.0**-x)]
     found = [*rays_under(motions, True, ALL, draw)]
     for make, motion in product((scenes.path, scenes.whitted), motions):
@@ -213,7 +226,16 @@ def _powers(draw: Draw, x: float) -> Outcomes:
     return together(found)
 
 
-def _turned(draw: Draw, x: float) -> Outcomes:
+@series(
+    Sweep(
+        "0 mirrors, 1 exchanges of axes, 2 rotations, 3 rotations with mirrors",
+        *(TURNINGS, (MIRRORS,), *_CASES),
+    ),
+    unit=_CHANGE,
+    explained="turns have no extreme",
+)
+def turned(draw: Draw, x: float) -> Outcomes:
+    """Rays, and pictures by Whitted, of scenes turned and mirrored."""
     turns = turns_of(draw.rng, x)
     found = [*rays_under([Motion(turn=t) for t in turns], False, ALL, draw)]
     scene = scenes.whitted(draw.folder)
@@ -223,13 +245,19 @@ def _turned(draw: Draw, x: float) -> Outcomes:
     return together(found)
 
 
-# ---- the same shapes in another order, in other meshes, in groups --------------------------------
-
 REVERSED, SHUFFLED, TRIANGLES, SPLIT = 0.0, 1.0, 2.0, 3.0
 
 
+@series(
+    Sweep(
+        "0 shapes reversed, 1 shuffled, 2 triangles shuffled, 3 meshes split in two",
+        *((REVERSED, SHUFFLED, TRIANGLES, SPLIT), (SPLIT,), *_CASES),
+    ),
+    unit=_CHANGE,
+    explained="an order has no extreme",
+)
 def rearranged(draw: Draw, x: float) -> Outcomes:
-    """Rays and pictures, bit for bit."""
+    """Rays and pictures of scenes whose parts come in another order: the same to the last bit."""
     return together(_rearranged(draw, x))
 
 
@@ -265,8 +293,14 @@ def _remeshed(scene: rt.Scene, draw: Draw, x: float) -> tuple[rt.Scene, Any]:
     return relations.remeshed(scene, parts) or (scene, None)
 
 
+@series(
+    Sweep("groups within groups", (1.0, 2.0, 4.0, 8.0, 16.0), (4.0,), *_CASES),
+    unit=_CHANGE,
+    explained="Mitsuba knows no groups within groups: it is told the product of the maps",
+)
 def nested(draw: Draw, x: float) -> Outcomes:
-    """Shapes under one map, against instances of groups whose maps compose to it."""
+    """Shapes drawn as instances of groups of groups, each under a map of its own, against the same
+    shapes under one transform."""
     return together(_nested(draw, x, make) for make in BOTH)
 
 
@@ -280,152 +314,3 @@ def _nested(draw: Draw, x: float, make: Make) -> Outcomes:
     bare, grouped, names = relations.nested(scene.changed(groups={}, shapes=()), shapes, steps)
     bench = rays.Bench(bare, draw.cases, draw.rng, draw.mitsuba and make is scenes.things)
     return bench.compared(grouped, bench.rays.o, bench.rays.d, names)
-
-
-# ---- the family ---------------------------------------------------------------------------------
-
-FACTORS = (*decades(0, 12), 1e20, 1e30, 1e50)
-
-_CASES = 600, 6_000
-
-_SCALE = (
-    "float32 scales like float64, and rays from the eye have no epsilon: Mitsuba's hit the same "
-    "until what it computes leaves float32's range, "
-)
-
-_GROWN = (
-    "Mitsuba begins rays (1 + |p|) 8.9e-5 off surfaces, which grows with them: its pictures are "
-    "the same up to 1e8 and fail from 1e9 on (778 of 1,728 pixels)"
-)
-
-_CHANGE = "relative change of t"
-_DIFFERENCE = "largest difference / mean of the picture"
-
-_LIGHT_ENDS = (
-    "64 u (offset + size) is where rounding may put a point: beyond 1e12 sizes that is 3e-2 of the "
-    "size, as large as what the picture shows"
-)
-
-FAMILY = Family(
-    id="F9",
-    name="metamorphic images",
-    law="a scene that is moved, scaled, turned, mirrored, reordered or grouped shows the same ids "
-    "and, within u times the scene's condition, the same light",
-    anchors="ANARI's test suite has scenes with a Variant axis, compared by image metrics; pbrt, "
-    "Embree and Mitsuba test no such law",
-    series=(
-        Series(
-            "translated",
-            Sweep("offset / size", decades(0, 13), (1.0, 1e8, 1e12), *_CASES),
-            "Scenes of every primitive, and their rays, moved by whole numbers.  A ray that "
-            "hits something else, or not at exactly the same t, breaks the law.",
-            _translated,
-            unit=_CHANGE,
-            shoot=partial(shoot_rays, offset),
-        ),
-        Series(
-            "translated solids",
-            Sweep("offset / size", decades(0, 12), (1e4,), 240, 1000),
-            "The same of set operations, which are seen from next to them where they are "
-            "far out.  Rays that differ must be right by F7's law: beyond 16 sizes in the scene "
-            "before it is moved, which allows no error that grows with the offset.",
-            _translated_solids,
-            unit=_CHANGE,
-        ),
-        Series(
-            "translated light",
-            Sweep("offset / size", decades(0, 13), (1e3, 1e9), 1, 1),
-            "Pictures, path-traced and by Whitted, of scenes moved by whole numbers.  A pixel"
-            " that changes by more than its condition times u (offset + size) breaks the law.",
-            partial(light.under, offset),
-            unit=_DIFFERENCE,
-            holds_to=1e12,
-            law=_LIGHT_ENDS,
-            shoot=partial(shoot_light, offset),
-        ),
-        Series(
-            "shrunk",
-            Sweep("1 / factor", FACTORS, (1e9,), *_CASES),
-            "Scenes of every primitive and of solids, and their rays, made smaller.",
-            partial(_scaled, shrunk),
-            unit=_CHANGE,
-            explained=_SCALE + "from 1e20 on (163 of 437 rays)",
-            shoot=partial(shoot_rays, shrunk),
-        ),
-        Series(
-            "grown",
-            Sweep("factor", FACTORS, (1e9,), *_CASES),
-            "Scenes of every primitive and of solids, and their rays, made larger.",
-            partial(_scaled, grown),
-            unit=_CHANGE,
-            explained=_SCALE + "from 1e12 on (132 of 434 rays)",
-            shoot=partial(shoot_rays, grown),
-        ),
-        Series(
-            "shrunk light",
-            Sweep("1 / factor", FACTORS, (1e1, 1e9), 1, 1),
-            "Pictures of scenes made smaller, lights such that they look the same.",
-            partial(light.under, shrunk),
-            unit=_DIFFERENCE,
-            shoot=partial(shoot_light, shrunk),
-        ),
-        Series(
-            "grown light",
-            Sweep("factor", FACTORS, (1e9,), 1, 1),
-            "Pictures of scenes made larger, lights such that they look the same.",
-            partial(light.under, grown),
-            unit=_DIFFERENCE,
-            explained=_GROWN,
-            shoot=partial(shoot_light, grown),
-        ),
-        Series(
-            "powers of two",
-            Sweep(
-                "|k| of the factors 2^k and 2^-k",
-                (1.0, 3.0, 10.0, 30.0, 60.0, 100.0, 160.0),
-                (160.0,),
-                *_CASES,
-            ),
-            "Rays and pictures of scenes scaled by powers of two: the same to the last bit.",
-            _powers,
-            unit=_CHANGE,
-            explained=_SCALE + "from 2^60 on (238 of 434 rays); x is an exponent",
-        ),
-        Series(
-            "turned",
-            Sweep(
-                "0 mirrors, 1 exchanges of axes, 2 rotations, 3 rotations with mirrors",
-                TURNINGS,
-                (MIRRORS,),
-                *_CASES,
-            ),
-            "Rays, and pictures by Whitted, of scenes turned and mirrored.",
-            _turned,
-            unit=_CHANGE,
-            explained="turns have no extreme",
-        ),
-        Series(
-            "rearranged",
-            Sweep(
-                "0 shapes reversed, 1 shuffled, 2 triangles shuffled, 3 meshes split in two",
-                (0.0, 1.0, 2.0, 3.0),
-                (3.0,),
-                *_CASES,
-            ),
-            "Rays and pictures of scenes whose parts come in another order: the same to the "
-            "last bit.",
-            rearranged,
-            unit=_CHANGE,
-            explained="an order has no extreme",
-        ),
-        Series(
-            "nested",
-            Sweep("groups within groups", (1.0, 2.0, 4.0, 8.0, 16.0), (4.0,), *_CASES),
-            "Shapes drawn as instances of groups of groups, each under a map of its own, "
-            "against the same shapes under one transform.",
-            nested,
-            unit=_CHANGE,
-            explained="Mitsuba knows no groups within groups: it is told the product of the maps",
-        ),
-    ),
-)

@@ -10,15 +10,20 @@ import numpy as np
 import reference_rt as rt
 from comparisons.experiments.relations import REACH, Motion, moved
 from comparisons.experiments.stability.harness import scenes
-from comparisons.experiments.stability.harness.core import MITSUBA, OURS, Draw, FloatArray, Outcome
-from comparisons.experiments.stability.harness.scenes import SIZE, of_pixels
-from comparisons.experiments.stability.harness.steps import rendered
+from comparisons.experiments.stability.harness.in_mitsuba import rendered
+from comparisons.experiments.stability.harness.outcomes import (
+    MITSUBA,
+    OURS,
+    FloatArray,
+    Outcome,
+    Outcomes,
+    of_pixels,
+    unit_of,
+)
+from comparisons.experiments.stability.harness.scenes import SIZE
+from comparisons.experiments.stability.harness.series import Draw
 from comparisons.geometry.exact.dyadic import BoolArray
-from comparisons.geometry.frame import UNIT_ROUNDOFF as U32
 from comparisons.mitsuba.backend import scalar
-from reference_rt.core.ray import UNIT_ROUNDOFF
-
-ROUNDOFF = {OURS: UNIT_ROUNDOFF, MITSUBA: U32}
 
 STEPS = 4.0
 """Surfaces that a path meets: each adds an error of that size."""
@@ -74,7 +79,7 @@ def before(render: Renderer, scene: rt.Scene, shift: float, u: float) -> Before:
 @lru_cache(maxsize=4)
 def remembered(contestant: str, scene: rt.Scene, shift: float) -> Before:
     """`before`, which is the same for all factors."""
-    return before(partial(colours, contestant), scene, shift, ROUNDOFF[contestant])
+    return before(partial(colours, contestant), scene, shift, unit_of(contestant))
 
 
 @lru_cache(maxsize=4)
@@ -135,7 +140,7 @@ def judged(contestant: str, scene: rt.Scene, motion: Motion, mirrored: bool = Fa
     What rounds separately at each surface no common move finds: where a few pixels are wrong, they
     are compared with scenes each part of which is moved by `shift` in a direction of its own.
     """
-    render, u = partial(colours, contestant), ROUNDOFF[contestant]
+    render, u = partial(colours, contestant), unit_of(contestant)
     shift = REACH * u * (SIZE + max(map(abs, motion.offset)) / motion.factor)
     base = remembered(contestant, scene, shift)
     found = render(moved(scene, motion))
@@ -159,7 +164,7 @@ def _anywhere(rng: np.random.Generator, shift: float, part: object) -> FloatArra
     return np.asarray(shift / np.linalg.norm(v) * v)
 
 
-def under(motion: Callable[[float], Motion], draw: Draw, x: float) -> dict[str, Outcome]:
+def under(motion: Callable[[float], Motion], draw: Draw, x: float) -> Outcomes:
     """Both lit scenes; Mitsuba renders the path-traced one alone."""
     path = scenes.path(draw.folder)
     found = {OURS: judged(OURS, path, motion(x))}

@@ -7,19 +7,20 @@ import numpy as np
 import numpy.typing as npt
 
 import reference_rt as rt
-from comparisons.experiments.relations import Identities, Motion, Names, identities_of
-from comparisons.experiments.stability.harness.core import (
+from comparisons.experiments.relations import Identities, Motion, Names, differ, identities_of
+from comparisons.experiments.stability.harness.in_mitsuba import traced
+from comparisons.experiments.stability.harness.outcomes import (
     MITSUBA,
     OURS,
     Columns,
     FloatArray,
     Outcome,
+    Outcomes,
     hexed,
     outcome,
 )
 from comparisons.experiments.stability.harness.scenes import GRID
 from comparisons.experiments.stability.harness.solids import Truth, truths
-from comparisons.experiments.stability.harness.steps import traced
 from comparisons.geometry.affine import unit_rows
 from comparisons.geometry.exact.dyadic import BoolArray, nearest
 from comparisons.geometry.frame import round32
@@ -106,8 +107,6 @@ class Judge:
         return found
 
 
-Outcomes = dict[str, Outcome]
-
 HALVINGS = 50
 """Steps that close in on an edge: until two rays differ by float64's rounding."""
 
@@ -158,13 +157,15 @@ def aimed(tables: SceneTables, n: int, rng: np.random.Generator) -> Rays:
     ends = rng.uniform(-3.0, 3.0, (2, n, 3)) - o
     a, b = (round32(unit_rows(end)) for end in ends)
     kind = np.arange(n) % 3
-    pairs = np.flatnonzero((kind > 0) & differ(ours(tables, o, a), ours(tables, o, b)))
+    pairs = np.flatnonzero(
+        (kind > 0) & differ(ours(tables, o, a).identities, ours(tables, o, b).identities)
+    )
     low, high = np.zeros(len(pairs)), np.ones(len(pairs))
     p, q, e = a[pairs], b[pairs], o[pairs]
-    first = ours(tables, e, p)
+    first = ours(tables, e, p).identities
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        other = differ(ours(tables, e, p + middle[:, None] * (q - p)), first)
+        other = differ(ours(tables, e, p + middle[:, None] * (q - p)).identities, first)
         low, high = np.where(other, low, middle), np.where(other, middle, high)
     far = kind[pairs] == 1
     depth = np.where(far, rng.uniform(4, 14, len(pairs)), rng.uniform(14, HALVINGS, len(pairs)))
@@ -174,11 +175,6 @@ def aimed(tables: SceneTables, n: int, rng: np.random.Generator) -> Rays:
     coarse = np.ones(n, bool)
     coarse[pairs[~far]] = False
     return Rays(o, a, coarse)
-
-
-def differ(a: Found, b: Found) -> BoolArray:
-    """Which rays do not hit the same thing."""
-    return np.asarray((a.identities != b.identities).any(axis=1))
 
 
 def through(motion: Motion, rays: Rays) -> tuple[FloatArray, FloatArray]:
@@ -199,7 +195,7 @@ class Traced(NamedTuple):
 
 def _changed(before: Traced, after: Traced) -> BoolArray:
     names = after.found.identities if after.names is None else after.names
-    return differ(before.found, Found(after.found.t, names))
+    return differ(before.found.identities, names)
 
 
 BAND = 8.0

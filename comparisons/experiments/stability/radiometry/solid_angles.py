@@ -5,25 +5,23 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from flint import arb, ctx
+from flint import arb
 
-from comparisons.experiments.stability.harness.core import (
+from comparisons.experiments.stability.harness.exactly import cross, dot, exactly
+from comparisons.experiments.stability.harness.meshes import mitsuba_mesh
+from comparisons.experiments.stability.harness.outcomes import (
     MITSUBA,
     OURS,
     Columns,
-    Draw,
     FloatArray,
-    Outcome,
-    Series,
-    Sweep,
-    decades,
+    Outcomes,
     of_errors,
     plain,
     relative,
     together,
     unit_of,
 )
-from comparisons.experiments.stability.harness.meshes import mitsuba_mesh
+from comparisons.experiments.stability.harness.series import Draw, Sweep, decades, series
 from comparisons.geometry.affine import unit_vectors
 from comparisons.geometry.frame import round32
 from comparisons.mitsuba.backend import mitsuba
@@ -66,18 +64,18 @@ def theirs(shape: dict[str, Any] | Any, p: FloatArray, u: FloatArray) -> FloatAr
     return np.asarray(for_rays(density, points, numbers)[0].reshape(u.shape[:2]))
 
 
-def _sphere(draw: Draw, gap: FloatArray, shared: bool) -> dict[str, Outcome]:
+def _cap(at: list[arb]) -> tuple[arb, arb]:
+    """The solid angle of the unit sphere, and the cosine of half its cone."""
+    d2 = dot(at, at)
+    cosine = (1 - 1 / d2).sqrt() if d2 > 1 else arb(0)
+    return 2 * arb.pi() * (1 / d2) / (1 + cosine), cosine
+
+
+def _sphere(draw: Draw, gap: FloatArray, shared: bool) -> Outcomes:
     """The unit sphere from 1 + gap."""
     p = np.ascontiguousarray(unit_vectors(draw.rng, len(gap)) * (1.0 + gap)[:, None])
     p = round32(p) if shared else p
-    exact, cosines = [], []
-    with ctx.workprec(300):
-        for at in p.tolist():
-            d2 = sum((arb(c) * arb(c) for c in at), arb(0))
-            cosine = (1 - 1 / d2).sqrt() if d2 > 1 else arb(0)
-            exact.append(float(2 * arb.pi() * (1 / d2) / (1 + cosine)))
-            cosines.append(float(cosine))
-    truth, cosine = np.array(exact), np.array(cosines)
+    truth, cosine = exactly(_cap, p).T
     out = np.empty((len(p), 1))
     u = draw.rng.uniform(0.0, 1.0, (len(p), 1, 2))
     _of_sphere(Sphere().tabulate(TabulationContext()), p, u, out)
@@ -96,38 +94,30 @@ def _sphere(draw: Draw, gap: FloatArray, shared: bool) -> dict[str, Outcome]:
     return outcomes
 
 
-def _small(draw: Draw, x: float) -> dict[str, Outcome]:
-    """Solid angles of 1 / x to 2 / x: pi / d²."""
+@series(
+    Sweep("1 / solid angle", decades(0, 12), (1.0, 1e6, 1e12), 1_000, 20_000), unit="of the value"
+)
+def small_spheres(draw: Draw, x: float) -> Outcomes:
+    """The solid angle that light samples of a sphere stand for, seen from afar."""
     omega = draw.rng.uniform(1.0, 2.0, draw.cases) / x
     return _sphere(draw, np.sqrt(math.pi / omega) - 1.0, True)
 
 
-def _close(draw: Draw, x: float) -> dict[str, Outcome]:
-    return _sphere(draw, draw.rng.uniform(1.0, 2.0, draw.cases) / x, x < 2.0**20)
-
-
-SMALL_SPHERE = Series(
-    "small spheres",
-    Sweep("1 / solid angle", decades(0, 12), (1.0, 1e6, 1e12), 1_000, 20_000),
-    "The solid angle that light samples of a sphere stand for, seen from afar.",
-    _small,
-    unit="of the value",
-)
-CLOSE_SPHERE = Series(
-    "close spheres",
+@series(
     Sweep(
         "radius / distance from the surface", decades(0, 12), (1.0, 1e3, 1e6, 1e12), 1_000, 20_000
     ),
-    "The solid angle that light samples of a sphere stand for, seen from just off it.",
-    _close,
     unit="of the value",
     explained="the law allows for the condition, 1 / cos, so that both may lose digits alike: "
     "Mitsuba is off by 6.9e-5 at 1e6, ours by 6.3e-14; it is asked as far as float32 has points "
     "that close, 2^20",
 )
+def close_spheres(draw: Draw, x: float) -> Outcomes:
+    """The solid angle that light samples of a sphere stand for, seen from just off it."""
+    return _sphere(draw, draw.rng.uniform(1.0, 2.0, draw.cases) / x, x < 2.0**20)
 
 
-# ---- solid angles of rectangles and triangles, implied by the densities of light samples ---------
+# Solid angles of rectangles and triangles.
 #
 # Nothing is left to chance: a light sample is a function of two random numbers, and the mean of
 # 1 / pdf over all of them, an integral over the unit square, is the light's solid angle whatever
@@ -173,13 +163,8 @@ def rule(n: int) -> tuple[FloatArray, FloatArray]:
     return both, product / math.fsum(product)
 
 
-def _triangle_angle(a: Any, b: Any, c: Any) -> tuple[arb, float]:
+def _triangle_angle(a: list[arb], b: list[arb], c: list[arb]) -> tuple[arb, float]:
     """The solid angle of a triangle seen from the origin, and the condition of its denominator."""
-
-    def dot(p: Any, q: Any) -> arb:
-        return sum((s * t for s, t in zip(p, q, strict=True)), arb(0))
-
-    n = [b[k - 2] * c[k - 1] - b[k - 1] * c[k - 2] for k in range(3)]
     lengths = [dot(v, v).sqrt() for v in (a, b, c)]
     terms = [
         lengths[0] * lengths[1] * lengths[2],
@@ -188,7 +173,7 @@ def _triangle_angle(a: Any, b: Any, c: Any) -> tuple[arb, float]:
         dot(c, a) * lengths[1],
     ]
     total = sum(terms, arb(0))
-    volume = abs(dot(a, n))
+    volume = abs(dot(a, cross(b, c)))
     size = float(sum((abs(t) for t in terms), arb(0)))
     # Of atan2: the larger of the two sides counts.
     return 2 * arb.atan2(volume, total), size / max(abs(float(total)), float(volume))
@@ -196,16 +181,17 @@ def _triangle_angle(a: Any, b: Any, c: Any) -> tuple[arb, float]:
 
 def _exact(corners: Any, p: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(n,) solid angles of a convex polygon, and their conditions."""
-    angles, conditions = [], []
-    with ctx.workprec(300):
-        for at in p.tolist():
-            seen = [[arb(c) - arb(o) for c, o in zip(v, at, strict=True)] for v in corners]
-            parts = [
-                _triangle_angle(seen[0], seen[k], seen[k + 1]) for k in range(1, len(seen) - 1)
-            ]
-            angles.append(float(sum((part[0] for part in parts), arb(0))))
-            conditions.append(max(part[1] for part in parts))
-    return np.array(angles), np.array(conditions)
+
+    def formula(at: list[arb]) -> tuple[arb, float]:
+        seen = [[arb(c) - o for c, o in zip(v, at, strict=True)] for v in corners]
+        angles, conditions = zip(
+            *(_triangle_angle(seen[0], *seen[k : k + 2]) for k in range(1, len(seen) - 1)),
+            strict=True,
+        )
+        return sum(angles, arb(0)), max(conditions)
+
+    angles, conditions = exactly(formula, p).T
+    return angles, conditions
 
 
 def _points(rng: np.random.Generator, n: int, x: float) -> FloatArray:
@@ -239,9 +225,7 @@ def _mean(densities: Densities, p: FloatArray, nodes: int) -> FloatArray:
         return np.asarray(np.where(pdf > 0.0, 1.0 / pdf, 0.0) @ weights)
 
 
-def _compare(
-    name: str, corners: Any, p: FloatArray, methods: dict[str, Densities]
-) -> dict[str, Outcome]:
+def _compare(name: str, corners: Any, p: FloatArray, methods: dict[str, Densities]) -> Outcomes:
     truth, condition = _exact(corners, p)
     outcomes = {}
     for who, densities in methods.items():
@@ -277,47 +261,39 @@ def _methods(draw: Draw, ours: Densities, shape: Callable[[], Any]) -> dict[str,
     return {OURS: ours, MITSUBA: mitsubas}
 
 
-def _square(draw: Draw, p: FloatArray) -> dict[str, Outcome]:
+def _square(draw: Draw, p: FloatArray) -> Outcomes:
     methods = _methods(draw, _rectangle_densities, lambda: {"type": "rectangle"})
     return _compare("rectangle", SQUARE, p, methods)
 
 
-def _flat(draw: Draw, x: float) -> dict[str, Outcome]:
+@series(
+    Sweep(
+        "1 / solid angle",
+        (1.0, 1e1, 1e2, 1e3, *decades(4, 20, 2)),
+        (1.0, 1e3, 1e6, 1e12, 1e20),
+        *(200, 2_000),
+    ),
+    unit="of the value",
+    explained="both draw points of the area, whose densities hold no difference of numbers that "
+    "are alike: Mitsuba is off by a few of its u, 2.1e-7, at the end of the range as well",
+)
+def flat_lights(draw: Draw, x: float) -> Outcomes:
+    """The mean of 1 / pdf over the random numbers of a sample of a rectangle and of a triangle,
+    three half edges away or more, or beside them at a grazing angle."""
     p = _points(draw.rng, draw.cases, x)
     methods = _methods(draw, _triangle_densities, _mitsuba_triangle)
     return together([_square(draw, p), _compare("triangle", CORNERS, p, methods)])
 
 
-def _sky(draw: Draw, x: float) -> dict[str, Outcome]:
+@series(
+    Sweep("half edge / height", decades(0, 12), (1.0, 1e3, 1e12), 200, 2_000), unit="of the value"
+)
+def lights_that_fill_the_sky(draw: Draw, x: float) -> Outcomes:
+    """The mean of 1 / pdf over the random numbers of a sample of a rectangle right above. Samples
+    uniform over its area miss the part that counts: right in the mean of very many, but 400, as
+    well placed as 400 can be, say another solid angle."""
     return _square(draw, _over(draw.rng, draw.cases, x))
 
 
 def _mitsuba_triangle() -> Any:
     return mitsuba_mesh(np.array(CORNERS), np.array([[0, 1, 2]]))
-
-
-FLAT = Series(
-    "flat lights",
-    Sweep(
-        "1 / solid angle",
-        (1.0, 1e1, 1e2, 1e3, 1e4, 1e6, 1e8, 1e10, 1e12, 1e14, 1e16, 1e18, 1e20),
-        (1.0, 1e3, 1e6, 1e12, 1e20),
-        200,
-        2_000,
-    ),
-    "The mean of 1 / pdf over the random numbers of a sample of a rectangle and of a triangle, "
-    "three half edges away or more, or beside them at a grazing angle.",
-    _flat,
-    unit="of the value",
-    explained="both draw points of the area, whose densities hold no difference of numbers that "
-    "are alike: Mitsuba is off by a few of its u, 2.1e-7, at the end of the range as well",
-)
-SKY = Series(
-    "lights that fill the sky",
-    Sweep("half edge / height", decades(0, 12), (1.0, 1e3, 1e12), 200, 2_000),
-    "The mean of 1 / pdf over the random numbers of a sample of a rectangle right above.  Samples "
-    "uniform over its area miss the part that counts: right in the mean of very many, but 400, "
-    "as well placed as 400 can be, say another solid angle.",
-    _sky,
-    unit="of the value",
-)

@@ -17,85 +17,50 @@ Every other shape and its rays are rounded to float32, and Mitsuba gets the very
 ours and the textbook's methods; the others are for these alone.  Mitsuba is judged by the same
 law: what its rounding turns into a miss or a hit is wrong.
 
-`judge` draws shapes and rays, and decides."""
+`trials` draws shapes and rays, `judge` decides, `maps` shows."""
 
-from collections.abc import Callable, Iterator, Mapping
-from functools import partial
+from collections.abc import Callable, Iterator
+from functools import wraps
 
 import numpy as np
 
 import reference_rt as rt
-from comparisons.experiments.stability.harness.core import (
+from comparisons.experiments.stability.harness.in_mitsuba import traced
+from comparisons.experiments.stability.harness.outcomes import (
     MITSUBA,
     OURS,
-    Draw,
-    Family,
     FloatArray,
-    Outcome,
-    Series,
-    Shot,
-    Sweep,
-    decades,
-    pixel_grid,
+    Outcomes,
     together,
 )
-from comparisons.experiments.stability.harness.steps import traced
-from comparisons.experiments.stability.slivers.judge import (
+from comparisons.experiments.stability.harness.series import Draw, Family, Sweep, decades, series
+from comparisons.experiments.stability.harness.shots import Shot
+from comparisons.experiments.stability.harness.steps import scaled
+from comparisons.experiments.stability.slivers.judge import Judge, Question
+from comparisons.experiments.stability.slivers.maps import picture, targets
+from comparisons.experiments.stability.slivers.trials import (
+    OUTSIDE,
     SHAPES,
-    Judge,
-    Question,
     Trial,
-    grazed_box,
     grazed_flat,
     grazed_triangle,
-    needle,
+    grazing_directions,
     thin_triangle,
 )
-from comparisons.geometry.exact.dyadic import BoolArray
+from comparisons.geometry.frame import round32
 from comparisons.referee import columns_of
 from reference_rt import textbook
 from reference_rt.rendering import query
 
-# ---- maps of a triangle: the outcome of the ray that is aimed at each of its points --------------
-
-
-PIXELS = 192
-
-RIGHT, LOST, FALSE, OFF = (70, 110, 150), (250, 250, 250), (240, 160, 40), (200, 40, 40)
-
-
-def targets() -> FloatArray:
-    """Barycentrics (PIXELS², 3) of a picture in which any triangle has its vertices near the lower
-    corners and the middle of the upper edge."""
-    x, y = pixel_grid(PIXELS, 1.2)
-    top = 0.5 * (y + 1.0)
-    right = 0.5 * (x + 1.0 - top)
-    return np.stack([1.0 - top - right, right, top], axis=-1)
-
-
-def picture(expected: FloatArray, found: FloatArray, wrong: BoolArray, caption: str) -> Shot:
-    """expected, found (PIXELS²,): t, inf for misses;  wrong: which break the law."""
-    pixels = np.full((PIXELS * PIXELS, 3), 20, np.uint8)
-    hit, there = np.isfinite(found), np.isfinite(expected)
-    pixels[hit] = RIGHT
-    pixels[wrong & hit & there] = OFF
-    pixels[wrong & hit & ~there] = FALSE
-    pixels[wrong & ~hit] = LOST
-    counts = [
-        f"{int(which.sum())} {word}"
-        for which, word in (
-            (wrong & ~hit, "lost (white)"),
-            (wrong & hit & ~there, "false (orange)"),
-            (wrong & hit & there, "elsewhere (red)"),
-        )
-    ]
-    return Shot(pixels.reshape(PIXELS, PIXELS, 3), f"{caption}: {', '.join(counts)}.")
-
-
-# ---- the series ----------------------------------------------------------------------------------
-
+FAMILY = Family(
+    "F4",
+    "slivers and grazing rays",
+    "t lies in the exact hit interval, or the miss is exact, but for rays moved by rounding",
+    "embree#387: a false hit at t = 12291.2 on a sliver; no range is tested elsewhere",
+)
 
 Make = Callable[[np.random.Generator, float, int, bool], Trial]
+"""Of random numbers, x, how many rays, and whether float32 is to have all numbers."""
 Shoot = Callable[[str, float], Shot]
 
 CASES = 2_000, 40_000
@@ -120,19 +85,6 @@ def answers(trial: Trial, mitsuba: bool) -> tuple[Question, dict[str, FloatArray
     return Question(trial.kind, row, trial.o, trial.d, trial.size), found
 
 
-def measured(make: Make) -> Callable[[Draw, float], Mapping[str, Outcome]]:
-    """A series' `measure`: SHAPES trials, each for all contestants that can take part."""
-
-    def trials(draw: Draw, x: float) -> Iterator[dict[str, Outcome]]:
-        for k in range(SHAPES):
-            trial = make(draw.rng, x, draw.cases // SHAPES, k % 2 == 0)
-            question, found = answers(trial, draw.mitsuba and trial.singles)
-            judge = Judge(question)
-            yield {name: judge.outcome(t) for name, t in found.items()}
-
-    return lambda draw, x: together(trials(draw, x))
-
-
 def map_of(make: Callable[..., Trial]) -> Shoot:
     """A series' `shoot`: a triangle of float32 numbers, with a ray aimed at each point."""
 
@@ -147,13 +99,6 @@ def map_of(make: Callable[..., Trial]) -> Shoot:
     return shoot
 
 
-def _series(
-    name: str, sweep: Sweep, about: str, make: Make, explained: str = "", shoot: Shoot | None = None
-) -> Series:
-    unit = "u (|o| + size)"
-    return Series(name, sweep, about, measured(make), unit, explained=explained, shoot=shoot)
-
-
 ASPECT = Sweep("length / height", decades(0, 12), decades(0, 12, 4), *CASES)
 ANGLE = Sweep("1 / angle to the plane", decades(1, 15), decades(3, 15, 4), *CASES)
 EXACT = (
@@ -161,67 +106,97 @@ EXACT = (
     " them to 24 bits at any size, and nothing is lost that float64 would keep"
 )
 
-FAMILY = Family(
-    id="F4",
-    name="slivers and grazing rays",
-    law="t lies in the exact hit interval, or the miss is exact, but for rays moved by rounding",
-    anchors="embree#387: a false hit at t = 12291.2 on a sliver; no range is tested elsewhere",
-    series=(
-        _series(
-            "aspect",
-            ASPECT,
-            "Ever thinner triangles, turned any way, met at up to 70° from the normal; three rays"
-            " in four at points inside.",
-            partial(thin_triangle, turned=True),
-            shoot=map_of(thin_triangle),
-        ),
-        _series(
-            "aspect, aligned",
-            ASPECT,
-            "The same in planes of the axes, whose heights float32 has exactly.",
-            partial(thin_triangle, turned=False),
-            EXACT,
-        ),
-        _series(
-            "grazing",
-            ANGLE,
-            "Rays at a small angle to a triangle, turned any way, three in four at points inside.",
-            partial(grazed_triangle, turned=True),
-            shoot=map_of(grazed_triangle),
-        ),
-        _series(
-            "grazing, aligned",
-            ANGLE,
-            "The same in planes of the axes, where float32 has every angle exactly.",
-            partial(grazed_triangle, turned=False),
-            EXACT,
-        ),
-        _series(
-            "grazing a rectangle",
-            ANGLE,
-            "Rays at a small angle to rectangles: half of these in the plane z = 0, half turned.",
-            partial(grazed_flat, is_round=False),
-            EXACT,
-        ),
-        _series(
-            "grazing a disk",
-            ANGLE,
-            "Rays at a small angle to ellipses: half of these in the plane z = 0, half turned.",
-            partial(grazed_flat, is_round=True),
-            EXACT,
-        ),
-        _series(
-            "grazing a box",
-            ANGLE,
-            "Rays along a face of a cube, within twice the angle of it on either side.",
-            grazed_box,
-        ),
-        _series(
-            "needles",
-            ASPECT._replace(axis="length / thickness"),
-            "Ever thinner boxes, met from the side.",
-            needle,
-            EXACT,
-        ),
-    ),
-)
+
+def drawn(
+    sweep: Sweep, name: str = "", explained: str = "", shoot: Shoot | None = None
+) -> Callable[[Make], Make]:
+    """Register what draws a trial as a series of SHAPES trials a point, each for all contestants
+    that can take part."""
+
+    def register(make: Make) -> Make:
+        def trials(draw: Draw, x: float) -> Iterator[Outcomes]:
+            for k in range(SHAPES):
+                trial = make(draw.rng, x, draw.cases // SHAPES, k % 2 == 0)
+                question, hits = answers(trial, draw.mitsuba and trial.singles)
+                judge = Judge(question)
+                yield {name: judge.outcome(t) for name, t in hits.items()}
+
+        @series(sweep, name, unit="u (|o| + size)", explained=explained, shoot=shoot)
+        @wraps(make)
+        def measure(draw: Draw, x: float) -> Outcomes:
+            return together(trials(draw, x))
+
+        return make
+
+    return register
+
+
+@drawn(ASPECT, shoot=map_of(thin_triangle))
+def aspect(rng: np.random.Generator, x: float, n: int, singles: bool) -> Trial:
+    """Ever thinner triangles, turned any way, met at up to 70° from the normal; three rays in four
+    at points inside."""
+    return thin_triangle(rng, x, n, singles, turned=True)
+
+
+@drawn(ASPECT, "aspect, aligned", EXACT)
+def aspect_aligned(rng: np.random.Generator, x: float, n: int, singles: bool) -> Trial:
+    """The same in planes of the axes, whose heights float32 has exactly."""
+    return thin_triangle(rng, x, n, singles, turned=False)
+
+
+@drawn(ANGLE, shoot=map_of(grazed_triangle))
+def grazing(rng: np.random.Generator, x: float, n: int, singles: bool) -> Trial:
+    """Rays at a small angle to a triangle, turned any way, three in four at points inside."""
+    return grazed_triangle(rng, x, n, singles, turned=True)
+
+
+@drawn(ANGLE, "grazing, aligned", EXACT)
+def grazing_aligned(rng: np.random.Generator, x: float, n: int, singles: bool) -> Trial:
+    """The same in planes of the axes, where float32 has every angle exactly."""
+    return grazed_triangle(rng, x, n, singles, turned=False)
+
+
+@drawn(ANGLE, explained=EXACT)
+def grazing_a_rectangle(rng: np.random.Generator, x: float, n: int, singles: bool) -> Trial:
+    """Rays at a small angle to rectangles: half of these in the plane z = 0, half turned."""
+    return grazed_flat(rng, x, n, singles, is_round=False)
+
+
+@drawn(ANGLE, explained=EXACT)
+def grazing_a_disk(rng: np.random.Generator, x: float, n: int, singles: bool) -> Trial:
+    """Rays at a small angle to ellipses: half of these in the plane z = 0, half turned."""
+    return grazed_flat(rng, x, n, singles, is_round=True)
+
+
+@drawn(ANGLE)
+def grazing_a_box(rng: np.random.Generator, x: float, n: int, singles: bool) -> Trial:
+    """Rays along a face of a cube, within twice the angle of it on either side."""
+    d = grazing_directions(rng, x, n)
+    height = rng.uniform(-2.0, 2.0, n) / x
+    target = np.stack([*rng.uniform(-1.2, 1.2, (2, n)), 1.0 + height], axis=1)
+    turn, side = np.eye(3)[rng.permutation(3)], rng.choice([-1.0, 1.0])
+    o, d = side * (target - 2.0 * d) @ turn.T, side * d @ turn.T
+    if singles:
+        o, d = round32(o), round32(d)
+    one = np.ones(3)
+    return Trial("boxes", rt.Box(), o, d, 2.0, singles, np.array([-one, one]))
+
+
+@drawn(ASPECT._replace(axis="length / thickness"), explained=EXACT)
+def needles(rng: np.random.Generator, x: float, n: int, singles: bool) -> Trial:
+    """Ever thinner boxes, met from the side."""
+    # Along an axis, 2 long and 2 / x thick: three in four rays are aimed at points inside.  It lies
+    # about the origin, and across it rays start and move by thicknesses alone, so that float32 can
+    # say where they pass.
+    thin = 1.0 / x
+    along, turn = rng.uniform(-1.1, 1.1, n), np.eye(3)[rng.permutation(3)]
+    offset = np.where(rng.uniform(size=n) < OUTSIDE, 3.0, 1.0) * rng.uniform(-1.0, 1.0, n) * thin
+    d = np.stack([rng.uniform(-2.0, 2.0, n), rng.uniform(-1.0, 1.0, n) * thin, -np.ones(n)], axis=1)
+    target = np.stack([along, offset, np.zeros(n)], axis=1)
+    scale = np.array([1.0, thin, thin]) @ turn.T
+    d = (d * rng.uniform(1.0, 4.0, (n, 1))) @ turn.T
+    o = target @ turn.T - d
+    if singles:
+        scale, o, d = round32(scale), round32(o), round32(d)
+    shape = rt.Box(transform=(scaled(*scale.tolist()),))
+    return Trial("boxes", shape, o, d, 2.0, singles, np.array([-scale, scale]))

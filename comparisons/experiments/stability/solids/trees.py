@@ -8,6 +8,7 @@ import numpy as np
 
 import reference_rt as rt
 from comparisons.experiments.stability.harness.meshes import BALL
+from comparisons.experiments.stability.harness.outcomes import FloatArray
 from comparisons.experiments.stability.harness.steps import at, scaled, turned, vector
 from comparisons.geometry.affine import unit_vectors
 
@@ -149,3 +150,11 @@ def _shapes_of(operation: str, p: Tree, q: Tree) -> list[Tree]:
     if not isinstance(p, int) and p[0] == "-":
         found.append(("-", p[1], ("|", p[2], q)))
     return found
+
+
+def rays_at(
+    rng: np.random.Generator, n: int, middle: FloatArray, size: float
+) -> tuple[FloatArray, FloatArray]:
+    """From around, outside of everything, at points near the middle."""
+    o = middle + 4.0 * size * unit_vectors(rng, n)
+    return o, middle + size * rng.uniform(-1.0, 1.0, (n, 3)) - o

@@ -1,0 +1,91 @@
+"""Integrators for the comparison: to and from Mitsuba; a file per type, whose contract is
+`IntegratorType`.
+
+To add a type: its file here, and a line in `INTEGRATORS`.
+"""
+
+from typing import Any
+
+from comparisons.integrators.direct import DIRECT
+from comparisons.integrators.integrator import Data, IntegratorType
+from comparisons.integrators.path import PATH
+from comparisons.integrators.ray_cast import LAYER_OF, RAY_CAST, SHOWN
+from comparisons.integrators.whitted import WHITTED
+from comparisons.mitsuba.context import UntranslatableError
+from comparisons.mitsuba.node import Node, Reading
+from reference_rt.integrators import AnyIntegrator, Direct, Path, RayCast
+
+INTEGRATORS: tuple[IntegratorType[Any], ...] = (PATH, DIRECT, WHITTED, RAY_CAST)
+"""All integrators."""
+
+_BY_TYPE = {one.description: one for one in INTEGRATORS}
+
+_BY_PLUGIN = {plugin: read for one in INTEGRATORS for plugin, read in one.from_mitsuba.items()}
+
+
+def type_of(integrator: Any) -> IntegratorType[Any]:
+    """What is known of an integrator's type.  Raises UntranslatableError for one not in
+    INTEGRATORS."""
+    found = _BY_TYPE.get(type(integrator))
+    if found is None:
+        raise UntranslatableError(integrator, "integrator")
+    return found
+
+
+def translate_integrator(integrator: Any) -> Data | None:
+    """An integrator's dict; None if there is no picture to compare.
+
+    Raises UntranslatableError.
+    """
+    to_mitsuba = type_of(integrator).to_mitsuba
+    return None if to_mitsuba is None else to_mitsuba(integrator)
+
+
+def read_integrator(reading: Reading, node: Node | None) -> tuple[AnyIntegrator, tuple[str, ...]]:
+    """An integrator, and the layers of the film that it asks for.  Raises SceneError."""
+    if node is None:
+        return Path(), ()
+    hides = node.flag("hide_emitters")
+    node.ignore("timeout", "block_size", "samples_per_pass")  # of how it runs
+    layers: tuple[str, ...] = ()
+    with node.checking():
+        if node.plugin in _BY_PLUGIN:
+            found = _BY_PLUGIN[node.plugin](reading, node)
+        elif node.plugin == "moment":
+            found, layers = _inside(reading, node)
+            reading.note(node, "its moments are left out: ours is the picture inside it")
+        elif node.plugin == "aov":
+            found, layers = _aov(reading, node)
+        else:
+            raise node.unsupported("expected one of: path, direct, volpath, depth, aov, moment")
+    if hides and isinstance(found, Path | Direct):
+        found = found.model_copy(update={"hide_emitters": True})
+    node.finish()
+    return found, layers
+
+
+def _aov(reading: Reading, node: Node) -> tuple[AnyIntegrator, tuple[str, ...]]:
+    """The integrator inside, or ray casting, and the layers for AOVs."""
+    layers: list[str] = []
+    kinds: list[str] = []
+    for token in node.text("aovs", "").replace(",", " ").split():
+        kind = token.partition(":")[2]
+        kinds.append(kind)
+        if kind in SHOWN and kind not in LAYER_OF and not node.has_children("Integrator"):
+            continue
+        if kind not in LAYER_OF:
+            raise node.error(
+                f"'aovs' has '{token}', which is not supported; expected of: {', '.join(LAYER_OF)}"
+            )
+        if LAYER_OF[kind] not in layers:
+            layers.append(LAYER_OF[kind])
+    found, _ = _inside(reading, node)
+    if isinstance(found, RayCast) and len(kinds) == 1:
+        found = RayCast(show=SHOWN.get(kinds[0], "colour"))  # type: ignore[arg-type]
+    return found, tuple(layers) if not isinstance(found, RayCast) else ()
+
+
+def _inside(reading: Reading, node: Node) -> tuple[AnyIntegrator, tuple[str, ...]]:
+    """The integrator inside another one; ray casting for none."""
+    inside = node.only("Integrator")
+    return (RayCast(), ()) if inside is None else read_integrator(reading, inside)

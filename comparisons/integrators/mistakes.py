@@ -1,0 +1,110 @@
+"""Errors of Mitsuba's integrators, the scenes that they concern, and what a comparison does about
+them."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from comparisons.integrators import type_of
+from comparisons.lights import type_of as type_of_light
+from reference_rt.integrators import Direct, Path
+from reference_rt.materials import Emissive, Mask, ThinDielectric
+from reference_rt.scene.model import SceneModel
+
+
+def in_place_of(scene: SceneModel, has_solids: bool = False) -> dict[str, Any] | None:
+    """Our integrator, which runs in Mitsuba, for a scene for which Mitsuba's own is wrong, or that
+    has solids; None for all others."""
+    integrator = scene.integrator
+    of_solids = type_of(integrator).of_solids
+    wrong = has_solids or squares_opacity(scene) or misplaces(scene)
+    return of_solids(integrator) if of_solids is not None and wrong else None
+
+
+def misplaces(scene: SceneModel) -> bool:
+    """What Mitsuba's integrators see behind a hidden lamp is placed by the new ray's distance from
+    the old ray's origin, unless it is a mesh (Mitsuba 3.9.1,
+    `SamplingIntegrator::skip_area_emitters`)."""
+    return isinstance(scene.integrator, Path | Direct) and scene.integrator.hide_emitters
+
+
+def counts_lights_often(scene: SceneModel) -> bool:
+    """Mitsuba's integrator `direct` adds up its samples of lights without extent, which it should
+    average (src/integrators/direct.cpp: their weight is 1 whatever `emitter_samples` is), so that
+    they are as many times too bright.  The mean does not depend on the number, and the counterpart
+    has one."""
+    integrator = scene.integrator
+    points = any(type_of_light(light).has_no_extent for light in scene.lights)
+    return points and isinstance(integrator, Direct) and integrator.light_samples > 1
+
+
+def squares_opacity(scene: SceneModel) -> bool:
+    """On masks that are neither opaque nor absent Mitsuba's integrator `path` multiplies samples of
+    lights by the opacity twice.  A diffuse plane under a point light then has a quarter of its
+    light at an opacity of a half, where Mitsuba's BSDF and its integrator `direct` give half of it
+    (Mitsuba 3.9.1)."""
+    masks = [m for m in scene.materials.values() if isinstance(m, Mask)]
+    return isinstance(scene.integrator, Path) and any(m.opacity not in (0.0, 1.0) for m in masks)
+
+
+BLACK: dict[str, Any] = {
+    "type": "constant",
+    "radiance": {"type": "rgb", "value": [0.0, 0.0, 0.0]},
+    "sampling_weight": 0.0,
+}
+"""An environment without light, which is never sampled."""
+
+
+def drops_light(scene: SceneModel) -> bool:
+    """Where there is no environment Mitsuba's integrator `path` returns black for a path that only
+    passes straight through surfaces, and so drops the emission of a lamp that lets light pass so.
+    A thin pane that shines shows 8 % of its radiance, with BLACK all of it, as with `volpath`
+    (Mitsuba 3.9.1)."""
+    environments = any(type_of_light(light).surrounds for light in scene.lights)
+    kinds = {type(material) for material in scene.materials.values()}
+    passing = not kinds.isdisjoint((ThinDielectric, Mask))
+    return isinstance(scene.integrator, Path) and not environments and passing and Emissive in kinds
+
+
+class Mistake(NamedTuple):
+    """concerns: whether it would make Mitsuba's picture of a scene wrong;  note: for the report."""
+
+    concerns: Callable[[SceneModel], bool]
+    note: Callable[[SceneModel], str]
+
+
+MISTAKES = (
+    Mistake(
+        counts_lights_often,
+        lambda scene: (
+            "Mitsuba's direct illumination adds up its samples of lights without extent, which it "
+            f"should average: with {getattr(scene.integrator, 'light_samples', 1)} of them these "
+            "lights are as many times too bright; compared with one sample, for which it is right"
+        ),
+    ),
+    Mistake(
+        squares_opacity,
+        lambda scene: (
+            "Mitsuba's path tracer multiplies samples of lights by the opacity of a mask twice; "
+            "our own, which runs in Mitsuba, takes its place"
+        ),
+    ),
+    Mistake(
+        drops_light,
+        lambda scene: (
+            "without an environment Mitsuba's path tracer drops the light of lamps that let light "
+            "pass straight through: its scene has a black environment"
+        ),
+    ),
+    Mistake(
+        misplaces,
+        lambda scene: (
+            "Mitsuba misplaces what lies behind hidden lamps unless it is a mesh; our own "
+            "integrator, which runs in Mitsuba, takes the place of its own"
+        ),
+    ),
+)
+
+
+def notes_of_integrator(scene: SceneModel) -> list[str]:
+    """The notes on the errors that concern a scene."""
+    return [mistake.note(scene) for mistake in MISTAKES if mistake.concerns(scene)]

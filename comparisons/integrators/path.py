@@ -1,0 +1,57 @@
+"""Path tracing: Mitsuba's `path`, and its `volpath` without media."""
+
+from comparisons.integrators.integrator import Data, IntegratorType, hiding
+from comparisons.mitsuba.node import Node, Reading
+from reference_rt.integrators import Path
+from reference_rt.materials import Mask, ThinDielectric
+
+MOST_ROULETTE = 4096
+"""Our largest `rr_depth`."""
+
+
+def _to_mitsuba(integrator: Path) -> Data:
+    """The sampling strategy of ours does not change the mean."""
+    depth = -1 if integrator.max_depth is None else integrator.max_depth
+    found = {"type": "path", "max_depth": depth, "rr_depth": integrator.rr_depth}
+    return found | hiding(integrator)
+
+
+def _of_solids(integrator: Path) -> Data:
+    return {**_to_mitsuba(integrator), "type": "path_of_solids"}
+
+
+def _from_mitsuba(reading: Reading, node: Node) -> Path:
+    depth = node.integer("max_depth", -1)
+    if depth < -1:
+        raise node.error(f"'max_depth' is {depth}; expected -1 (no end), 0 or more")
+    roulette = node.integer("rr_depth", 5)
+    if roulette < 1:
+        raise node.error(f"'rr_depth' is {roulette}; expected 1 or more")
+    # Where the roulette begins does not change the expected picture.
+    return Path(max_depth=None if depth < 0 else depth, rr_depth=min(roulette, MOST_ROULETTE))
+
+
+def _without_media(reading: Reading, node: Node) -> Path:
+    """`volpath` is `path` then, but that its shadow rays pass surfaces that bend none."""
+    node.ignore("use_spectral_mis")
+    found = _from_mitsuba(reading, node)
+    for name, material in reading.materials.items():
+        if isinstance(material, Mask | ThinDielectric):
+            raise node.error(
+                f"its shadow rays pass the material '{name}', ours do not; expected the integrator "
+                "path, or a scene without mask, null and thindielectric"
+            )
+    return found
+
+
+PATH = IntegratorType(
+    description=Path,
+    to_mitsuba=_to_mitsuba,
+    of_solids=_of_solids,
+    from_mitsuba={
+        "path": _from_mitsuba,
+        "volpath": _without_media,
+        "volpathmis": _without_media,
+    },
+    edges=lambda integrator: integrator.max_depth,
+)
