@@ -42,7 +42,7 @@ class Tessellated(NamedTuple):
 
 
 def tessellated(shape: Shape, folder: Path) -> Tessellated:
-    """The triangles of a shape.  Raises ValueError; TypeError for planes and solids."""
+    """The triangles of a primitive.  Raises ValueError; TypeError for planes."""
     if isinstance(shape, Triangle | Mesh):
         table = shape.tabulate(TabulationContext(folder=folder))
         return Tessellated(

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from every_shape import every_shape
 
 from comparisons.geometry.frame import OURS
 from comparisons.mitsuba.backend import scalar
@@ -14,9 +13,6 @@ from comparisons.shapes import canonical, torus
 from comparisons.shapes.stand_ins import coarser
 from comparisons.translator import load
 from reference_rt import Scene
-from reference_rt.core.transform import Matrix, Rotate, Scale, Translate, Turn
-from reference_rt.scene.examples import NAMED
-from reference_rt.shapes import Plane
 
 
 @contextmanager
@@ -100,25 +96,47 @@ lights:
 """
 """Every type of material, and lights of four kinds; its images are those of `image_folder`."""
 
-MAPS = (
-    Rotate(rotate=Turn(axis=(1, 2, 3), degrees=50)),
-    Matrix(matrix=((1, 0.3, 0, 0), (0, 1, 0.2, 0), (0.1, 0, 0.8, 0))),
-    Matrix(matrix=((-1, 0.3, 0, 0), (0, 1, 0.2, 0), (0.1, 0, 0.9, 0))),
-)
+EVERY_SHAPE = """
+groups:
+  pair: [{type: sphere, radius: 0.8}, {type: sphere, radius: 0.3, center: [0.2, 0.9, 0.1]}]
+shapes:
+  - {type: sphere, radius: 0.8, center: [-2.4, -2.4, 0]}
+  - {type: sphere, radius: 0.8, transform: [SHEARED, {translate: [0, -2.4, 0]}]}
+  - {type: box, transform: [{scale: 0.7}, MIRRORED, {translate: [2.4, -2.4, 0]}]}
+  - {type: rectangle, transform: [TURNED, {translate: [-2.4, 0, 0]}]}
+  - {type: disk, transform: [SHEARED, {translate: [0, 0, 0]}]}
+  - {type: plane, transform: [{translate: [0, 0, -3]}]}
+  - {type: triangle, v0: [-1, -1, 0], v1: [1, -1, 0.3], v2: [0, 1, 0],
+     transform: [MIRRORED, {translate: [2.4, 0, 0]}]}
+  - {type: polygon, rings: [[[0, 1], [0.6, -0.8], [-1, 0.3], [1, 0.3], [-0.6, -0.8]]],
+     transform: [MIRRORED, {translate: [-2.4, 2.4, 0]}]}
+  - {type: mesh, file: tent.obj, transform: [MIRRORED, {translate: [0, 2.4, 0]}]}
+  - {type: cylinder, radius: 0.5, capped: false, transform: [TURNED, {translate: [2.4, 2.4, 0]}]}
+  - {type: cone, radius: 0.8, transform: [TURNED, {translate: [-2.4, 0, 2.4]}]}
+  - {type: torus, major_radius: 0.7, minor_radius: 0.3, transform: [{translate: [0, 0, 2.4]}]}
+  - {type: quadric, coefficients: [1, 1, -1, 0, 0, 0, 0, 0, 0, 0.1],
+     lower: [-0.9, -0.8, -0.7], upper: [0.8, 0.9, 1], transform: [{translate: [2.4, 0, 2.4]}]}
+  - {type: instance, group: pair, transform: [MIRRORED, {translate: [-2.4, 2.4, 2.4]}]}
+  - {type: difference, of: [{type: box, transform: [{scale: 0.7}]}, {type: sphere, radius: 0.9}],
+     transform: [{translate: [0, 2.4, 2.4]}]}
+"""
+
+MAPS = {
+    "TURNED": "{rotate: {axis: [1, 2, 3], degrees: 50}}",
+    "SHEARED": "{matrix: [[1, 0.3, 0, 0], [0, 1, 0.2, 0], [0.1, 0, 0.8, 0]]}",
+    "MIRRORED": "{matrix: [[-1, 0.3, 0, 0], [0, 1, 0.2, 0], [0.1, 0, 0.9, 0]]}",
+}
+
+TENT = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nv 0 0 1\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 3 2 1\n"
 
 
-def all_shapes() -> Scene:
-    """Every type of shape, turned, sheared or mirrored, beside each other; a plane behind them."""
-    places = [(2.4 * x, 2.4 * y, 2.4 * z) for z in (0, 1) for y in (-1, 0, 1) for x in (-1, 0, 1)]
-    shapes = [
-        shape.model_copy(
-            update={"transform": (Scale(scale=(0.6,) * 3), MAPS[k % 3], Translate(translate=place))}
-        )
-        for k, (shape, place) in enumerate(zip(every_shape(0), places, strict=False))
-        if not isinstance(shape, Plane)
-    ]
-    behind = Plane(transform=(Translate(translate=(0.0, 0.0, -3.0)),))
-    return Scene(shapes=(*shapes, behind), groups=NAMED["groups"])
+def every_shape(folder: Path) -> Scene:
+    """Every type of shape, turned, sheared or mirrored."""
+    (folder / "tent.obj").write_text(TENT)
+    text = EVERY_SHAPE
+    for name, steps in MAPS.items():
+        text = text.replace(name, steps)
+    return Scene.parse(text, folder=folder)
 
 
 def every_material(folder: Path) -> Scene:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from counterparts import all_shapes, coarse_meshes, counterpart_of, every_material
+from counterparts import coarse_meshes, counterpart_of, every_material, every_shape
 from query_scene import LIT
 
 from comparisons.geometry.frame import UNIT_ROUNDOFF, delta, round32
@@ -17,6 +17,9 @@ from comparisons.rungs.whitted import plugin_radiance
 from reference_rt import Direct, Scene, Whitted
 from reference_rt import Path as PathTracing
 from reference_rt.core.arrays import FloatArray
+from reference_rt.shapes import Primitive
+from reference_rt.shapes.csg import Difference
+from reference_rt.shapes.instances import Instance
 
 SIZE = 6.0
 """No shape reaches further from its own centre."""
@@ -76,10 +79,19 @@ def test_occluded_is_ray_test(scene: Scene, counterpart: Counterpart) -> None:
     assert (ours == theirs).mean() > 0.998  # outlines, and ends at a surface, within float32
 
 
+@pytest.fixture(scope="module")
+def shapes(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    return every_shape(tmp_path_factory.mktemp("shapes"))
+
+
+def test_every_type_of_shape_is_compared(shapes: Scene) -> None:
+    found = {type(shape) for shape in shapes.shapes}
+    assert found == {*Primitive.__args__, Instance, Difference}  # of set operations one
+
+
 @pytest.mark.slow
-def test_crossings_are_repeated_ray_intersections() -> None:
+def test_crossings_are_repeated_ray_intersections(shapes: Scene) -> None:
     """Of rays whose crossings are so far apart that Mitsuba can leave each without passing two."""
-    shapes = all_shapes()
     with coarse_meshes(512, 256):
         counterpart = counterpart_of(shapes)
     o, d = chords(2000, 4)
