@@ -78,7 +78,6 @@ def _caught(pool: Evidence, fault: PictureFault, budget: Budget, rng: np.random.
     assert pool.rendered is not None
     assert pool.rendered.resampled is not None
     candidate, reference = pool.rendered.resampled
-    assert isinstance(reference, np.ndarray)
     ours, theirs = (
         side[rng.choice(len(side), budget.replicates, replace=False)]
         for side in (candidate, reference)
