@@ -76,9 +76,8 @@ def power_curves(budget: Budget, scenes: Path, say: Say) -> list[Curve]:
 
 def _caught(pool: Evidence, fault: PictureFault, budget: Budget, rng: np.random.Generator) -> bool:
     assert pool.rendered is not None
-    assert pool.rendered.replicates is not None
-    candidate, reference = pool.rendered.replicates
-    assert isinstance(reference, np.ndarray)
+    assert pool.rendered.resampled is not None
+    candidate, reference = pool.rendered.resampled
     ours, theirs = (
         side[rng.choice(len(side), budget.replicates, replace=False)]
         for side in (candidate, reference)

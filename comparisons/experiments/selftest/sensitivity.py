@@ -74,8 +74,8 @@ def _silent(step: str) -> None:
 def _altered(evidence: Evidence, fault: PictureFault, budget: Budget) -> Case:
     rendered = evidence.rendered
     assert rendered is not None
-    assert rendered.replicates is not None
-    ours, reference = rendered.replicates
+    assert rendered.resampled is not None
+    ours, reference = rendered.resampled
     with np.errstate(all="ignore"):
         altered = of_replicates(fault.change(ours), reference, rendered.seconds)
     return judge(replace(evidence, rendered=altered), budget.limit)
