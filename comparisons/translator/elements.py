@@ -22,6 +22,7 @@ from comparisons.materials.translate import translate_material
 from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.files import Element, Files, Reference, Rgb, Vector, matrix_step
 from comparisons.mitsuba.plugins.whitted import MOST_COMPONENTS
+from comparisons.textures import READERS
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.materials import most_branches
 from reference_rt.rendering.scene import Scene
@@ -35,7 +36,8 @@ OURS = (
 
 OUR_PLUGINS = ("textbook_phong", "gltf_pbr", "view_rectangle", "whitted", "mesh_area")
 
-TEXTURES = ("bitmap", "checkerboard", "mesh_attribute", "uniform")
+TEXTURES = (*READERS, "uniform")
+"""Plugins that are elements of their own, however often they are used."""
 
 TAGS = ("film", "rfilter", "sampler", "integrator", "emitter")
 """Names of nested plugins that are their elements' tags, too."""
