@@ -10,16 +10,15 @@ from comparisons.report.table import Table, table_of
 from comparisons.results.case import Case
 from comparisons.results.headline import detectable, percent
 from comparisons.results.naming import named
-from comparisons.statistics.scales import IMAGE, PIXELS, SCALES, TILES
 from reference_rt.util.errors import printable
-
-_MAIN = (TILES, PIXELS)
-"""Scales that a table has always; it has the others where they differ."""
 
 
 def biases_of(case: Case) -> Table[Any] | None:
     """A column for the image mean, tiles and pixels each, and a row for what was measured, what
     would have been seen, and what is permitted; None for a case without these numbers."""
+    # Suites begin before the statistics are imported.
+    from comparisons.statistics.scales import IMAGE, PIXELS, SCALES, TILES
+
     rung = next((r for r in case.rungs if r.name == "statistics"), None)
     if rung is not None and "edge_wrong" in rung.numbers:
         return _of_edges(rung.numbers)
@@ -36,7 +35,8 @@ def biases_of(case: Case) -> Table[Any] | None:
     columns = [(IMAGE.what, found, would, _within(rung.numbers.get("limit")))]
     for scale in SCALES[1:]:
         cells = rung.numbers.get(scale.name)
-        if isinstance(cells, Mapping) and (scale in _MAIN or cells["differ"]):
+        # Tiles and pixels are shown always, the other scales where they differ.
+        if isinstance(cells, Mapping) and (scale in (TILES, PIXELS) or cells["differ"]):
             half = cells.get("median_detectable_bias")
             would = f"{percent(half)} in half of them" if known and half is not None else ""
             column = (f"{cells['tested']:,} {scale.what}", _worst(cells), would)

@@ -37,8 +37,9 @@ def number_or_texture(reading: Reading, node: Node, key: str, default: float) ->
         if value.kind != "Texture":
             raise node.error(f"'{key}' is a {value.kind.lower()}; expected a number or a texture")
         if value.index in reading.fields:
+            # Mitsuba's `eval_1` exchanges the two.
             field = "color1" if reading.fields[value.index] == "color0" else "color0"
-            return number_or_texture(reading, value, field, FIELDS[field])  # see `_checker`
+            return number_or_texture(reading, value, field, FIELDS[field])
         if value.plugin not in SPECTRA:
             return texture_name(reading, value, Use(as_number=True))
         if value.plugin in ("uniform", "rawconstant"):

@@ -95,30 +95,69 @@ _complete_behind_link = by_class("complete", {Link: _complete, Shapes: _complete
 """Completes the hits of a block, unless whoever reads them has the shapes' tables."""
 
 
-# Rays against all shapes of one type.
+# Rays against all shapes of one type.  What a kernel below calls of the type stands in these
+# functions: a kernel that held it in a closure would have another name in each process.
+
+
+_intersect = by_class("intersect", {table: module.intersect for _, _, table, module in TABLES})
+
+
+def _nearer_by(module: Any) -> Callable[..., None]:
+    """The kernel of `_nearer` for a type of shape."""
+    nearer, arguments = module.nearer, module.arguments
+
+    @kernel
+    def of_row(table: Any, i: int, rays: Any, at: int, code: int, t: Any, codes: Any) -> None:
+        nearer(rays, at, arguments(table, i), code, t, codes)
+
+    return of_row
+
+
+_nearer = by_class(
+    "nearer", {table: _nearer_by(m) for code, _, table, m in TABLES if code in SIDE_BY_SIDE}
+)
+"""Tests row i of a table against VECTOR_WIDTH rays."""
+
+
+@kernel
+def _as_it_is(table: Any, ray: Ray) -> Ray:
+    return ray
+
+
+@kernel
+def _sheared(table: Any, ray: Ray) -> Any:
+    return shear_of(ray)
+
+
+_prepared = by_class(
+    "prepared",
+    {table: _sheared if code == TRIANGLE else _as_it_is for code, _, table, _ in TABLES},
+)
+"""prepared(table, ray): what `intersect` takes, computed once for all shapes of a type."""
 
 
 def _nearest_by(module: Any) -> Callable[..., Hit]:
     """The kernel of `nearest_of_type` for a type of shape."""
-    kind, intersect = CODES[module], module.intersect
+    kind = CODES[module]
 
     @kernel
-    def of_table(table: Any, ray: Any, closest: Hit) -> Hit:
+    def of_table(table: Any, ray: Ray, closest: Hit) -> Hit:
+        prepared = _prepared(table, ray)
         for i in range(len(table.face)):
-            met: Crossing = intersect(table, i, ray)
+            met: Crossing = _intersect(table, i, prepared)
             # Of a block's ray, types with SIMD kernels and greater codes are already in `closest`.
             if met.t < closest.t or (met.t == closest.t and kind < _kind_of(closest.kind)):
                 closest = Hit(met.t, kind, i, met.u, met.v, -1)
         return closest
 
-    @kernel
-    def of_triangles(table: Any, ray: Ray, closest: Hit) -> Hit:
-        return of_table(table, shear_of(ray), closest)
-
-    return of_triangles if kind == TRIANGLE else of_table
+    return of_table
 
 
-@by_code(_nearest_by)
+_NEAREST = {module: _nearest_by(module) for module in CODES}
+_nearest_in = by_class("nearest_in", {table: _NEAREST[module] for _, _, table, module in TABLES})
+
+
+@by_code(_NEAREST.get)
 def nearest_of_type(shapes: Shapes, kind: int, ray: Ray, closest: Hit) -> Hit:
     """The nearest of `closest` and a ray's hit with any shape of one type."""
     return closest
@@ -126,17 +165,13 @@ def nearest_of_type(shapes: Shapes, kind: int, ray: Ray, closest: Hit) -> Hit:
 
 def _of_block_by(module: Any) -> Callable[..., None]:
     """The kernel of `nearest_of_block` for a type of shape."""
-    kind, of_one = CODES[module], _nearest_by(module)
+    kind = CODES[module]
 
     @kernel
     def one_by_one(table: Any, rays: RayBlock, hits: HitBlock, n: int, any_hit: bool) -> None:
         for j in range(n):
             if not (any_hit and hits.codes[j] >= 0):
-                put_hit(hits, j, of_one(table, ray_of(rays, j), hit_of(hits, j)))
-
-    if kind in ONE_BY_ONE:
-        return one_by_one
-    nearer, arguments = module.nearer, module.arguments
+                put_hit(hits, j, _nearest_in(table, ray_of(rays, j), hit_of(hits, j)))
 
     @kernel
     def side_by_side(table: Any, rays: RayBlock, hits: HitBlock, n: int) -> None:
@@ -144,10 +179,10 @@ def _of_block_by(module: Any) -> Callable[..., None]:
         for at in range(0, n, VECTOR_WIDTH):
             load(hits.numbers, hits.codes, at, t, codes)
             for i in range(len(table.face)):
-                nearer(rays.numbers, at, arguments(table, i), (kind + 1) * KIND + i, t, codes)
+                _nearer(table, i, rays.numbers, at, (kind + 1) * KIND + i, t, codes)
             store(t, codes, at, hits.numbers, hits.codes)
 
-    return side_by_side
+    return one_by_one if kind in ONE_BY_ONE else side_by_side
 
 
 @by_code(_of_block_by)

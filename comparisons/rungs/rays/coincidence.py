@@ -63,7 +63,9 @@ def coincident(
         agrees = (comparer.ratios(some, behind, rows_of(theirs, k)) <= 1.0).all(axis=1)
         e = slide(comparer.sizes, some.o, some.d, behind)
         with np.errstate(invalid="ignore"):
-            together[rest] = agrees & (np.abs(behind.t - ours.t[k]) <= e)
+            at_one_t = np.abs(behind.t - ours.t[k]) <= e
+        # Where nothing lies behind, t and e are infinite: Mitsuba misses what we hit.
+        together[rest] = agrees & (behind.shape >= 0) & at_one_t
     return together
 
 

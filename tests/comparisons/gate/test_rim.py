@@ -7,7 +7,7 @@ from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.question import Question
 from comparisons.gate.reference import Reference
-from comparisons.gate.rim import without_rim, without_rim_later
+from comparisons.gate.rim import question_without_rim, without_rim
 from comparisons.results.case import FloatArray
 from reference_rt.util.errors import UsageError
 
@@ -48,16 +48,17 @@ def test_all_that_has_pixels_is_cropped() -> None:
     reference = Reference(pictures, pictures[0] ** 2)
     lights = {"lamp": pictures[0]}
     cropped, judge = without_rim(candidates(1.0), reference, 4)
-    found, _ = without_rim_later(lambda: lights, None, 4)
+    inside = question_without_rim(Question(lights=lambda: lights, rim=4))
     inner = pictures[:, 4:-4, 4:-4]
     assert cropped[0].radiance.shape == (40, 56, 3)
     assert cropped[0].opacity is not None
     assert cropped[0].opacity.shape == (40, 56)
     np.testing.assert_array_equal(judge.pictures, inner)
     np.testing.assert_array_equal(np.asarray(judge.variance), inner[0] ** 2)
-    assert found is not None
-    np.testing.assert_array_equal(found()["lamp"], inner[0])
-    assert without_rim_later(None, None, 4) == (None, None)
+    assert inside.lights is not None
+    np.testing.assert_array_equal(inside.lights()["lamp"], inner[0])
+    without = question_without_rim(Question(rim=4))
+    assert (without.lights, without.lengths, without.edges) == (None, None, None)
 
 
 @pytest.mark.parametrize("rim", [-1, 24, 100])

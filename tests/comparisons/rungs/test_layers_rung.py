@@ -1,6 +1,7 @@
 """The rung of layers: right layers agree, and every fault of a layer is found."""
 
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +86,8 @@ def changed_by(monkeypatch: pytest.MonkeyPatch, name: str, change: Callable[[Any
             picture.layers[name] = change(picture.layers[name])
         return picture
 
-    monkeypatch.setattr("comparisons.rungs.layers.rung.render", faulty)
+    # `comparisons.rungs.layers` is the function, too.
+    monkeypatch.setattr(import_module("comparisons.rungs.layers.rung"), "render", faulty)
 
 
 FAULTS: dict[str, tuple[str, Callable[[Any], Any]]] = {

@@ -11,7 +11,7 @@ from comparisons.shapes import SHAPES, type_of
 from comparisons.shapes.stand_ins import coarser
 from comparisons.translator import load
 from reference_rt import RayCast, Scene
-from reference_rt.core.transform import Matrix, Rotate, Scale, Turn
+from reference_rt.core.transform import Matrix, Rotate, Scale, Translate, Turn
 from reference_rt.scene.build import build_tables
 from reference_rt.scene.examples import examples
 from reference_rt.shapes import Primitive
@@ -46,6 +46,16 @@ def test_a_counterpart_is_met_in_the_same_places(shape: Any, steps: str) -> None
             # Half the fineness, four times the distance: the surface is smooth, or straight.
             assert 3.0 < stand_in["ratio"] < 5.0
             assert stand_in["sag"] < 1e-4
+
+
+@pytest.mark.cases(4)
+@pytest.mark.parametrize("shape", examples(Primitive), ids=lambda shape: shape.type)
+def test_a_counterpart_that_is_elsewhere_is_seen(shape: Any) -> None:
+    """Mitsuba meets nothing where ours is, before an empty background: no coincident surface."""
+    ours = placed(shape, "stretched")
+    away = (*ours.transform, Translate(translate=(900.0, 900.0, 900.0)))
+    rung = compared(ours, ours.model_copy(update={"transform": away}), 700)
+    assert rung.status == "differ", rung.reason
 
 
 def changes(shape: Any) -> list[Any]:

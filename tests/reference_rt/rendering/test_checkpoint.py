@@ -10,7 +10,7 @@ import pytest
 from builders import SCENES
 
 import reference_rt as rt
-from reference_rt.rendering import framebuffer
+from reference_rt.rendering import checkpoint
 from reference_rt.rendering.checkpoint import Band, Checkpoint, render_digest
 from reference_rt.rendering.noise import COLUMNS
 from reference_rt.util.errors import ImageError
@@ -187,7 +187,7 @@ def test_digests_are_of_what_the_picture_depends_on(tmp_path, monkeypatch):
     ]
     found = {digest(one) for one in (scene, *others)}
     assert len(found) == 1 + len(others)
-    monkeypatch.setattr(framebuffer, "sources_digest", lambda: b"other sources")
+    monkeypatch.setattr(checkpoint, "sources_digest", lambda: b"other sources")
     assert digest(scene) not in found
 
 
