@@ -63,6 +63,11 @@ REFERENCE = 0.035
 """CPU seconds that `_a_fixed_work` takes on an idle core of the two of an AMD EPYC with AVX-512
 (2026-11-25).  It takes three times that where four busy processes share them."""
 
+MARGIN = 2.0
+"""How many times longer than the loop says a test may take on another machine: on an Intel Xeon
+with AVX-512 the loop takes 1.06 of REFERENCE, and tests that compute pictures up to 1.7 of their
+time on the EPYC (2026-11-28)."""
+
 WORDING = Path(__file__).with_name("wording.json")
 """Whole messages, by the test that shows each (fixture `wording`)."""
 
@@ -167,12 +172,12 @@ def pytest_runtest_makereport(
         report.cpu = _cpu() - cpu
         judged = item.get_closest_marker("slow") is None and kernels == _kernels()
         if judged and report.cpu > LIMIT and report.passed:
-            allowed = LIMIT * max(1.0, _a_fixed_work() / REFERENCE)
+            allowed = LIMIT * MARGIN * max(1.0, _a_fixed_work() / REFERENCE)
             if report.cpu > allowed:
                 report.outcome = "failed"
                 report.longrepr = (
                     f"{report.cpu:.1f} CPU s: expected at most {allowed:.1f} of a test that is not"
-                    f" `slow` ({LIMIT:g} where this machine is idle)"
+                    f" `slow` ({LIMIT:g} on the machine of REFERENCE)"
                 )
     return report
 
