@@ -35,8 +35,10 @@ def _to_mitsuba(light: Projector, context: TranslationContext) -> Data:
     width, height = 1, 1
     if "bitmap" in irradiance:
         width, height = irradiance["bitmap"].size()
-    elif isinstance(texture := context.textures.get(str(light.irradiance)), Bitmap):
-        width, height = _size(context.folder / texture.file)
+    elif context.files is not None and isinstance(
+        texture := context.textures.get(str(light.irradiance)), Bitmap
+    ):
+        width, height = _size(context.folder / texture.file)  # our own textures have one pixel
     shape = float(width) / float(height)
     stretch = _such_that(shape / light.aspect, lambda x: shape / x == light.aspect)
     steps = () if stretch == 1.0 else (Step("scale", (1.0, stretch, 1.0)),)

@@ -249,3 +249,36 @@ def test_an_occluder_within_the_shadow_epsilon_of_a_far_lamp() -> None:
         assert found.status == "agree", found.reason
         faulty = faulty_counterpart(TUBE_BEFORE_A_LAMP, "radiance: 70000", "radiance: 75000")
         assert direct(scene, scene.tables, faulty, 300).status == "differ"
+
+
+PROJECTED = """
+camera: {type: perspective, eye: [0, 3, 4], target: [0, 0, 0], fov: 50}
+film: {width: 12, height: 8}
+textures:
+  image: {type: bitmap, file: image.png}
+  cut: {type: bitmap, file: image.png, cutoff: 0.2}
+  both: {type: product, of: [image, image], factor: [0.9, 0.5, 0.7]}
+  checks: {type: checker, first: 0.9, second: [0.1, 0.5, 0.3], uv: {scale: [3, 2]}}
+shapes:
+  - {type: plane, transform: [{rotate: {axis: [1, 0, 0], degrees: -90}}]}
+lights:
+  - LIGHT
+"""
+LIGHTS = {
+    "spot": "{type: spot, origin: [0, 4, 1], target: [0, 0, 0], cutoff_angle: 30, intensity: 9, "
+    "texture: TEXTURE}",
+    "projector": "{type: projector, origin: [0, 4, 1], target: [0, 0, 0], fov: 50, "
+    "irradiance: TEXTURE}",
+}
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+@pytest.mark.parametrize("texture", ["image", "cut", "both", "checks"])
+def test_images_that_lights_project(light: str, texture: str, tmp_path: Path) -> None:
+    """Of every type: Mitsuba's projected images hang upside down, and its textures are turned."""
+    texels = np.random.default_rng(7).integers(0, 256, (5, 4, 3)).astype(np.uint8)
+    Image.fromarray(texels).save(tmp_path / "image.png")
+    text = PROJECTED.replace("LIGHT", LIGHTS[light].replace("TEXTURE", texture))
+    scene = Scene.parse(text, folder=tmp_path)
+    rung = direct(scene, scene.tables, load(scene))
+    assert rung.status == "agree", rung.reason
