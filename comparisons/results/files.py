@@ -4,10 +4,10 @@ import dataclasses
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -92,13 +92,3 @@ def write_json(path: Path, document: Any) -> None:
     with replacing(path) as temporary:
         # A lone surrogate, from a file name that is not UTF-8, becomes JSON's escape for it.
         temporary.write_text(text + "\n", encoding="utf-8", errors="backslashreplace", newline="\n")
-
-
-@contextmanager
-def csv_file(path: Path) -> Iterator[TextIO]:
-    """Open a file for a `csv` writer."""
-    with (
-        replacing(path) as temporary,
-        temporary.open("w", encoding="utf-8", errors="backslashreplace", newline="") as file,
-    ):
-        yield file
