@@ -112,7 +112,7 @@ def test_a_bias_within_the_margin_is_permitted():
 
 
 def test_a_smaller_share_of_the_levels_needs_more_evidence() -> None:
-    """A bias of 0.8 % that the whole level proves, in twelve pictures of pixels that vary by 10 %."""
+    """A bias of 0.8 % that the whole level proves; twelve pictures whose pixels vary by 10 %."""
     a, b = (
         1.0 + bias + 0.1 * np.random.default_rng(seed).normal(size=(12, 32, 32, 3))
         for seed, bias in ((1, 0.008), (2, 0.0))
