@@ -88,8 +88,7 @@ def rough_metal(
     wi: FloatArray, wo: FloatArray, alpha: float, eta: float, k: float, name: str = "ggx"
 ) -> FloatArray:
     """f times cos wi of directions (..., 3) about the normal +z: D G F / (4 cos wo), with the
-    height-correlated or the separable G: Mitsuba's and ours are
-    separable, G1(wi) G1(wo)."""
+    height-correlated or the separable G: Mitsuba's and ours are separable, G1(wi) G1(wo)."""
     d, lam = DISTRIBUTIONS[name]
     h = wi + wo
     h = h / np.linalg.norm(h, axis=-1, keepdims=True)
