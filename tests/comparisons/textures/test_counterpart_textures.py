@@ -41,6 +41,9 @@ TEXTURES: tuple[Texture, ...] = (
     Bitmap(file="colours.png", channel="green"),
     Bitmap(file="colours.png", cutoff=0.3, uv=TURNED),
     Product(of=("image", "checks"), factor=(0.5, 2.0, 1.0)),
+    # Of a surface without vertex colours, which are one colour there.
+    VertexColours(without=(0.3, 0.2, 0.9)),
+    Product(of=("own", "image", "own"), factor=(0.5, 2.0, 1.0)),
 )
 
 
@@ -55,7 +58,8 @@ def interaction(u: Any, v: Any) -> Any:
 
 @pytest.mark.parametrize("texture", TEXTURES)
 def test_textures(texture: Texture, image_folder: Path) -> None:
-    others = {"image": Bitmap(file="colours.png"), "checks": Checker(uv=TURNED)}
+    own = VertexColours(without=(0.3, 0.2, 0.9))
+    others = {"image": Bitmap(file="colours.png"), "checks": Checker(uv=TURNED), "own": own}
     scene = Scene(textures={"t": texture, **others})
     scene._folder = image_folder
     textures = build_tables(scene).textures
@@ -90,6 +94,8 @@ textures: {t: TEXTURE, image: {type: bitmap, file: colours.png}, own: {type: ver
 materials: {base: {type: diffuse}, m: MATERIAL}
 shapes:
   - {type: mesh, vertices: [[-1, -1, 0], [1, -1, 0], [0, 1, 0]], faces: [[0, 1, 2]],
+     uv: [[0, 0], [1, 0], [0.5, 1]], material: m}
+  - {type: mesh, vertices: [[-1, -1, 1], [1, -1, 1], [0, 1, 1]], faces: [[0, 1, 2]],
      uv: [[0, 0], [1, 0], [0.5, 1]], colours: [[0.9, 0, 0], [0, 0.9, 0], [0, 0, 0.9]], material: m}
 """
 KINDS = {
