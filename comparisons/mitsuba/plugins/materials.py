@@ -306,7 +306,7 @@ def _mixtures(mi: Any) -> None:
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
             # By name: the parser leaves constant colours as numbers, which are no objects.
-            names = [name for name in properties.property_names() if name.startswith("of_")]
+            names = [name for name, _ in properties.items() if name.startswith("of_")]
             self.of = [properties.get_unbounded_texture(name) for name in names]
             self.factor = mi.Color3f([float(properties[f"factor_{k}"]) for k in range(3)])
             self.cutoff = float(properties["cutoff"])
