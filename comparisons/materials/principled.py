@@ -6,7 +6,8 @@ import numpy as np
 
 from comparisons.geometry.frame import UNIT_ROUNDOFF
 from comparisons.materials.material import MOST, Errors, Gltf, MaterialType
-from comparisons.mitsuba.context import TranslationContext
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.context import TranslationContext, UntranslatableError
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.plugin_table import PluginTable, Row, inserted
 from comparisons.renderers.vocabulary import GltfWriter, Look, of_index
@@ -41,7 +42,19 @@ def _to_mitsuba(material: Principled, context: TranslationContext) -> dict[str, 
         index = {"eta": material.eta}
     else:
         index = {"specular": 0.5 if material.specular is None else material.specular}
-    return inserted(TABLE.write(material, context), BASE.name, index)
+    plugin = inserted(TABLE.write(material, context), BASE.name, index)
+    if context.files is None and material.sheen and mitsuba().variant().startswith("scalar"):
+        plugin["spec_trans"] = _with_sheen(material)
+    return plugin
+
+
+def _with_sheen(material: Principled) -> float:
+    """Transmission with which Mitsuba's scalar variants do not leave out the sheen, as they do
+    where it is exactly 1: the next float32 below.  All lobes then differ by at most a rounding."""
+    if isinstance(material.spec_trans, str):
+        lacking = "Principled with sheen and a texture of spec_trans, by scalar variants,"
+        raise UntranslatableError(lacking, "material")
+    return min(material.spec_trans, 1.0 - UNIT_ROUNDOFF)
 
 
 def _from_mitsuba(reading: Reading, node: Node) -> Principled:

@@ -1,5 +1,6 @@
 """Material by material: the BSDFs of our kernels are those of their counterparts in Mitsuba."""
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from comparisons.materials.material import MOST
 from comparisons.materials.principled import clearcoat_error
 from comparisons.materials.rough_plastic import MARGIN, table_error
 from comparisons.materials.translate import translate_material
-from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.backend import SCALAR, mitsuba, variant
 from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.plugins.exact_coat import approximate_g1, exact_g1, smooth_reflectance
 from comparisons.rungs.rays import arbiter
@@ -64,6 +65,7 @@ MATERIALS: tuple[Material, ...] = (
     rt.Plastic(**COLOURS, interior_ior=1.33, exterior_ior=1.33),
     rt.Principled(base_colour=(0.8, 0.5, 0.2), spec_trans=0.7, roughness=0.4, metallic=0.1),
     rt.Principled(base_colour=(0.8, 0.5, 0.2), spec_trans=1.0, roughness=0.2, eta=1.6),
+    rt.Principled(base_colour=(0.8, 0.5, 0.2), spec_trans=1.0, sheen=0.8, eta=1.6),
     rt.PrincipledThin(base_colour=(0.8, 0.5, 0.2), sheen=0.8, sheen_tint=0.5, flatness=0.6),
     rt.PrincipledThin(base_colour=(0.8, 0.5, 0.2), diff_trans=1.2, spec_trans=0.3, spec_tint=0.5),
     rt.PrincipledThin(spec_trans=1.0, eta=1.7, roughness=0.6, anisotropic=0.6),
@@ -110,11 +112,14 @@ def float32_bound(material: Material, wo: FloatArray, wi: FloatArray, ours: Floa
     return found + 1e-18
 
 
-@pytest.mark.cases(31)
+@pytest.mark.cases(62)
+@pytest.mark.parametrize("backend", ["the chosen one", SCALAR])
 @pytest.mark.parametrize("material", MATERIALS, ids=lambda m: m.type)
-def test_the_same_is_scattered(material: Material) -> None:
+def test_the_same_is_scattered(material: Material, backend: str) -> None:
+    """By Mitsuba's wide variants and by its scalar ones, whose code branches otherwise."""
     wo, wi = pairs(material)
-    ours, theirs = both_sides(material, wo, wi, counterpart(material))
+    with variant(backend) if backend == SCALAR else contextlib.nullcontext():
+        ours, theirs = both_sides(material, wo, wi, counterpart(material))
     bound = float32_bound(material, wo, wi, ours)
     if isinstance(material, rt.RoughPlastic):
         white = {"reflectance": (1.0, 1.0, 1.0), "specular": (0.0, 0.0, 0.0)}
