@@ -67,9 +67,10 @@ class Command:
         `scene` is the file that the page gets, named scene.json."""
         known = {"spp", "size"} & {key for key, value in values.items() if value is not None}
         sizes = ("{width}", "{height}") if "size" in known else ("-", "-")
-        module = "comparisons.gate.browser"
+        module, wall = "comparisons.gate.browser", Path(__file__).with_name("without_network.py")
         data = "-" if values["scene"] is None else str(values["scene"].parent)
-        words = [sys.executable, "-P", "-m", module, page, data, "{output}", "{seeds}"]
+        words = [sys.executable, "-I", "-S", str(wall)]
+        words += [sys.executable, "-P", "-m", module, page, data, "{output}", "{seeds}"]
         words += ["{spp}" if "spp" in known else "-", *sizes]
         return cls(shlex.join(words), name=Path(page.partition("?")[0]).name, **values)
 
