@@ -15,11 +15,11 @@ from comparisons.compare.budget import Budget
 from reference_rt.cli.options import adjusted
 from reference_rt.core.model import Description, Positive
 from reference_rt.rendering.scene import Scene
-from reference_rt.scene import yaml_text
 from reference_rt.scene.model import OWN
-from reference_rt.scene.yaml_text import line_of
+from reference_rt.util import yaml_text
 from reference_rt.util.errors import SceneError, SceneWarning, UsageError, printable
 from reference_rt.util.files import read_text
+from reference_rt.util.yaml_text import line_of
 
 # ---- cases: scenes, changes to them, budgets ----------------------------------------------------
 

@@ -15,8 +15,7 @@ from pathlib import Path
 from threading import Thread
 from typing import Any, TypeVar
 
-import yaml
-
+from reference_rt.util import yaml_text
 from reference_rt.util.errors import UsageError, WorkersError
 from reference_rt.util.files import read_text, temporary_folder
 
@@ -248,8 +247,11 @@ def batch_cluster(file: Path) -> Any:
     htcondor, oar, moab), `jobs`, how many of them, and the options of dask-jobqueue's class, such
     as queue, cores, memory, walltime.  Raises UsageError."""
     try:
-        described = yaml.safe_load(read_text(file))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        described = yaml_text.load(read_text(file))
+    except yaml_text.MalformedError as error:
+        line = "" if error.line is None else f":{error.line}"
+        raise UsageError(f"{file}{line}: malformed: {error}; expected YAML") from None
+    except (OSError, UnicodeDecodeError) as error:
         reason = " ".join(str(error).split())
         raise UsageError(f"{file}: cannot be read: {reason}; expected YAML") from None
     options = dict(described) if isinstance(described, dict) else {}

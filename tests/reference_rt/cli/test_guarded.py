@@ -7,7 +7,7 @@ import typer
 from command_line import invoke
 from typer.testing import CliRunner
 
-from reference_rt.cli.guarded import MOST_ALIKE, guarded, scene_warnings
+from reference_rt.cli.guarded import MOST_ALIKE, guarded, our_warnings
 from reference_rt.util.errors import SceneWarning
 
 FLAT = "scene.yaml:{}: shapes[{}]: mesh part{}.ply: {} of 1,260 triangles have no area"
@@ -15,7 +15,7 @@ FLAT = "scene.yaml:{}: shapes[{}]: mesh part{}.ply: {} of 1,260 triangles have n
 
 def told(*texts: str) -> list[str]:
     found: list[str] = []
-    with scene_warnings(found.append):
+    with our_warnings(found.append):
         for text in texts:
             warnings.warn(SceneWarning(text), stacklevel=1)
     return found
@@ -42,7 +42,7 @@ def test_the_same_warning_is_reported_once():
 
 
 def test_other_warnings_are_pythons():
-    with pytest.warns(UserWarning, match="another"), scene_warnings(pytest.fail):
+    with pytest.warns(UserWarning, match="another"), our_warnings(pytest.fail):
         warnings.warn("another", UserWarning, stacklevel=1)
 
 
@@ -50,7 +50,7 @@ def test_they_are_reported_before_an_error():
     found: list[str] = []
 
     def fail() -> None:
-        with scene_warnings(found.append):
+        with our_warnings(found.append):
             for k in range(10):
                 warnings.warn(SceneWarning(FLAT.format(k, k, k, k)), stacklevel=1)
             raise ValueError("wrong")
