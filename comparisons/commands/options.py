@@ -9,6 +9,7 @@ import typer
 
 from reference_rt.cli.options import ClusterFile as ClusterFile
 from reference_rt.cli.options import Scheduler as Scheduler
+from reference_rt.cli.options import duration
 from reference_rt.util.errors import ReferenceUnavailableError, UsageError
 
 # ---- the message of a command whose Python packages, the extra `compare`, are not installed ------
@@ -70,12 +71,7 @@ Witness = Annotated[
 ]
 
 TimeLimit = Annotated[
-    float | None,
-    typer.Option(
-        min=0.1,
-        metavar="SECONDS",
-        help="Add no replicates beyond this time, for each scene. (default: 600)",
-    ),
+    str | None, duration("Add no replicates beyond this time, for each scene (default: 10m)")
 ]
 
 

@@ -11,9 +11,9 @@ from typing import Annotated, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from comparisons.compare.budget import Budget
+from comparisons.compare.budget import Budget, Seconds
 from reference_rt.cli.options import adjusted
-from reference_rt.core.model import Description, Positive
+from reference_rt.core.model import Description
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.model import OWN
 from reference_rt.util import yaml_text
@@ -148,8 +148,8 @@ class Suite(Part):
 
     about: str
     """A one-line description."""
-    case_seconds: Positive = 900.0
-    """Seconds after which a case's process is ended."""
+    case_seconds: Seconds = 900.0
+    """Time after which a case's process is ended."""
     controls: Part | None = None
     """Cases of Mitsuba against itself; None: no such cases."""
 

@@ -9,50 +9,14 @@ import gc
 import inspect
 import os
 import socket
-import subprocess
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import pytest
-from command_line import invoke
+from command_line import ARGUMENTS, COMMANDS, WorkBegan, invoke
 from suite_runs import run_in, scenes
-
-import comparisons.commands.register
-import comparisons.experiments.convergence.methods
-import comparisons.mitsuba.backend
-import reference_rt.rendering.executor
-import reference_rt.scene.build
-from reference_rt.cli.main import app
-
-SCENE = str(Path(__file__).parents[3] / "scenes" / "spheres_whitted.yaml")
-
-COMMANDS = {c.name or c.callback.__name__: c.callback for c in app.registered_commands}
-
-ARGUMENTS = {
-    "render": [SCENE],
-    "compare": [SCENE],
-    "suite": ["smoke", "--scenes", str(Path(SCENE).parent)],
-    "gate": ["no.exr", "--scene", SCENE],
-    "accept": ["no.exr", "--name", "room", "--reason", "right"],
-    "report": ["run"],
-    "selftest": ["--scenes", str(Path(SCENE).parent)],
-    "converge": [SCENE],
-    "methods": [],
-    "bench": ["--scenes", str(Path(SCENE).parent)],
-    "stability": [],
-    "explain": [SCENE],
-    "convert": [SCENE],
-    "preview": [SCENE],
-    "trace": [SCENE, "--pixel", "1,1"],
-    "fuzz": ["--count", "1"],
-    "truth": ["perspective", "--scenes", str(Path(SCENE).parent / "truth")],
-    "doctor": [],
-    "schema": [],
-    "warm-up": [],
-}
-"""What each command needs besides its outputs."""
 
 INPUTS = {
     "scene",
@@ -117,30 +81,6 @@ def test_every_option_that_is_a_path_is_an_input_or_a_listed_output():
     assert set(COMMANDS) == set(ARGUMENTS)
     outputs = {(name, option) for name, c in COMMANDS.items() for option in _paths(c) - INPUTS}
     assert outputs == set(FILES)
-
-
-class WorkBegan(BaseException):
-    """Not an Exception, which commands would tell of as their own."""
-
-
-@pytest.fixture
-def idle(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Whatever takes long raises, and the working folder is the test's own."""
-
-    def refuse(*_: Any, **__: Any) -> Any:
-        raise WorkBegan
-
-    for module, name in (
-        (reference_rt.scene.build, "build_tables"),
-        (reference_rt.rendering.executor, "build_tables"),
-        (comparisons.mitsuba.backend, "mitsuba"),
-        (subprocess, "Popen"),
-        (subprocess, "run"),
-    ):
-        monkeypatch.setattr(module, name, refuse)
-    for name in ("CI", "GITHUB_ACTIONS", "GITHUB_STEP_SUMMARY"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.chdir(tmp_path)
 
 
 def _socket(path: Path) -> None:
