@@ -11,6 +11,7 @@ from reference_rt.cli.options import ClusterFile as ClusterFile
 from reference_rt.cli.options import Scheduler as Scheduler
 from reference_rt.cli.options import duration
 from reference_rt.util.errors import ReferenceUnavailableError, UsageError
+from reference_rt.util.extras import needs
 
 # ---- the message of a command whose Python packages, the extra `compare`, are not installed ------
 
@@ -21,9 +22,7 @@ def compare_extra(doing: str = "comparing") -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError as error:
-        raise ReferenceUnavailableError(
-            f"{doing} needs {error.name}: pip install 'reference-rt[compare]'"
-        ) from None
+        raise ReferenceUnavailableError(needs(doing, "compare", error.name)) from None
 
 
 Baselines = Annotated[Path, typer.Option(metavar="DIR", help="The folder of baselines.")]

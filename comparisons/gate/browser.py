@@ -25,6 +25,7 @@ from urllib.parse import unquote, urlsplit
 import numpy as np
 
 from comparisons.gate.page_files import read_below
+from reference_rt.util.extras import needs
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserType, Page, Route
@@ -265,4 +266,4 @@ if __name__ == "__main__":
     except PageError as error:
         sys.exit(str(error))
     except ModuleNotFoundError as error:
-        sys.exit(f"{error.name} is not installed: pip install 'reference-rt[browser]'")
+        sys.exit(needs("a page", "browser", error.name))

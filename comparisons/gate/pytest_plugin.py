@@ -92,10 +92,12 @@ class ImageGate:
             from reference_rt.rendering.scene import Scene
             from reference_rt.util.errors import ReferenceRtError
         except ModuleNotFoundError as error:
-            missing = str(error.name)
+            from reference_rt.util.extras import needs
+
+            missing = needs("image_gate", "compare", error.name)
         # Failing outside of `except`: pytest would show the handled error, with all its frames.
         if missing:
-            pytest.fail(f"image_gate needs {missing}: pip install 'reference-rt[compare]'")
+            pytest.fail(missing)
 
         given: list[tuple[Picture, Path | None]] = []
         try:

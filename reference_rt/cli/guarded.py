@@ -15,10 +15,12 @@ from reference_rt.util.errors import (
     CacheWarning,
     ImageError,
     ReferenceRtError,
+    ReferenceUnavailableError,
     SceneError,
     SceneWarning,
     printable,
 )
+from reference_rt.util.extras import extra_of, needs
 from reference_rt.util.memory import machine_memory
 from reference_rt.util.processes import dropped, exit_code_of
 
@@ -55,6 +57,9 @@ def guarded(command: F) -> F:
                 _fail(lost_output(error), ImageError.exit_code)
             if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
                 _fail(_out_of_memory(), SceneError.exit_code)
+            if isinstance(error, ModuleNotFoundError) and (extra := extra_of(error.name)):
+                message = needs("this command", extra, error.name)
+                _fail(message, ReferenceUnavailableError.exit_code)
             message = " ".join(str(error).split())
             _fail(f"internal error: {type(error).__name__}: {message}; please report it", 5)
 
