@@ -1,6 +1,5 @@
 """Without the packages of the extras: one line that names all of them, and how to install them."""
 
-import importlib
 import importlib.metadata
 import json
 import os
@@ -8,6 +7,8 @@ import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -74,12 +75,16 @@ WORKING = [f"explain {SCENE}", "schema"]
 """They need none."""
 
 
+@cache
+def installed() -> Mapping[str, list[str]]:
+    """The packages of each module that can be imported."""
+    return importlib.metadata.packages_distributions()
+
+
 def modules_of(packages: list[str]) -> list[str]:
     """What can be imported of packages; the names of those that are not installed are guessed."""
-    there = importlib.metadata.packages_distributions()
-    found = {
-        m for m, of in there.items() if {o.lower() for o in of} & {p.lower() for p in packages}
-    }
+    wanted = {package.lower() for package in packages}
+    found = {module for module, of in installed().items() if {o.lower() for o in of} & wanted}
     return sorted(found | {package.replace("-", "_") for package in packages})
 
 
@@ -167,11 +172,8 @@ def test_extras_are_those_that_are_declared() -> None:
         assert extras.extra_of(module) == extra
     for extra in USERS:
         for package in PLAIN[extra]:
-            try:
-                modules = modules_of([package])
-            except importlib.metadata.PackageNotFoundError:
-                continue
-            assert extra in {extras.extra_of(module) for module in modules}, package
+            brought = {extras.extra_of(module) for module in modules_of([package])}
+            assert extra in brought, package
     assert extras.extra_of("nowhere") is extras.extra_of(None) is None
 
 
