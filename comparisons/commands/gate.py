@@ -109,8 +109,8 @@ def gate(
     time_limit: Annotated[
         str | None,
         duration(
-            "Add no pictures by --command or --browser beyond this time; also the limit of each "
-            "(default: 10m)"
+            "Add no pictures by --command or --browser beyond this time; also the limit of each",
+            "10m",
         ),
     ] = None,
     suffix: Annotated[

@@ -70,7 +70,7 @@ Witness = Annotated[
 ]
 
 TimeLimit = Annotated[
-    str | None, duration("Add no replicates beyond this time, for each scene (default: 10m)")
+    str | None, duration("Add no replicates beyond this time, for each scene", "10m")
 ]
 
 

@@ -138,9 +138,10 @@ class Where(NamedTuple):
         return Cluster(self.scheduler or "", self.cluster)
 
 
-def duration(words: str) -> Any:
+def duration(words: str, default: str = "") -> Any:
     """An option that is a duration: its text, which `seconds_of` reads; words: its help."""
-    return typer.Option(metavar="TIME", help=f"{words}: 90s, 10m or 1.5h.")
+    unless = f" (default: {default})" if default else ""
+    return typer.Option(metavar="TIME", help=f"{words}: 90s, 10m or 1.5h.{unless}")
 
 
 TimeLimit = Annotated[str | None, duration("End after this time, with the samples so far")]
