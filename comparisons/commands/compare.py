@@ -28,6 +28,7 @@ from comparisons.commands.options import (
 from comparisons.results.rungs import COMPARED
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.cli.options import AllowMissing, Defaults, by_name
+from reference_rt.cli.quantities import seconds_of
 from reference_rt.util.errors import UsageError
 
 if TYPE_CHECKING:
@@ -90,12 +91,13 @@ def compare(
     )
     if fixed and time_limit is not None:
         raise UsageError("got --fixed and --time-limit; expected one of them")
+    seconds = SECONDS if time_limit is None else seconds_of(time_limit, "--time-limit")
     if fixed:
         budget = Budget(replicates=replicates or Budget().replicates)
     elif spp is None and replicates is None:
-        budget = Budget(replicates=PARTED, parts=PARTS, seconds=time_limit or SECONDS)
+        budget = Budget(replicates=PARTED, parts=PARTS, seconds=seconds)
     else:
-        budget = Budget(replicates=replicates or FIRST, seconds=time_limit or SECONDS)
+        budget = Budget(replicates=replicates or FIRST, seconds=seconds)
     budget = budget.model_copy(update={"reference_sampler": "multijitter", "witness": witness})
     plan = plan_of_files(scenes, changes, budget)
     given = {

@@ -7,9 +7,7 @@ from comparisons.mitsuba import backend
 from comparisons.renderers import other
 from reference_rt.cli.doctor import Check
 from reference_rt.util.errors import ReferenceUnavailableError
-
-PACKAGES = ("skimage", "scipy", "jinja2", "junitparser", "manifold3d", "flint")
-"""Modules of the extra `compare`, besides Mitsuba."""
+from reference_rt.util.extras import missing
 
 
 def checks() -> Iterable[Check]:
@@ -30,7 +28,6 @@ def checks() -> Iterable[Check]:
         yield Check("Cycles", other("cycles").version())
     except ReferenceUnavailableError as error:
         yield Check("Cycles", "left out", str(error))
-    missing = [name for name in PACKAGES if importlib.util.find_spec(name) is None]
-    if missing:
-        found = f"without {', '.join(missing)}"
+    if lacks := missing("compare"):
+        found = f"without {', '.join(lacks)}"
         yield Check("comparisons", found, "pip install 'reference-rt[compare]'", False)

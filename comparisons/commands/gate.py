@@ -22,7 +22,8 @@ from comparisons.commands.options import (
 )
 from comparisons.commands.truth import truth_gate
 from reference_rt.cli.guarded import guarded, say
-from reference_rt.cli.options import AllowMissing, Defaults, adjusted, by_name
+from reference_rt.cli.options import AllowMissing, Defaults, adjusted, by_name, duration
+from reference_rt.cli.quantities import seconds_of
 from reference_rt.util.errors import ReferenceRtError, SceneError, UsageError, printable
 
 if TYPE_CHECKING:
@@ -106,12 +107,10 @@ def gate(
         typer.Option(min=0, help="First value of {seed}; the others are far from it. (default: 1)"),
     ] = None,
     time_limit: Annotated[
-        float | None,
-        typer.Option(
-            min=0.1,
-            metavar="SECONDS",
-            help="Add no pictures by --command or --browser beyond this time; also the limit of "
-            "each. (default: 600)",
+        str | None,
+        duration(
+            "Add no pictures by --command or --browser beyond this time; also the limit of each",
+            "10m",
         ),
     ] = None,
     suffix: Annotated[
@@ -192,6 +191,7 @@ def gate(
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.console import ProgressLine
 
+    seconds = None if time_limit is None else seconds_of(time_limit, "--time-limit")
     if [command is None, browser is None, not candidates].count(False) != 1:
         raise UsageError("expected either candidates, --command or --browser")
     driven = command is not None or browser is not None
@@ -221,7 +221,7 @@ def gate(
                 raise UsageError(f"--{name}: does not apply to --truth; expected one of them")
         numbers = {"replicates": replicates, "spp": spp, "seed": seed}
         truth_gate(truth, candidates or (), command, layer, out, suffix=suffix,
-                   seconds=time_limit, **numbers)  # fmt: skip
+                   seconds=seconds, **numbers)  # fmt: skip
     described = (
         None
         if scene is None
@@ -234,7 +234,7 @@ def gate(
         if described is not None:
             own = getattr(described.resolved_sampler, "spp", spp)
             film = (described.film.width, described.film.height)
-        more: dict[str, Any] = {"spp": own, "size": film, "seconds": time_limit or SECONDS}
+        more: dict[str, Any] = {"spp": own, "size": film, "seconds": seconds or SECONDS}
         if browser is not None:
             data = None if scene is None else out / "candidates" / "scene.json"
             run = Command.of_page(browser, scene=data, suffix=suffix or ".npy", **more)
@@ -245,7 +245,7 @@ def gate(
         rounds = Rounds(
             1 if seed is None else seed,
             replicates or (1 if one else Rounds().replicates),
-            None if fixed else time_limit or SECONDS,
+            None if fixed else seconds or SECONDS,
         )
 
     def tell(line: str) -> None:

@@ -9,7 +9,9 @@ import typer
 
 from reference_rt.cli.options import ClusterFile as ClusterFile
 from reference_rt.cli.options import Scheduler as Scheduler
+from reference_rt.cli.options import duration
 from reference_rt.util.errors import ReferenceUnavailableError, UsageError
+from reference_rt.util.extras import needs
 
 # ---- the message of a command whose Python packages, the extra `compare`, are not installed ------
 
@@ -20,9 +22,7 @@ def compare_extra(doing: str = "comparing") -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError as error:
-        raise ReferenceUnavailableError(
-            f"{doing} needs {error.name}: pip install 'reference-rt[compare]'"
-        ) from None
+        raise ReferenceUnavailableError(needs(doing, "compare", error.name)) from None
 
 
 Baselines = Annotated[Path, typer.Option(metavar="DIR", help="The folder of baselines.")]
@@ -70,12 +70,7 @@ Witness = Annotated[
 ]
 
 TimeLimit = Annotated[
-    float | None,
-    typer.Option(
-        min=0.1,
-        metavar="SECONDS",
-        help="Add no replicates beyond this time, for each scene. (default: 600)",
-    ),
+    str | None, duration("Add no replicates beyond this time, for each scene", "10m")
 ]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from comparisons.report import templates
 from comparisons.report.plots import save
 from reference_rt.cli.guarded import say
-from reference_rt.util.files import check_writable
+from reference_rt.util.files import check_writable, discard
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Outputs:
         one's.  Raises as `check`."""
         self.check()
         for file in self.files:
-            file.unlink(missing_ok=True)
+            discard(file)
 
     def finish(
         self,

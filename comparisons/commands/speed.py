@@ -21,8 +21,8 @@ from comparisons.commands.options import (
     table_in,
 )
 from reference_rt.cli.guarded import guarded, say
-from reference_rt.cli.options import Defaults, by_name
-from reference_rt.cli.quantities import size_of
+from reference_rt.cli.options import Defaults, by_name, duration
+from reference_rt.cli.quantities import seconds_of, size_of
 from reference_rt.util.errors import SceneError, UsageError, printable
 
 
@@ -121,12 +121,7 @@ def converge(
     out: Annotated[Path, out_folder("results.json, .csv and report.html", "DIR")] = Path(
         "out/converge"
     ),
-    time_limit: Annotated[
-        float,
-        typer.Option(
-            min=0.1, metavar="SECONDS", help="For all pictures and the reference of one scene."
-        ),
-    ] = 60.0,
+    time_limit: Annotated[str, duration("For all pictures and the reference of one scene")] = "60s",
     size: Annotated[
         str | None,
         typer.Option(
@@ -186,7 +181,7 @@ def converge(
     from reference_rt.util.workers import Processes
 
     settings = Settings(
-        time_limit=time_limit,
+        time_limit=seconds_of(time_limit, "--time-limit"),
         size=None if size is None else size_of(size),
         max_spp=max_spp,
         replicates=replicates,

@@ -27,6 +27,7 @@ from comparisons.commands.options import (
     table_in,
 )
 from reference_rt.cli.guarded import guarded, say
+from reference_rt.cli.options import duration
 from reference_rt.util.errors import UsageError
 from reference_rt.util.workers import Workers
 
@@ -203,10 +204,7 @@ def fuzz(
     count: Annotated[
         int | None, typer.Option(min=1, help="Scenes to check. (default: 100, or until --time)")
     ] = None,
-    time: Annotated[
-        str | None,
-        typer.Option(metavar="DURATION", help="Begin scenes for so long: 90s, 10m or 2h."),
-    ] = None,
+    time: Annotated[str | None, duration("Begin scenes for so long")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of all scenes.")] = 0,
     first: Annotated[int, typer.Option(min=0, help="Number of the first scene.")] = 0,
     rungs: Annotated[
@@ -243,10 +241,7 @@ def fuzz(
         ),
     ] = None,
     stop: Annotated[bool, typer.Option("--stop", help="Stop at the first finding.")] = False,
-    reduce: Annotated[
-        float,
-        typer.Option(min=0.0, metavar="SECONDS", help="Time to reduce a finding; 0: do not."),
-    ] = 120.0,
+    reduce: Annotated[str, duration("Time to reduce a finding, or 0 for not at all")] = "2m",
     workers: NumberOfWorkers = None,
     scheduler: Scheduler = None,
     cluster: ClusterFile = None,
@@ -315,7 +310,7 @@ def fuzz(
             stop=stop,
             command=renderer or "",
             scenes=scenes,
-            shrink=reduce,
+            shrink=0.0 if reduce == "0" else seconds_of(reduce, "--reduce"),
         )
         with Display(len(plan.scenes) or plan.count) as display:
             found = run(plan, display.done, display.line)

@@ -1,11 +1,20 @@
 """How much work one comparison may take: samples, replicates, rays, and the bias to detect."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from comparisons.renderers import ReferenceSampler, WitnessName
+from reference_rt.cli.quantities import seconds_in
 from reference_rt.core.model import Description
+
+
+def _read(value: Any) -> Any:
+    return seconds_in(value) if isinstance(value, str) else value
+
+
+Seconds = Annotated[float, BeforeValidator(_read), Field(gt=0)]
+"""A duration: a number of seconds, or a text such as 10m."""
 
 PixelSize = tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]]
 
@@ -33,7 +42,7 @@ class Budget(Description):
     """Width and height in pixels; None: the scene's own."""
     replicates: Annotated[int, Field(ge=2)] = 16
     """Independent pictures by each renderer; with `seconds`, those of the first look."""
-    seconds: Annotated[float, Field(gt=0)] | None = None
+    seconds: Seconds | None = None
     """None: exactly `replicates`.  Otherwise they are doubled until the statistics are decided, or
     until this time has passed since the first one was begun (see `comparisons.compare.looks`).
     Suites have fixed replicates: their budgets are chosen from the measured noise, their run time

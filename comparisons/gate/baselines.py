@@ -34,7 +34,13 @@ from reference_rt.util.errors import (
     UsageError,
     printable,
 )
-from reference_rt.util.files import check_writable, read_input, read_text, temporary_folder
+from reference_rt.util.files import (
+    check_writable,
+    kind_of,
+    read_input,
+    read_text,
+    temporary_folder,
+)
 
 RECORD = "baseline.json"
 
@@ -139,8 +145,10 @@ def check_name(name: str) -> None:
 def check_place(folder: Path, name: str) -> None:
     """Refuse a baseline that `accept` could not write.  Raises UsageError, ImageError."""
     check_name(name)
-    if (folder / name).is_file():
-        raise ImageError(f"{folder / name}: is a file; expected the folder of a baseline")
+    place = folder / name
+    there = kind_of(place) or ("is a link to nothing" if place.is_symlink() else "")
+    if there not in ("", "is a folder"):
+        raise ImageError(f"{place}: {there}; expected the folder of a baseline")
     check_writable(folder / "a baseline")
 
 
@@ -209,9 +217,10 @@ def accept(
         raise UsageError(f"{len(pictures)} candidates without noise; expected one")
     groups = np.array_split(pictures, min(len(pictures), MOST_KEPT))
     kept = {f"picture-{k:02d}.exr": group.mean(axis=0) for k, group in enumerate(groups)}
+    place = Path(os.path.realpath(folder / name))  # a link stays
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with temporary_folder(folder) as temporary:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with temporary_folder(place.parent) as temporary:
             new = temporary / "new"
             for file, picture in kept.items():
                 planes = dict(zip("RGB", np.moveaxis(picture, -1, 0), strict=True))
@@ -233,9 +242,9 @@ def accept(
                 history=history,
             )
             (new / RECORD).write_text(_sealed(record), encoding="utf-8", newline="\n")
-            if (folder / name).exists():
-                (folder / name).rename(temporary / "old")
-            new.rename(folder / name)
+            if place.exists():
+                place.rename(temporary / "old")
+            new.rename(place)
     except OSError as error:
         raise ImageError(
             f"{folder / name}: cannot be written: {error.strerror}; expected a writable place"

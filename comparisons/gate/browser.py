@@ -7,10 +7,12 @@ seed.  DATA is the folder of scene.json, or - without a scene.  What goes wrong 
 exit code is 1.
 
 No port is opened: the browser's requests are answered here, from the page's folder and DATA, and
-all others fail.  WebGL and WebGPU compute in software, so that all machines have the same pixels.
+all others fail (`NO_NETWORK`).  WebGL and WebGPU compute in software, so that all machines have the
+same pixels.
 """
 
 import base64
+import mimetypes
 import os
 import shutil
 import sys
@@ -22,6 +24,9 @@ from urllib.parse import unquote, urlsplit
 
 import numpy as np
 
+from comparisons.gate.page_files import read_below
+from reference_rt.util.extras import needs
+
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserType, Page, Route
 
@@ -32,6 +37,19 @@ SOFTWARE = (
     *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"),
     *("--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"),
 )
+
+NO_NETWORK = (
+    # Whatever is not answered here goes to a proxy, also what is meant for this machine.  The
+    # proxy's name has no address, nor has any other.
+    *("--proxy-server=proxy.invalid:1", "--proxy-bypass-list=<-loopback>"),
+    "--host-resolver-rules=MAP * ~NOTFOUND",
+    # WebRTC alone would send its packets past the proxy.  The second is an older name.
+    "--webrtc-ip-handling-policy=disable_non_proxied_udp",
+    "--force-webrtc-ip-handling-policy=disable_non_proxied_udp",
+)
+"""Switches by which nothing in the browser reaches a network: requests that Playwright does not see
+(WebSocket, WebTransport, what is loaded ahead, shared workers), WebRTC, and the browser's own.
+`without_network.py` is a second wall, where the machine has it."""
 
 HOST = "https://page.invalid"
 """A name that no server has; https, because WebGPU and others need a secure context."""
@@ -70,9 +88,11 @@ BEFORE = """(() => {
       fail(`a script was not loaded: ${e.target.src || "one in the page, or what it imports"}`);
   }, true);
   window.addEventListener("unhandledrejection", (e) => fail(`an uncaught error: ${e.reason}`));
+  for (const name of ["RTCPeerConnection", "webkitRTCPeerConnection"]) delete window[name];
   window.__gate = { failed, contexts };
 })();"""
-"""Runs before the page's own scripts: errors that they do not await end the run at once."""
+"""Runs before the page's own scripts: errors that they do not await end the run at once.  Switches
+of browsers are renamed and then ignored without a word, so WebRTC is also taken away."""
 
 READY = """() => Promise.race([__gate.failed, (async () => {
   while (typeof window.render !== "function") await new Promise((go) => setTimeout(go, 20));
@@ -116,16 +136,29 @@ def launched(chromium: "BrowserType") -> "Browser":
     from playwright.sync_api import Error
 
     found = chromium_program()
+    switches = [*SOFTWARE, *NO_NETWORK]
     # Root, and containers without user namespaces, have no sandbox.
     for sandbox in (True, False) if os.geteuid() else (False,):
         try:
             return chromium.launch(
-                executable_path=found, args=[*SOFTWARE], chromium_sandbox=sandbox, timeout=0
+                executable_path=found,
+                args=switches,
+                chromium_sandbox=sandbox,
+                timeout=0,
             )
         except Error as error:
             if not (sandbox and "sandbox" in str(error).lower()):
                 raise PageError(f"{found}: cannot be started: {_first_lines(error)}") from None
     raise AssertionError("unreachable")
+
+
+def opened(browser: "Browser", root: Path, data: Path | None) -> "Page":
+    """A new page, whose requests are answered from these folders, whose paths are resolved."""
+    context = browser.new_context(service_workers="block", accept_downloads=False)
+    context.set_default_timeout(0)  # the gate has a limit of its own
+    context.route("**/*", partial(_answer, root, data))
+    context.add_init_script(BEFORE)
+    return context.new_page()
 
 
 def _answer(root: Path, data: Path | None, route: "Route") -> None:
@@ -135,15 +168,22 @@ def _answer(root: Path, data: Path | None, route: "Route") -> None:
     folder = root
     if data is not None and path.startswith(SCENE):
         folder, path = data, path.removeprefix(SCENE)
-    file = Path(os.path.normpath(folder / path.lstrip("/")))
     if not address.startswith(f"{HOST}/"):
         print(f"asked for {address}: the gate gives no network")
         route.abort()
-    elif file.is_relative_to(folder) and file.is_file():
-        route.fulfill(path=file, headers=ISOLATED)
-    else:
+        return
+    file = folder / path.lstrip("/")
+    try:
+        content = read_below(folder, path)
+    except (FileNotFoundError, NotADirectoryError):
         print(f"asked for {address}: there is no file {file}")
         route.fulfill(status=404)
+    except OSError as error:
+        print(f"asked for {address}: {file} is not read: {error.strerror}")
+        route.fulfill(status=403)
+    else:
+        kind = mimetypes.guess_type(path)[0] or "application/octet-stream"
+        route.fulfill(body=content, content_type=kind, headers=ISOLATED)
 
 
 def rendered(page: "Page", task: dict[str, Any], codes: bool) -> np.ndarray:
@@ -200,11 +240,7 @@ def main(page_file: str, folder: str, output: str, *numbers: str) -> None:
     os.environ["TMPDIR"] = str(Path(output).absolute().parents[1])
     with sync_playwright() as playwright:
         browser = launched(playwright.chromium)
-        context = browser.new_context(service_workers="block")
-        context.set_default_timeout(0)  # the gate has a limit of its own
-        context.route("**/*", partial(_answer, root, data))
-        context.add_init_script(BEFORE)
-        page = context.new_page()
+        page = opened(browser, root, data)
         page.on("console", lambda message: print(f"{message.type}: {message.text}"))
         page.on("dialog", lambda dialog: dialog.dismiss())
         try:
@@ -230,4 +266,4 @@ if __name__ == "__main__":
     except PageError as error:
         sys.exit(str(error))
     except ModuleNotFoundError as error:
-        sys.exit(f"{error.name} is not installed: pip install 'reference-rt[browser]'")
+        sys.exit(needs("a page", "browser", error.name))

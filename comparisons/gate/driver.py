@@ -18,7 +18,7 @@ from typing import Any
 
 from comparisons.gate.pictures_in import Picture, read_candidate
 from reference_rt.util.errors import ImageError, ReferenceRtError, UsageError
-from reference_rt.util.files import temporary_folder
+from reference_rt.util.files import discard, kind_of, replacing, temporary_folder
 
 
 class RendererError(ReferenceRtError):
@@ -67,9 +67,10 @@ class Command:
         `scene` is the file that the page gets, named scene.json."""
         known = {"spp", "size"} & {key for key, value in values.items() if value is not None}
         sizes = ("{width}", "{height}") if "size" in known else ("-", "-")
-        module = "comparisons.gate.browser"
+        module, wall = "comparisons.gate.browser", Path(__file__).with_name("without_network.py")
         data = "-" if values["scene"] is None else str(values["scene"].parent)
-        words = [sys.executable, "-P", "-m", module, page, data, "{output}", "{seeds}"]
+        words = [sys.executable, "-I", "-S", str(wall)]
+        words += [sys.executable, "-P", "-m", module, page, data, "{output}", "{seeds}"]
         words += ["{spp}" if "spp" in known else "-", *sizes]
         return cls(shlex.join(words), name=Path(page.partition("?")[0]).name, **values)
 
@@ -114,7 +115,7 @@ class Command:
 class Driver:
     """Runs a renderer, each time in a new folder; copies of its pictures are kept in `keep`, from
     which those of an earlier gate are removed.  say: is told of each start.  Raises UsageError for
-    a command that cannot be run."""
+    a command that cannot be run, ImageError for what is in a picture's place and is no file."""
 
     def __init__(
         self, command: Command, keep: Path, say: Callable[[str], None] = lambda line: None
@@ -126,9 +127,8 @@ class Driver:
         self.seconds = 0.0
         """Wall clock of all starts."""
         with suppress(OSError):
-            (keep / LOG).unlink(missing_ok=True)
-            for old in keep.glob("candidate-*"):
-                old.unlink()
+            for old in (keep / LOG, *keep.glob("candidate-*")):
+                discard(old)
 
     @property
     def together(self) -> bool:
@@ -179,19 +179,15 @@ class Driver:
     def _kept(self, output: Path) -> Path:
         """Copy a picture; its place among those that are kept.  Raises ImageError."""
         kept = self._keep / f"candidate-{len(self.made):02d}{self._command.suffix}"
-        try:
-            self._keep.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(output, kept)
-        except OSError as error:
-            raise ImageError(f"{kept}: cannot be written: {error.strerror}") from None
+        with replacing(kept) as temporary:
+            shutil.copyfile(output, temporary)
         self.made.append(kept)
         return kept
 
     def _keep_log(self, said: Path) -> None:
         """Keep what a renderer that failed printed."""
-        with suppress(OSError):
-            self._keep.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(said, self._keep / LOG)
+        with suppress(ImageError), replacing(self._keep / LOG) as temporary:
+            shutil.copyfile(said, temporary)
 
 
 def _named(seeds: Sequence[int]) -> str:
@@ -266,6 +262,12 @@ def _pictures_here() -> set[tuple[str, int]]:
 def _check_written(output: Path, before: set[tuple[str, int]], which: str) -> None:
     if output.is_file():
         return
+    if os.path.lexists(output):
+        there = kind_of(output) or "is a link to nothing"
+        raise RendererError(
+            f"what the renderer wrote with {which} {there}; expected a picture's file at the path "
+            f"given by {{output}}"
+        )
     others = sorted(path.name for path in output.parent.iterdir())
     here = sorted(name for name, _ in _pictures_here() - before)
     if others or here:

@@ -6,6 +6,7 @@ from typing import Any
 from comparisons.report import write_report, write_results
 from comparisons.results.case import Case, exit_code
 from comparisons.runs.provenance import ours
+from reference_rt.util.files import discard
 
 
 def write(
@@ -20,7 +21,7 @@ def write(
     results, report = out / "results.json", out / "report.html"
     write_results(results, [case], provenance)
     if not page:
-        report.unlink(missing_ok=True)
+        discard(report)
         return results, None
     write_report(report, [case], provenance, walls={} if wall is None else {case.scene: wall})
     return results, report

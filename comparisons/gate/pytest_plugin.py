@@ -92,10 +92,12 @@ class ImageGate:
             from reference_rt.rendering.scene import Scene
             from reference_rt.util.errors import ReferenceRtError
         except ModuleNotFoundError as error:
-            missing = str(error.name)
+            from reference_rt.util.extras import needs
+
+            missing = needs("image_gate", "compare", error.name)
         # Failing outside of `except`: pytest would show the handled error, with all its frames.
         if missing:
-            pytest.fail(f"image_gate needs {missing}: pip install 'reference-rt[compare]'")
+            pytest.fail(missing)
 
         given: list[tuple[Picture, Path | None]] = []
         try:
@@ -130,7 +132,7 @@ class ImageGate:
     def _folder(self) -> Path:
         """The folder of this call, the same in each run; outputs of an earlier run are removed.
         Raises ImageError where it cannot be written."""
-        from reference_rt.util.files import check_writable
+        from reference_rt.util.files import check_writable, discard
 
         nodeid = self._node.nodeid
         plain = re.sub(r"[^A-Za-z0-9._-]+", "-", nodeid.rpartition("/")[2]).strip("-.")
@@ -140,9 +142,9 @@ class ImageGate:
         files = [folder / n for n in ("results.json", "report.html", "case.json", "pictures.exr")]
         check_writable(*files)
         for file in files:
-            file.unlink(missing_ok=True)
+            discard(file)
         for old in folder.glob("candidate-*.exr"):
-            old.unlink()
+            discard(old)
         return folder
 
     def _write(self, case: "Case", folder: Path, baseline: str) -> bool:

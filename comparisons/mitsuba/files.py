@@ -1,6 +1,7 @@
 """The files of a scene that is written: a scene file, of ours or another renderer's, and beside it
 a folder of meshes and images, whole or not at all; and what the format cannot express of it."""
 
+import os
 import secrets
 import shutil
 from collections.abc import Callable, Iterator
@@ -151,14 +152,16 @@ def write_files(scene: SceneModel, path: Path, text_of: Callable[["Files"], str]
     """Write the text that `text_of` makes of a scene, and what it puts into the `Files` that it is
     given; returns how many these are.
 
-    The folder of the scene that it replaces is replaced, too.  Raises ImageError, also if the
-    folder holds anything else; SceneError for a file of the scene that cannot be read.
+    The folder of the scene that it replaces is replaced, too; of a link the folder that it names.
+    Raises ImageError, also if the folder holds anything else; SceneError for a file of the scene
+    that cannot be read.
     """
-    folder = folder_of(path)
-    _check_folder(path, folder)
+    named = folder_of(path)
+    _check_folder(path, named)
+    folder = Path(os.path.realpath(named))
     mark = secrets.token_hex(4)
     temporary, old = (folder.with_name(f".{mark}-{k}-{folder.name}") for k in ("new", "old"))
-    files = Files(scene, temporary, folder.name)
+    files = Files(scene, temporary, named.name)
     done = False
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

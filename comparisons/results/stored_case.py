@@ -18,7 +18,7 @@ from comparisons.results.case import Case, FloatArray, Images
 from comparisons.results.files import plain, sealed, unsealed, write_json
 from reference_rt.core.exr import read_exr, write_exr
 from reference_rt.util.errors import ImageError
-from reference_rt.util.files import read_input, read_text
+from reference_rt.util.files import discard, read_input, read_text
 
 CASE, PICTURES = "case.json", "pictures.exr"
 
@@ -93,7 +93,7 @@ def write_case(folder: Path, case: Case, key: str = "", wall: float = 0.0) -> No
         document["sha256"] = _digest(folder / PICTURES)
     write_json(folder / CASE, sealed(document))
     if images is None:
-        (folder / PICTURES).unlink(missing_ok=True)
+        discard(folder / PICTURES)
 
 
 def read_case(folder: Path) -> Case:

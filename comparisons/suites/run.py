@@ -43,7 +43,7 @@ from comparisons.suites.keys import case_key
 from comparisons.suites.suite import Plan, Source, Work, folder_name
 from comparisons.suites.worker import Request
 from reference_rt.util.errors import ImageError, SceneError
-from reference_rt.util.files import check_writable, delete_unfinished, read_text
+from reference_rt.util.files import check_writable, delete_unfinished, discard, read_text, replacing
 from reference_rt.util.workers import Threads, Workers
 
 _STYLES = {
@@ -319,7 +319,7 @@ def run_cases(
         display.line(f"Mitsuba {told['mitsuba']}")
         Thread(target=import_module, args=("comparisons.report.thumbnails",)).start()
         # The page of an earlier run must not be mistaken for this run's.
-        options.report.unlink(missing_ok=True)
+        discard(options.report)
         try:
             requests: list[Request] = []
             for work in plan.work:
@@ -413,15 +413,15 @@ def _stored(request: Request) -> Case:
 def _case(request: Request, case: Case | None, ended: Ended) -> Case:
     """The case as its worker stored it, or an invalid one that says why there is none."""
     log = request.folder / LOG
-    log.unlink(missing_ok=True)
+    discard(log)
     if case is not None:
         return case
     reason = ended.failure or ""
     if ended.invalid:
         return _without_result(request, "scene", reason, ended.wall)
     if ended.log:
-        log.parent.mkdir(parents=True, exist_ok=True)
-        log.write_text(ended.log, encoding="utf-8")
+        with replacing(log) as temporary:
+            temporary.write_text(ended.log, encoding="utf-8")
         reason += f"; see {log}"
     return _without_result(request, "run", reason, ended.wall)
 

@@ -11,15 +11,15 @@ from typing import Annotated, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from comparisons.compare.budget import Budget
+from comparisons.compare.budget import Budget, Seconds
 from reference_rt.cli.options import adjusted
-from reference_rt.core.model import Description, Positive
+from reference_rt.core.model import Description
 from reference_rt.rendering.scene import Scene
-from reference_rt.scene import yaml_text
 from reference_rt.scene.model import OWN
-from reference_rt.scene.yaml_text import line_of
+from reference_rt.util import yaml_text
 from reference_rt.util.errors import SceneError, SceneWarning, UsageError, printable
 from reference_rt.util.files import read_text
+from reference_rt.util.yaml_text import line_of
 
 # ---- cases: scenes, changes to them, budgets ----------------------------------------------------
 
@@ -148,8 +148,8 @@ class Suite(Part):
 
     about: str
     """A one-line description."""
-    case_seconds: Positive = 900.0
-    """Seconds after which a case's process is ended."""
+    case_seconds: Seconds = 900.0
+    """Time after which a case's process is ended."""
     controls: Part | None = None
     """Cases of Mitsuba against itself; None: no such cases."""
 

@@ -24,7 +24,7 @@ from comparisons.results.case import WARNING, Case, trace_command
 from comparisons.results.stored_case import write_case
 from comparisons.runs.processes import carry_out, private_stdout, send
 from comparisons.suites.suite import Changes
-from reference_rt.cli.guarded import scene_warnings
+from reference_rt.cli.guarded import our_warnings
 from reference_rt.rendering.scene import Scene
 
 Runner = Callable[..., Case]
@@ -76,7 +76,7 @@ def answer(request: Request, runner: Runner, threads: int | None, answers: TextI
     def run() -> None:
         start = time.perf_counter()
         warned: list[str] = []
-        with scene_warnings(lambda text: warned.append(f"{WARNING}{text}")):
+        with our_warnings(lambda text: warned.append(f"{WARNING}{text}")):
             case = runner(
                 request.changes.load(request.scene),
                 request.budget,

@@ -22,14 +22,22 @@ def truth_gate() -> Callable[[str, Any], None]:
     """
 
     def check(name: str, pictures: Any) -> None:
-        import numpy as np
-
-        from comparisons.gate.pictures_in import read_candidates
-        from comparisons.gate.reference import stacked
-        from comparisons.truth.case import cases
-        from comparisons.truth.judge import judge
-
         __tracebackhide__ = True
+        missing = ""
+        try:
+            import numpy as np
+
+            from comparisons.gate.pictures_in import read_candidates
+            from comparisons.gate.reference import stacked
+            from comparisons.truth.case import cases
+            from comparisons.truth.judge import judge
+        except ModuleNotFoundError as error:
+            from reference_rt.util.extras import needs
+
+            missing = needs("truth_gate", "compare", error.name)
+        # Failing outside of `except`: pytest would show the handled error, with all its frames.
+        if missing:
+            pytest.fail(missing)
         case = cases()[name]
         listed = isinstance(pictures, list | tuple)
         if listed and all(hasattr(p, "__fspath__") or isinstance(p, str) for p in pictures):

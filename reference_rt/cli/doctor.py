@@ -11,6 +11,7 @@ import numba
 
 from reference_rt.jit.kernel import CACHE_FOLDER
 from reference_rt.jit.kernel_cache import cache_root
+from reference_rt.util.extras import extra_of
 
 CHECKS = "reference_rt.checks"
 """The entry points of functions without arguments that return the checks of other packages."""
@@ -38,6 +39,10 @@ def checks() -> Iterable[Check]:
     for entry in importlib.metadata.entry_points(group=CHECKS):
         try:
             yield from entry.load()()
+        except ModuleNotFoundError as error:
+            extra = extra_of(error.name)
+            advice = f"pip install 'reference-rt[{extra}]'" if extra else "reinstall that package"
+            yield Check(entry.name, f"{error.name} is not installed", advice, False)
         except Exception as error:  # another package's fault must not hide the other checks
             message = " ".join(str(error).split())
             advice = "reinstall that package"

@@ -12,12 +12,15 @@ from typing import Any, TypeVar
 import typer
 
 from reference_rt.util.errors import (
+    CacheWarning,
     ImageError,
     ReferenceRtError,
+    ReferenceUnavailableError,
     SceneError,
     SceneWarning,
     printable,
 )
+from reference_rt.util.extras import extra_of, needs
 from reference_rt.util.memory import machine_memory
 from reference_rt.util.processes import dropped, exit_code_of
 
@@ -32,7 +35,7 @@ def guarded(command: F) -> F:
     @functools.wraps(command)
     def run(*args: Any, **kwargs: Any) -> Any:
         try:
-            with scene_warnings(lambda text: typer.echo(f"warning: {text}", err=True)):
+            with our_warnings(lambda text: typer.echo(f"warning: {text}", err=True)):
                 return command(*args, **kwargs)
         except ReferenceRtError as error:
             others = error.others if isinstance(error, SceneError) else ()
@@ -54,6 +57,9 @@ def guarded(command: F) -> F:
                 _fail(lost_output(error), ImageError.exit_code)
             if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
                 _fail(_out_of_memory(), SceneError.exit_code)
+            if isinstance(error, ModuleNotFoundError) and (extra := extra_of(error.name)):
+                message = needs("this command", extra, error.name)
+                _fail(message, ReferenceUnavailableError.exit_code)
             message = " ".join(str(error).split())
             _fail(f"internal error: {type(error).__name__}: {message}; please report it", 5)
 
@@ -91,9 +97,13 @@ MOST_ALIKE = 3
 meshes has triangles without area in 206 of them."""
 
 
+OURS = (SceneWarning, CacheWarning)
+"""Warnings to users; all others are to programmers."""
+
+
 @contextmanager
-def scene_warnings(report: Callable[[str], None]) -> Iterator[None]:
-    """Call `report` with the texts of `SceneWarning`s; other warnings are Python's.
+def our_warnings(report: Callable[[str], None]) -> Iterator[None]:
+    """Call `report` with the texts of warnings of OURS; others are Python's.
 
     Of those that differ in the part of the scene and in numbers alone the first MOST_ALIKE are
     reported, and at the end the last one with the count of those left out.
@@ -103,7 +113,7 @@ def scene_warnings(report: Callable[[str], None]) -> Iterator[None]:
         others = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *place: Any, **to: Any) -> None:
-            if not issubclass(category, SceneWarning):
+            if not issubclass(category, OURS):
                 others(message, category, *place, **to)
                 return
             text = str(message)
@@ -114,7 +124,8 @@ def scene_warnings(report: Callable[[str], None]) -> Iterator[None]:
             if len(told) <= MOST_ALIKE:
                 report(text)
 
-        warnings.simplefilter("always", SceneWarning)
+        for ours in OURS:
+            warnings.simplefilter("always", ours)
         warnings.showwarning = show
         try:
             yield

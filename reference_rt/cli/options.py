@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -138,10 +138,13 @@ class Where(NamedTuple):
         return Cluster(self.scheduler or "", self.cluster)
 
 
-TimeLimit = Annotated[
-    str | None,
-    typer.Option(help="End after this time, such as 10m, with the samples so far."),
-]
+def duration(words: str, default: str = "") -> Any:
+    """An option that is a duration: its text, which `seconds_of` reads; words: its help."""
+    unless = f" (default: {default})" if default else ""
+    return typer.Option(metavar="TIME", help=f"{words}: 90s, 10m or 1.5h.{unless}")
+
+
+TimeLimit = Annotated[str | None, duration("End after this time, with the samples so far")]
 TargetError = Annotated[
     str | None,
     typer.Option(help="End at this relative standard error of the picture, such as 1%."),

@@ -5,7 +5,7 @@ import re
 
 from reference_rt.util.errors import UsageError
 
-_SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
+_SECONDS = {"": 1.0, "s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 _BYTES = {"K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40}
 _NUMBER = re.compile(r"(\d+\.?\d*|\.\d+)\s*([a-zA-Z%]*)", re.ASCII)
 _MOST_DIGITS = 30
@@ -22,12 +22,20 @@ def size_of(text: str) -> tuple[int, int]:
     return width, height
 
 
-def seconds_of(text: str, option: str) -> float:
-    """A duration, as in 90s, 10m, 1.5h, 2d.  Raises UsageError that names the option."""
+def seconds_in(text: str) -> float:
+    """A duration, as in 90s, 10m, 1.5h, 2d; 90 alone is seconds.  Raises ValueError."""
     number, unit = _split(text)
     if math.isnan(number) or unit.lower() not in _SECONDS or number <= 0.0:
-        raise UsageError(f"{option}: expected a duration, such as 90s, 10m or 1.5h, got '{text}'")
+        raise ValueError(f"expected a duration, such as 90s, 10m or 1.5h, got '{text}'")
     return number * _SECONDS[unit.lower()]
+
+
+def seconds_of(text: str, option: str) -> float:
+    """The same of an option.  Raises UsageError that names it."""
+    try:
+        return seconds_in(text)
+    except ValueError as error:
+        raise UsageError(f"{option}: {error}") from None
 
 
 def bytes_of(text: str, option: str) -> int:

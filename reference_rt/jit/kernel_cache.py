@@ -40,7 +40,7 @@ from numba.core.compiler import CompileResult
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
-from reference_rt.util.errors import ImageError
+from reference_rt.util.errors import CacheWarning, ImageError
 from reference_rt.util.files import replacing
 
 _UNUSED_FOR = 14 * 24 * 3600.0
@@ -97,7 +97,7 @@ def prepare_folder() -> str | None:
                 f"kernels are not cached: {stranger} belongs to another user or others may write"
                 " to it, and what it holds is run; expected a folder of your own, of mode 700"
                 " (REFERENCE_RT_CACHE)",
-                RuntimeWarning,
+                CacheWarning,
                 "reference_rt",
                 0,
             )

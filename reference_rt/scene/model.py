@@ -22,12 +22,11 @@ from reference_rt.lights import Ambient, AnyLight, Constant, EnvironmentMap
 from reference_rt.materials import AnyMaterial, Emissive, Material, Wrapper
 from reference_rt.materials.nested.paths import material_paths
 from reference_rt.sampling import AnySampler, Grid, Sobol
-from reference_rt.scene import yaml_text
-from reference_rt.scene.yaml_text import line_of
 from reference_rt.shapes import Shape
 from reference_rt.shapes.csg import AnyShape, Solid
 from reference_rt.shapes.instances import Instance
 from reference_rt.textures import AnyTexture, Product, texture_names
+from reference_rt.util import yaml_text
 from reference_rt.util.errors import (
     ReferenceUnavailableError,
     SceneError,
@@ -37,6 +36,7 @@ from reference_rt.util.errors import (
     printable,
 )
 from reference_rt.util.files import read_text
+from reference_rt.util.yaml_text import line_of
 
 MOST_NESTED = 100
 """Nesting depth of set operations: pydantic serialises at most 255 levels of lists and keys, of

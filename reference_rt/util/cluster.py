@@ -15,9 +15,9 @@ from pathlib import Path
 from threading import Thread
 from typing import Any, TypeVar
 
-import yaml
-
+from reference_rt.util import yaml_text
 from reference_rt.util.errors import UsageError, WorkersError
+from reference_rt.util.extras import needs
 from reference_rt.util.files import read_text, temporary_folder
 
 T = TypeVar("T")
@@ -248,8 +248,11 @@ def batch_cluster(file: Path) -> Any:
     htcondor, oar, moab), `jobs`, how many of them, and the options of dask-jobqueue's class, such
     as queue, cores, memory, walltime.  Raises UsageError."""
     try:
-        described = yaml.safe_load(read_text(file))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        described = yaml_text.load(read_text(file))
+    except yaml_text.MalformedError as error:
+        line = "" if error.line is None else f":{error.line}"
+        raise UsageError(f"{file}{line}: malformed: {error}; expected YAML") from None
+    except (OSError, UnicodeDecodeError) as error:
         reason = " ".join(str(error).split())
         raise UsageError(f"{file}: cannot be read: {reason}; expected YAML") from None
     options = dict(described) if isinstance(described, dict) else {}
@@ -262,6 +265,8 @@ def batch_cluster(file: Path) -> Any:
     try:
         cluster = getattr(module, _BATCH_SYSTEMS[kind])(**_guarded(options))
         cluster.scale(jobs=jobs)
+    except ImportError as error:  # without cryptography Dask makes no keys
+        raise UsageError(needs("a cluster", "cluster", error.name or "cryptography")) from None
     except (TypeError, ValueError, RuntimeError, OSError) as error:
         reason = " ".join(str(error).split())
         raise UsageError(f"{file}: {reason}; expected the options of dask-jobqueue") from None
@@ -297,8 +302,5 @@ def _guarded(options: dict[str, Any]) -> dict[str, Any]:
 def _module(name: str) -> Any:
     try:
         return importlib.import_module(name)
-    except ImportError:
-        raise UsageError(
-            f"{name.replace('_', '-')} is not installed; expected "
-            "`pip install 'reference-rt[cluster]'`"
-        ) from None
+    except ImportError as error:
+        raise UsageError(needs("a cluster", "cluster", error.name or name)) from None

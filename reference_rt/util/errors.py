@@ -143,6 +143,11 @@ class SceneWarning(UserWarning, metaclass=Brief):
         super().__init__(printable(message))
 
 
+class CacheWarning(RuntimeWarning):
+    """Kernels are not kept, so that each run compiles them.  Issued through the `warnings` module;
+    the command line prints it."""
+
+
 class ImageError(ReferenceRtError):
     """An image cannot be read, written or used."""
 

@@ -30,11 +30,25 @@ killed."""
 _TOKEN = "[0-9a-f]" * 8
 
 _KINDS = (
+    (stat.S_ISREG, "is a file"),
+    (stat.S_ISDIR, "is a folder"),
     (stat.S_ISFIFO, "is a pipe"),
     (stat.S_ISSOCK, "is a socket"),
     (stat.S_ISCHR, "is a device"),
     (stat.S_ISBLK, "is a device"),
 )
+
+
+def _kind(mode: int) -> str:
+    return next((kind for is_one, kind in _KINDS if is_one(mode)), "is something else")
+
+
+def kind_of(path: Path) -> str:
+    """What is there, links followed, in words ("is a pipe"); "" if nothing is."""
+    try:
+        return _kind(path.stat().st_mode)
+    except OSError:
+        return ""
 
 
 _LFS = b"version https://git-lfs.github.com/spec/"
@@ -58,8 +72,7 @@ def open_input(path: Path) -> BinaryIO:
         if stat.S_ISDIR(mode):
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
         if not stat.S_ISREG(mode):
-            kind = next((kind for is_one, kind in _KINDS if is_one(mode)), "is something else")
-            raise OSError(errno.EINVAL, f"{kind}, not a regular file", str(path))
+            raise OSError(errno.EINVAL, f"{_kind(mode)}, not a regular file", str(path))
         file = os.fdopen(number, "rb")
     except BaseException:
         os.close(number)
@@ -134,13 +147,20 @@ def _temporary_beside(path: Path) -> Iterator[Path]:
 
 def _target(path: Path) -> Path:
     """The file that a symbolic link names in the end; of anything else the path itself.  Raises
-    OSError for what must not be replaced by a file."""
-    target = Path(os.path.realpath(path)) if path.is_symlink() else path
-    if target.is_symlink():
-        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
-    if target.exists() and not (target.is_file() or target.is_dir()):
-        raise OSError(errno.EINVAL, "is no regular file", str(path))
-    return target
+    ImageError for what must not be replaced by a file, OSError where links go round."""
+    with suppress(FileNotFoundError, NotADirectoryError):
+        mode = path.stat().st_mode
+        if not stat.S_ISREG(mode):
+            raise ImageError(f"{path}: {_kind(mode)}; expected the name of a file")
+        if not os.access(path, os.W_OK):
+            raise ImageError(f"{path}: may not be written; expected a file that is not read-only")
+    return Path(os.path.realpath(path)) if path.is_symlink() else path
+
+
+def discard(path: Path) -> None:
+    """Delete a file that an earlier run wrote, if there is one; of a symbolic link the file that it
+    names, so that `replacing` writes there again.  Raises OSError, ImageError."""
+    _target(path).unlink(missing_ok=True)
 
 
 def _short(name: str) -> str:
@@ -239,14 +259,19 @@ def check_writable(*paths: Path) -> None:
         delete_unfinished(target.parent, glob.escape(_short(target.name)))
 
 
+def _check_parents(path: Path) -> None:
+    """Raises ImageError where something else stands in the place of a folder."""
+    for parent in path.parents:
+        there = kind_of(parent) or ("is a link to nothing" if parent.is_symlink() else "")
+        if there not in ("", "is a folder"):
+            raise ImageError(f"{path}: cannot be written: {parent} {there}; expected a folder")
+
+
 def _check_writable(path: Path) -> None:
     made: list[Path] = []
     try:
         with _temporary_beside(path) as probe:
-            if path.is_dir():
-                raise ImageError(f"{path}: is a folder; expected the name of a file")
-            if (file := next((p for p in path.parents if p.is_file()), None)) is not None:
-                raise ImageError(f"{path}: cannot be written: {file} is a file; expected a folder")
+            _check_parents(path)
             made = [parent for parent in probe.parents if not parent.exists()]
             probe.parent.mkdir(parents=True, exist_ok=True)
             probe.touch()

@@ -1,5 +1,6 @@
 """`reference-rt` in this process, with the commands of all installed packages."""
 
+from pathlib import Path
 from typing import Any
 
 from typer.testing import CliRunner, Result
@@ -16,3 +17,36 @@ def invoke(*words: Any, catch_exceptions: bool = True, **environment: str) -> Re
     """
     arguments = [str(word) for word in words]
     return CliRunner().invoke(app, arguments, env=environment, catch_exceptions=catch_exceptions)
+
+
+SCENE = str(Path(__file__).parents[2] / "scenes" / "spheres_whitted.yaml")
+
+COMMANDS = {c.name or c.callback.__name__: c.callback for c in app.registered_commands}
+
+ARGUMENTS = {
+    "render": [SCENE],
+    "compare": [SCENE],
+    "suite": ["smoke", "--scenes", str(Path(SCENE).parent)],
+    "gate": ["no.exr", "--scene", SCENE],
+    "accept": ["no.exr", "--name", "room", "--reason", "right"],
+    "report": ["run"],
+    "selftest": ["--scenes", str(Path(SCENE).parent)],
+    "converge": [SCENE],
+    "methods": [],
+    "bench": ["--scenes", str(Path(SCENE).parent)],
+    "stability": [],
+    "explain": [SCENE],
+    "convert": [SCENE],
+    "preview": [SCENE],
+    "trace": [SCENE, "--pixel", "1,1"],
+    "fuzz": ["--count", "1"],
+    "truth": ["perspective", "--scenes", str(Path(SCENE).parent / "truth")],
+    "doctor": [],
+    "schema": [],
+    "warm-up": [],
+}
+"""What each command needs besides its outputs."""
+
+
+class WorkBegan(BaseException):
+    """Not an Exception, which commands would tell of as their own."""

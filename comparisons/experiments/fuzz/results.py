@@ -10,7 +10,7 @@ from typing import TypeVar
 from pydantic import ValidationError
 
 from comparisons.experiments.fuzz.finding import Checked, Reduced
-from reference_rt.util.files import replacing
+from reference_rt.util.files import discard, replacing
 
 M = TypeVar("M", Checked, Reduced)
 
@@ -52,6 +52,6 @@ def check_settings(folder: Path, settings: dict[str, object]) -> bool:
 
 def remove(folder: Path) -> None:
     """Remove the results of earlier runs."""
-    (folder / "settings.json").unlink(missing_ok=True)
+    discard(folder / "settings.json")
     for kind in (Checked, Reduced):
         shutil.rmtree(_file(folder, kind, 0).parent, ignore_errors=True)

@@ -5,49 +5,18 @@ The commands and their options are those of the program itself: a command that i
 tests until its outputs are listed here.
 """
 
+import gc
 import inspect
-import subprocess
+import os
+import socket
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import pytest
-from command_line import invoke
+from command_line import ARGUMENTS, COMMANDS, WorkBegan, invoke
 from suite_runs import run_in, scenes
-
-import comparisons.commands.register
-import comparisons.experiments.convergence.methods
-import comparisons.mitsuba.backend
-import reference_rt.rendering.executor
-import reference_rt.scene.build
-from reference_rt.cli.main import app
-
-SCENE = str(Path(__file__).parents[3] / "scenes" / "spheres_whitted.yaml")
-
-COMMANDS = {c.name or c.callback.__name__: c.callback for c in app.registered_commands}
-
-ARGUMENTS = {
-    "render": [SCENE],
-    "compare": [SCENE],
-    "suite": ["smoke", "--scenes", str(Path(SCENE).parent)],
-    "gate": ["no.exr", "--scene", SCENE],
-    "accept": ["no.exr", "--name", "room", "--reason", "right"],
-    "report": ["run"],
-    "selftest": ["--scenes", str(Path(SCENE).parent)],
-    "converge": [SCENE],
-    "methods": [],
-    "bench": ["--scenes", str(Path(SCENE).parent)],
-    "stability": [],
-    "explain": [SCENE],
-    "convert": [SCENE],
-    "preview": [SCENE],
-    "trace": [SCENE, "--pixel", "1,1"],
-    "fuzz": ["--count", "1"],
-    "truth": ["perspective", "--scenes", str(Path(SCENE).parent / "truth")],
-    "doctor": [],
-    "schema": [],
-    "warm-up": [],
-}
-"""What each command needs besides its outputs."""
 
 INPUTS = {
     "scene",
@@ -114,59 +83,76 @@ def test_every_option_that_is_a_path_is_an_input_or_a_listed_output():
     assert outputs == set(FILES)
 
 
-class WorkBegan(BaseException):
-    """Not an Exception, which commands would tell of as their own."""
+def _socket(path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(path))
 
 
-@pytest.fixture
-def idle(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Whatever takes long raises, and the working folder is the test's own."""
+ELSE: dict[str, tuple[Callable[[Path], Any], str]] = {
+    "a folder": (Path.mkdir, "is a folder; expected the name of a file"),
+    "a pipe": (os.mkfifo, "is a pipe; expected the name of a file"),
+    "a link to a pipe": (
+        lambda path: [os.mkfifo(path.with_name("pipe")), path.symlink_to("pipe")],
+        "is a pipe; expected the name of a file",
+    ),
+    "a socket": (_socket, "is a socket; expected the name of a file"),
+    "a device": (
+        lambda path: path.symlink_to("/dev/null"), "is a device; expected the name of a file",
+    ),
+    "a loop": (lambda path: path.symlink_to(path.name), "Too many levels of symbolic links"),
+    "a read-only file": (
+        lambda path: [path.write_text("kept"), path.chmod(0o400)],
+        "may not be written; expected a file that is not read-only",
+    ),
+}  # fmt: skip
+"""What may stand in a file's place, how it gets there, and what is said."""
 
-    def refuse(*_: Any, **__: Any) -> Any:
-        raise WorkBegan
-
-    for module, name in (
-        (reference_rt.scene.build, "build_tables"),
-        (reference_rt.rendering.executor, "build_tables"),
-        (comparisons.mitsuba.backend, "mitsuba"),
-        (subprocess, "Popen"),
-        (subprocess, "run"),
-    ):
-        monkeypatch.setattr(module, name, refuse)
-    for name in ("CI", "GITHUB_ACTIONS", "GITHUB_STEP_SUMMARY"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.chdir(tmp_path)
-
+WAYS: dict[str, tuple[Callable[[Path], Any], str]] = {
+    "a file": (lambda path: path.write_text("a file"), "is a file; expected a folder"),
+    "a pipe": (os.mkfifo, "is a pipe; expected a folder"),
+    "a device": (lambda path: path.symlink_to("/dev/null"), "is a device; expected a folder"),
+    "a dead link": (
+        lambda path: path.symlink_to("nowhere"), "is a link to nothing; expected a folder",
+    ),
+}  # fmt: skip
+"""What may stand in the place of a folder on the way, how it gets there, and what is said."""
 
 CASES = [
-    (command, option, file, how)
+    (command, option, file, where, what)
     for (command, option), files in FILES.items()
     for file in files
-    for how in ("a file on the way", "a folder in its place", "no folder can be made")
+    for where, kinds in (("on the way", WAYS), ("in its place", ELSE), ("nowhere", [""]))
+    for what in kinds
     # Into a folder for records any name may be written.
-    if (file.rpartition("/")[2], how) != ("x", "a folder in its place")
+    if (file.rpartition("/")[2], where) != ("x", "in its place")
 ]
 
 
-@pytest.mark.cases(8)
-@pytest.mark.parametrize(("command", "option", "file", "how"), CASES)
+@pytest.mark.cases(14)
+@pytest.mark.parametrize(("command", "option", "file", "where", "what"), CASES)
 @pytest.mark.usefixtures("fake_runners", "idle")
 def test_an_output_that_cannot_be_written_is_refused_before_work_begins(
-    command, option, file, how, tmp_path
+    command, option, file, where, what, tmp_path, monkeypatch
 ):
-    out = tmp_path / "out"
+    out = tmp_path / "here"
     named = out / file if option in ("output", "preview") else out
     needed = ["--output", "picture.png"] if command == "render" and option != "output" else []
     target = out / file if file else out
-    if how == "a file on the way":
+    said = ""
+    if where == "nowhere":  # no folder can be made there
+        named = Path("/proc/none") / named.relative_to(tmp_path)
+    elif where == "on the way":
+        make, said = WAYS[what]
         blocker = target.parent if file else (tmp_path / "file")
         named = blocker / "x" if not file else named
         blocker.parent.mkdir(parents=True, exist_ok=True)
-        blocker.write_text("a file")
-    elif how == "a folder in its place":
-        target.mkdir(parents=True)
+        make(blocker)
     else:
-        named = Path("/proc/none") / named.relative_to(tmp_path)
+        make, said = ELSE[what]
+        if what == "a read-only file":  # which there is not for root
+            monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        make(target)
     (tmp_path / "run" / "cases").mkdir(parents=True)  # for `report`
     before = set(tmp_path.rglob("*"))
     words = [command, *ARGUMENTS[command], *needed, f"--{option}", str(named)]
@@ -175,10 +161,41 @@ def test_an_output_that_cannot_be_written_is_refused_before_work_begins(
     assert [line for line in told if line.startswith("error: ")] == told, result.output
     assert len(told) == 1
     # A file in which a table is to be put must be there: to name another is wrong usage.
-    assert result.exit_code == (2 if "cannot be read" in told[0] else 3), result.output
+    wrong_usage = ("cannot be read", "has no marker block")
+    assert result.exit_code == (2 if any(w in told[0] for w in wrong_usage) else 3), result.output
     assert option == "markdown" or result.exit_code == 3
     assert str(named) in told[0]
+    assert option == "markdown" or said.partition(";")[0] in told[0]
     assert set(tmp_path.rglob("*")) == before  # no file, and no folder
+
+
+@pytest.mark.cases(6)
+@pytest.mark.parametrize(
+    ("command", "option", "file"),
+    [
+        (command, option, file)
+        for (command, option), files in FILES.items()
+        for file in files
+        if file.rpartition("/")[2] != "x"
+    ],
+)
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.usefixtures("fake_runners", "idle")
+def test_a_link_stays_when_a_command_clears_its_outputs(command, option, file, tmp_path):
+    """What an earlier run wrote is removed before work begins: behind the link."""
+    out, elsewhere = tmp_path / "here", tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    named = out / file if option in ("output", "preview") else out
+    link = out / file if file else out
+    link.parent.mkdir(parents=True, exist_ok=True)
+    link.symlink_to(elsewhere / "file")
+    (elsewhere / "file").write_text("<!-- of an earlier run -->")
+    needed = ["--output", "picture.png"] if command == "render" and option != "output" else []
+    (tmp_path / "run" / "cases").mkdir(parents=True)  # for `report`
+    with suppress(WorkBegan):
+        invoke(command, *ARGUMENTS[command], *needed, f"--{option}", named, catch_exceptions=False)
+    gc.collect()  # of what the command had opened when its work was not let begin
+    assert link.readlink() == elsewhere / "file"
 
 
 @pytest.mark.parametrize("command", ["suite", "gate"])

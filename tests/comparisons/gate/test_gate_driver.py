@@ -43,6 +43,12 @@ if how == "here":
     np.save("mine.npy", picture)
 if how == "folder":
     output.mkdir()
+if how == "pipe":
+    os.mkfifo(output)
+if how == "dead":
+    output.symlink_to("nowhere")
+if how == "device":
+    output.symlink_to("/dev/zero")
 if how == "empty":
     output.touch()
 if how == "rubbish":
@@ -64,6 +70,36 @@ def renderer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 def command(renderer: str, how: str, seconds: float = 600.0) -> Command:
     return Command(f"{renderer} {how} {{output}} {{seed}}", suffix=".npy", seconds=seconds)
+
+
+@pytest.mark.parametrize(
+    ("how", "what"),
+    [
+        ("folder", "is a folder"),
+        ("pipe", "is a pipe"),
+        ("device", "is a device"),
+        ("dead", "is a link to nothing"),
+    ],
+)
+def test_what_is_no_file_is_named(renderer: str, tmp_path: Path, how: str, what: str) -> None:
+    said = f"^what the renderer wrote with seed 3 {what}; expected a picture's file at the path"
+    with pytest.raises(RendererError, match=said):
+        Driver(command(renderer, how), tmp_path / "kept").pictures([3])
+
+
+def test_links_among_the_kept_pictures_stay(renderer: str, tmp_path: Path) -> None:
+    """The file that a link names is written; what is no file is refused."""
+    keep, elsewhere = tmp_path / "kept", tmp_path / "elsewhere"
+    keep.mkdir()
+    (keep / "candidate-00.npy").symlink_to(elsewhere)
+    for seed in (5, 6):  # without the file, and with it
+        Driver(command(renderer, "well"), keep).pictures([seed])
+        assert (keep / "candidate-00.npy").readlink() == elsewhere
+        expected = np.random.default_rng(seed).random((4, 6, 3))
+        np.testing.assert_array_equal(np.load(elsewhere), expected)
+    (keep / "candidate-01.npy").symlink_to("/dev/null")
+    with pytest.raises(ImageError, match=r"candidate-01.npy: is a device; expected the name of a "):
+        Driver(command(renderer, "well"), keep)
 
 
 def test_each_seed_has_its_picture(renderer: str, tmp_path: Path) -> None:
@@ -97,7 +133,6 @@ def test_each_seed_has_its_picture(renderer: str, tmp_path: Path) -> None:
         ),
         ("beside", "another file with seed 1: mine.npy in the same folder; expected candidate-00"),
         ("here", "another file with seed 1: mine.npy in the working folder; expected candidate"),
-        ("folder", "another file with seed 1: candidate-00.npy in the same folder"),
     ],
 )
 def test_failures(renderer: str, tmp_path: Path, how: str, message: str) -> None:

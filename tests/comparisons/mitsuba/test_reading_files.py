@@ -197,6 +197,20 @@ def test_a_failure_keeps_the_older_files(folder):
         write_scene(scene, folder / "file" / "scene.yaml")
 
 
+def test_links_to_the_files_and_to_their_folder_stay(folder):
+    scene, out = read_file(folder / "scene.xml", Scene), folder / "out"
+    (out / "elsewhere").mkdir(parents=True)
+    (out / "scene_files").symlink_to("elsewhere")
+    (out / "scene.json").symlink_to("other.json")
+    for _ in range(2):
+        assert write_scene(scene, out / "scene.json") == 7
+        assert len(list((out / "elsewhere").iterdir())) == 7
+        assert (out / "scene_files").is_symlink()
+        assert (out / "scene.json").is_symlink()
+        assert len(list(out.iterdir())) == 4
+    Scene.load(out / "scene.json")
+
+
 @pytest.mark.cases(3)
 @pytest.mark.parametrize("kind", ["file", "folder", "name of a file"])
 @pytest.mark.parametrize("converted", [False, True])

@@ -1,21 +1,26 @@
 """Warnings about scenes, as commands report them."""
 
+import ast
 import warnings
+from pathlib import Path
 
 import pytest
 import typer
 from command_line import invoke
 from typer.testing import CliRunner
 
-from reference_rt.cli.guarded import MOST_ALIKE, guarded, scene_warnings
+from reference_rt.cli.guarded import MOST_ALIKE, OURS, guarded, our_warnings
+from reference_rt.jit.kernel_cache import prepare_folder
 from reference_rt.util.errors import SceneWarning
+
+ROOT = Path(__file__).parents[3]
 
 FLAT = "scene.yaml:{}: shapes[{}]: mesh part{}.ply: {} of 1,260 triangles have no area"
 
 
 def told(*texts: str) -> list[str]:
     found: list[str] = []
-    with scene_warnings(found.append):
+    with our_warnings(found.append):
         for text in texts:
             warnings.warn(SceneWarning(text), stacklevel=1)
     return found
@@ -41,8 +46,34 @@ def test_the_same_warning_is_reported_once():
     assert told(*["scene.yaml: the same"] * 10) == ["scene.yaml: the same"]
 
 
+def test_all_warnings_of_ours_are_reported(monkeypatch, tmp_path):
+    """Each has a class by which commands know it.  Of the cache it has no line of source."""
+    packages = (ROOT / "reference_rt", ROOT / "comparisons")
+    texts = [path.read_text(encoding="utf-8") for of in packages for path in of.rglob("*.py")]
+    calls = [
+        ast.unparse(node)
+        for text in texts
+        if "warnings.warn" in text
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Call)
+        and ast.unparse(node.func) in ("warnings.warn", "warnings.warn_explicit")
+    ]
+    assert len(calls) > 5
+    named = [any(ours.__name__ in call for ours in OURS) for call in calls]
+    assert [call for call, is_ours in zip(calls, named, strict=True) if not is_ours] == []
+
+    monkeypatch.setenv("REFERENCE_RT_CACHE", str(tmp_path))
+    (tmp_path / "kernels").mkdir()
+    (tmp_path / "kernels").chmod(0o777)
+    program = typer.Typer()
+    program.command()(guarded(prepare_folder))
+    said = CliRunner().invoke(program, []).stderr
+    assert said.startswith(f"warning: kernels are not cached: {tmp_path}/kernels belongs to")
+    assert len(said.splitlines()) == 1
+
+
 def test_other_warnings_are_pythons():
-    with pytest.warns(UserWarning, match="another"), scene_warnings(pytest.fail):
+    with pytest.warns(UserWarning, match="another"), our_warnings(pytest.fail):
         warnings.warn("another", UserWarning, stacklevel=1)
 
 
@@ -50,7 +81,7 @@ def test_they_are_reported_before_an_error():
     found: list[str] = []
 
     def fail() -> None:
-        with scene_warnings(found.append):
+        with our_warnings(found.append):
             for k in range(10):
                 warnings.warn(SceneWarning(FLAT.format(k, k, k, k)), stacklevel=1)
             raise ValueError("wrong")

@@ -8,7 +8,7 @@ from reference_rt.util.errors import UsageError
 
 @pytest.mark.parametrize(
     ("text", "seconds"),
-    [("90s", 90), ("10m", 600), ("1.5h", 5400), (" 2 d ", 172800), (".5S", 0.5)],
+    [("90s", 90), ("10m", 600), ("1.5h", 5400), (" 2 d ", 172800), (".5S", 0.5), ("90", 90)],
 )
 def test_durations(text, seconds):
     assert seconds_of(text, "--x") == seconds

@@ -123,7 +123,7 @@ def test_limits_and_previews(tmp_path):
     [
         (["--time-limit", "soon"], "--time-limit: expected a duration, such as 90s"),
         (["--time-limit", "0s"], "--time-limit: expected a duration"),
-        (["--time-limit", "10"], "--time-limit: expected a duration"),
+        (["--time-limit", "10x"], "--time-limit: expected a duration"),
         (["--target-error", "5"], "--target-error: expected a share"),
         (["--target-error", "0%"], "--target-error: expected a share"),
         (["--memory", "2"], "--memory: expected an amount of memory"),

@@ -15,6 +15,7 @@ import pytest
 from reference_rt.jit import kernel as kernel_module
 from reference_rt.jit import kernel_cache
 from reference_rt.jit.kernel import entry_kernel, is_compiled, signature_of
+from reference_rt.util.errors import CacheWarning
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
@@ -274,6 +275,6 @@ def test_what_others_may_write_is_not_run(mode, up, kernels, monkeypatch):
             return os.stat_result(found)
 
         monkeypatch.setattr(Path, "stat", stat)
-    with pytest.warns(RuntimeWarning, match=f"^kernels are not cached: {stranger} belongs") as said:
+    with pytest.warns(CacheWarning, match=f"^kernels are not cached: {stranger} belongs") as said:
         assert kernel_cache.prepare_folder() is None
     assert "\n" not in str(said[0].message)

@@ -247,7 +247,8 @@ def test_a_worker_killed_at_every_tenth_of_a_render(machines, box, small_units):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("[1, 2", "cannot be read"),
+        ("[1, 2", ":2: malformed"),
+        ("jobs: 3\ntype: slurm\njobs: 4", ":3: malformed: found duplicate key 'jobs'"),
         ("jobs: 3", "type: expected one of slurm, pbs"),
         ("{type: [slurm], jobs: 3}", "type: expected one of slurm, pbs"),
         ("{type: slurm}", "jobs: expected the number of jobs"),

@@ -6,7 +6,7 @@ import pytest
 from builders import EVERY_LAW, EVERY_LIGHT, EVERY_SHAPE, SCENES, every_shape
 
 import reference_rt as rt
-from reference_rt.scene import yaml_text
+from reference_rt.util import yaml_text
 
 FILES = sorted(SCENES.glob("*.yaml"))
 

@@ -8,7 +8,7 @@ from PIL import Image
 import reference_rt as rt
 from reference_rt.core.diagnosis import MOST
 from reference_rt.core.exr import write_exr
-from reference_rt.scene import yaml_text
+from reference_rt.util import yaml_text
 
 SHAPE = "shapes:\n  - type: sphere\n    "
 BOX = "shapes:\n  - type: box\n    transform: "

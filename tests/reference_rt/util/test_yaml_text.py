@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from reference_rt.scene import yaml_text
-from reference_rt.scene.yaml_text import line_of
+from reference_rt.util import yaml_text
+from reference_rt.util.yaml_text import line_of
 
 EVERYTHING = EVERY_SHAPE, EVERY_LAW, EVERY_LIGHT
 FILES = sorted([*SCENES.glob("*.yaml"), *SCENES.parent.glob("comparisons/suites/*.yaml")])
