@@ -7,6 +7,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
+from comparisons.compare.darkness import Darkness, why_dark
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.looks import Looks
 from comparisons.compare.misreadings import misreadings
@@ -156,6 +157,11 @@ class Judge:
         shown = self.curve(self.linear.pictures)
         return replace(self.linear, pictures=shown, notes=(*self.linear.notes, note))
 
+    @property
+    def darkness(self) -> Darkness | None:
+        """Why pictures of the scene may be black."""
+        return None if self.scene is None else partial(why_dark, self.scene)
+
     def case(
         self, candidates: Sequence[Picture], notes: Sequence[str] = (), looks: Looks | None = None
     ) -> Case:
@@ -235,7 +241,14 @@ class Judge:
             else partial(single_lights, known, threads=request.threads)
         )
         question = Question(
-            request.limit, request.name, lights, lengths, edges, self._witness(), request.rim
+            request.limit,
+            request.name,
+            lights,
+            lengths,
+            edges,
+            self._witness(),
+            request.rim,
+            self.darkness,
         )
         return gate_pictures(candidates, self.reference, question, notes, looks)
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from comparisons.geometry.flatten import maps_of
 from comparisons.results.case import RungResult
+from comparisons.rungs.files.description import Description, second_reading
 from comparisons.rungs.files.equations import check_equation
 from comparisons.rungs.files.findings import Findings, text
 from comparisons.rungs.files.images import check_bitmap, check_environment
@@ -32,6 +33,7 @@ def files(scene: Scene) -> RungResult:
     step = max(1, -(-len(shapes) // MOST_SHAPES))
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")  # they were issued when the scene was built
+        values = _check_description(scene, findings)
         for where, shape in shapes[::step]:
             _check_shape(where, shape, scene.folder, findings)
         for name, texture in scene.textures.items():
@@ -40,19 +42,57 @@ def files(scene: Scene) -> RungResult:
         for i, light in enumerate(scene.lights):
             if isinstance(light, EnvironmentMap):
                 check_environment(f"lights[{i}]", light, scene.folder, findings)
-    numbers: dict[str, Any] = {"checked": findings.checked, "unread": sorted(set(findings.unread))}
+    unread = sorted(set(findings.unread))
+    numbers: dict[str, Any] = {"checked": findings.checked, "unread": unread, "values": values}
     if findings.differences:
         more = len(findings.differences) - 1
         others = f"; and {more} more" if more else ""
         return RungResult("files", "differ", findings.differences[0] + others, numbers)
-    if not findings.checked:
+    if not findings.checked and not values:
         return RungResult(
             "files", "not-applicable", "no file or shape has a second source", numbers
         )
-    facts = ", ".join(f"{kind} {count}" for kind, count in sorted(findings.checked.items()))
-    left_out = f"; without a second source: {', '.join(numbers['unread'])}"
-    reason = f"as second sources say: {facts}{left_out if findings.unread else ''}"
+    counted = {**findings.checked, "values and defaults": values}
+    facts = ", ".join(f"{kind} {count:,}" for kind, count in sorted(counted.items()))
+    left_out = f"; without a second source: {', '.join(unread)}"
+    reason = f"as second sources say: {facts}{left_out if unread else ''}"
     return RungResult("files", "agree", reason, numbers)
+
+
+ALONE = ("camera", "film", "sampler", "integrator")
+"""Keys whose values refer to no other key's."""
+
+
+def _check_description(scene: Scene, findings: Findings) -> int:
+    """How many values were compared.
+
+    An option, or Python code, may have changed a part after it was read: a difference counts only
+    if the text, read anew by us, has it too.
+    """
+    said = None
+    if scene._source is not None and not _is_foreign(scene):
+        try:
+            said = second_reading(scene._source[1])
+        except ValueError as error:
+            findings.unread.append(str(error))
+    found = Description(scene, said)
+    wrong = found.differences
+    if wrong and said is not None:
+        if all(one.startswith(ALONE) for one in wrong):
+            said = {key: said[key] for key in ALONE if key in said}
+        again = Description(type(scene).model_validate(said), said).differences
+        wrong = [one for one in wrong if one in again]
+    findings.differences += wrong
+    return found.values
+
+
+def _is_foreign(scene: Scene) -> bool:
+    """Whether the scene was read from another program's file."""
+    return scene.source_file is not None and scene.source_file.suffix.lower() in (
+        ".xml",
+        ".gltf",
+        ".glb",
+    )
 
 
 def _shapes(scene: Scene) -> Iterator[tuple[str, Shape]]:
