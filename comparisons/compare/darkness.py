@@ -8,8 +8,15 @@ import numpy as np
 
 from comparisons.results.case import Images, RungResult
 from reference_rt.integrators import Path, RayCast, Whitted
-from reference_rt.lights import Ambient, Constant, Directional, EnvironmentMap, Point, Projector
-from reference_rt.lights import Spot
+from reference_rt.lights import (
+    Ambient,
+    Constant,
+    Directional,
+    EnvironmentMap,
+    Point,
+    Projector,
+    Spot,
+)
 from reference_rt.materials import Emissive, Phong
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes.shape import Shape, Solid

@@ -1,11 +1,11 @@
 """The numbers of a description against a second reading of it, which shares nothing with ours.
 
-Both renderers are given what our descriptions hold: a validator that exchanges y and z, or a default
-that is not the documented one, would be the same in both.  Here another library reads the text
-(ruamel.yaml), and a table written from the documentation (documented.toml) says what each field is
-and what it is where the text has none.  Each value of the scene that is rendered is compared with
-that, in its place.  Of scenes without a text of ours, those of Python and of other programs, the
-fields that nobody has set are compared with the documented defaults.
+Both renderers are given what our descriptions hold: a validator that exchanges y and z, or a
+default that is not the documented one, would be the same in both.  Here another library reads the
+text (ruamel.yaml), and a table written from the documentation (documented.toml) says what each
+field is, and what it is where the text has none.  Each value of the scene that is rendered is
+compared with that, in its place.  Of scenes without a text of ours, those of Python and of other
+programs, the fields that nobody has set are compared with the documented defaults.
 """
 
 import json
@@ -79,15 +79,15 @@ class Description:
         self.values = 0
         said = _UNKNOWN if said is None else said
         fields = dict(documented()["scene"])
-        kind, default = fields.pop("sampler")
+        sampler, _ = fields.pop("sampler")
         self._fields("", fields, said, scene, ("sampler",))
-        has = "sampler" in scene.model_fields_set if said is _UNKNOWN else said.get("sampler")
-        if has:
-            given = _UNKNOWN if said is _UNKNOWN else said["sampler"]
-            self._value("sampler", kind, given, scene.resolved_sampler, False)
-        else:
-            default = documented()["sampler_of"][scene.integrator.type]
-            self._value("sampler", kind, default, scene.resolved_sampler, True)
+        own = scene.resolved_sampler
+        if said is _UNKNOWN and "sampler" in scene.model_fields_set:
+            self._value("sampler", sampler, _UNKNOWN, own, False)
+        elif said is not _UNKNOWN and said.get("sampler") is not None:
+            self._value("sampler", sampler, said["sampler"], own, False)
+        elif (default := documented()["sampler_of"].get(scene.integrator.type)) is not None:
+            self._value("sampler", sampler, default, own, True)
 
     def _differ(self, place: str, said: Any, ours: Any, by_default: bool = False) -> None:
         by = "the documented default is" if by_default else "the description says"
