@@ -12,9 +12,11 @@ from comparisons.results.case import RungResult
 from comparisons.rungs.files.description import Description, second_reading
 from comparisons.rungs.files.equations import check_equation
 from comparisons.rungs.files.findings import Findings, text
+from comparisons.rungs.files.gltf import check_gltf
 from comparisons.rungs.files.images import check_bitmap, check_environment
 from comparisons.rungs.files.meshes import check_mesh
 from comparisons.shapes import type_of
+from comparisons.translator.reference import file_of
 from reference_rt.lights import EnvironmentMap
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Mesh, Triangle
@@ -67,10 +69,16 @@ def _check_description(scene: Scene, findings: Findings) -> int:
     """How many values were compared.
 
     An option, or Python code, may have changed a part after it was read: a difference counts only
-    if the text, read anew by us, has it too.
+    if what we read anew has it, too.
     """
-    said = None
-    if scene._source is not None and not _is_foreign(scene):
+    path, said = scene.source_file, None
+    if path is not None and path.suffix.lower() in (".gltf", ".glb"):
+        wrong = check_gltf(path, scene, findings)
+        if wrong:
+            again = type(scene).load(path, scene.defaults, scene.allows_missing)
+            there = check_gltf(path, again, Findings())
+            findings.differences += [one for one in wrong if one in there]
+    elif scene._source is not None and file_of(scene) is None:
         try:
             said = second_reading(scene._source[1])
         except ValueError as error:
@@ -80,19 +88,10 @@ def _check_description(scene: Scene, findings: Findings) -> int:
     if wrong and said is not None:
         if all(one.startswith(ALONE) for one in wrong):
             said = {key: said[key] for key in ALONE if key in said}
-        again = Description(type(scene).model_validate(said), said).differences
-        wrong = [one for one in wrong if one in again]
+        there = Description(type(scene).model_validate(said), said).differences
+        wrong = [one for one in wrong if one in there]
     findings.differences += wrong
     return found.values
-
-
-def _is_foreign(scene: Scene) -> bool:
-    """Whether the scene was read from another program's file."""
-    return scene.source_file is not None and scene.source_file.suffix.lower() in (
-        ".xml",
-        ".gltf",
-        ".glb",
-    )
 
 
 def _shapes(scene: Scene) -> Iterator[tuple[str, Shape]]:
