@@ -1,4 +1,5 @@
-"""Two black pictures: they are alike whatever the renderers do, so that they show no agreement."""
+"""Two black pictures are alike whatever the renderers do, so that they show no agreement; two of
+one colour show little."""
 
 import warnings
 from collections.abc import Callable, Iterator
@@ -42,6 +43,17 @@ def lit(checked: RungResult, images: Images, darkness: Darkness | None) -> RungR
         "a view in which something shines or is lit"
     )
     return replace(checked, status="inconclusive", reason=reason)
+
+
+def plain(images: Images) -> tuple[str, ...]:
+    """A note on two pictures of one colour each, such as those of a sky alone."""
+    sides = images.candidate, images.reference
+    if not all(x.any() and (x == x[0, 0]).all() and x[..., 0].size > 1 for x in sides):
+        return ()
+    colour = ", ".join(f"{v:.3g}" for v in images.candidate[0, 0])
+    return (
+        f"both pictures are of one colour throughout, ({colour}): they show no edge, no shading",
+    )
 
 
 def why_dark(scene: Scene) -> str:

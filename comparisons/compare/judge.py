@@ -7,7 +7,7 @@ import numpy as np
 
 from comparisons import statistics
 from comparisons.compare import diagnosis
-from comparisons.compare.darkness import Darkness, lit
+from comparisons.compare.darkness import Darkness, lit, plain
 from comparisons.compare.diagnosis.brightness import LITTLE
 from comparisons.compare.looks import Looks
 from comparisons.compare.path_length import Lengths
@@ -119,10 +119,11 @@ def judge(evidence: Evidence, limit: float) -> Case:
     limit: the smallest relative bias of the image mean that must be detectable.
     """
     rungs, rendered = list(evidence.rungs), evidence.rendered
-    metrics, images = None, None
+    metrics, images, notes = None, None, evidence.notes
     if rendered is not None:
         checked, *tested = picture_rungs(rendered, limit, evidence.looks)
         checked = lit(checked, rendered.images, evidence.darkness)
+        notes += plain(rendered.images)
         decided = any(rung.status in ("differ", "invalid") for rung in [*rungs, checked])
         if evidence.ray_starts and not decided and tested[0].status == "differ":
             assert rendered.resampled is not None
@@ -153,7 +154,7 @@ def judge(evidence: Evidence, limit: float) -> Case:
         metrics=metrics,
         seconds={side: dict(times) for side, times in evidence.seconds.items()},
         images=images,
-        notes=evidence.notes,
+        notes=notes,
         sides=evidence.sides,
         cause=cause,
         worst=worst,

@@ -7,7 +7,6 @@ from functools import partial
 import numpy as np
 
 from comparisons import statistics
-from comparisons.compare.darkness import Darkness, lit
 from comparisons.compare.judge import Evidence, Rendered, at_look, judge, of_replicates
 from comparisons.compare.looks import Looks, level_of
 from comparisons.gate.copies import Copies
@@ -43,7 +42,7 @@ def gate_pictures(
         copies = Copies.of(reference.fingerprints)
         candidates = copies.others(candidates)
         if not candidates:
-            return unchanged(question.name, copies, reference, notes, question.darkness)
+            return unchanged(question.name, copies, reference, notes)
         if copies.count:
             notes.append(copies.note(len(candidates)))
     if question.rim:
@@ -76,20 +75,11 @@ def gate_pictures(
     return judge(evidence, question.limit)
 
 
-def unchanged(
-    name: str,
-    copies: Copies,
-    reference: Reference,
-    notes: Sequence[str] = (),
-    darkness: Darkness | None = None,
-) -> Case:
-    """The case of candidates that are all copies of the reference's pictures.  darkness: as in
-    `Evidence`."""
+def unchanged(name: str, copies: Copies, reference: Reference, notes: Sequence[str] = ()) -> Case:
+    """The case of candidates that are all copies of the reference's pictures."""
     images = Images(*2 * [reference.pictures.mean(axis=0)])
     nothing = RungResult("statistics", "not-applicable", "there is no difference to test")
     rungs = [nothing, RungResult("images", "unchanged", copies.words, {"copies": copies.count})]
-    checked = lit(RungResult("input", "agree", "the same bits"), images, darkness)
-    rungs += [checked] if checked.status != "agree" else []
     metrics = image_metrics(images)
     verdict, reason = decide(rungs, metrics)
     return Case(

@@ -7,7 +7,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from comparisons.compare.darkness import Darkness, why_dark
+from comparisons.compare.darkness import why_dark
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.looks import Looks
 from comparisons.compare.misreadings import misreadings
@@ -157,11 +157,6 @@ class Judge:
         shown = self.curve(self.linear.pictures)
         return replace(self.linear, pictures=shown, notes=(*self.linear.notes, note))
 
-    @property
-    def darkness(self) -> Darkness | None:
-        """Why pictures of the scene may be black."""
-        return None if self.scene is None else partial(why_dark, self.scene)
-
     def case(
         self, candidates: Sequence[Picture], notes: Sequence[str] = (), looks: Looks | None = None
     ) -> Case:
@@ -248,7 +243,7 @@ class Judge:
             edges,
             self._witness(),
             request.rim,
-            self.darkness,
+            None if scene is None else partial(why_dark, scene),
         )
         return gate_pictures(candidates, self.reference, question, notes, looks)
 

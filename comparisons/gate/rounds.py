@@ -115,7 +115,7 @@ def _in_rounds(
     )
     others = pool.pictures()
     if not others:
-        return unchanged(request.name, copies, reference, darkness=judge.darkness)
+        return unchanged(request.name, copies, reference)
     notes = [copies.note(len(others))] if copies.count else []
     return judge.case(others, notes, looked)
 

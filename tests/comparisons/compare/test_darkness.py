@@ -8,7 +8,7 @@ from gate_checks import files, run, write
 
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, compare_scene
-from comparisons.compare.darkness import lit, why_dark
+from comparisons.compare.darkness import lit, plain, why_dark
 from comparisons.gate.request import gate
 from comparisons.results.case import Images, RungResult
 from reference_rt.rendering.scene import Scene
@@ -110,6 +110,25 @@ def test_compare(integrator: str) -> None:
         without = Subject(scene(1.2, 0.5, integrator, lights=""))
         case = compare_scene(without, budget, lambda line: None, 1)
         assert case.verdict == "agree", case.reason
+
+
+def test_one_colour_and_empty_layers_are_said() -> None:
+    """Nothing but the sky is seen: that agrees, and says what it shows."""
+    sky = scene(near=50.0)
+    sky = sky.changed(film=sky.film.model_copy(update={"layers": ("albedo", "normal")}))
+    budget = Budget(pixels=20, light_pixels=16, replicates=2, spp=1, seconds=None)
+    case = compare_scene(Subject(sky), budget, lambda line: None, 1)
+    assert case.verdict == "agree", case.reason
+    assert any("of one colour throughout, (1, 1, 1)" in note for note in case.notes)
+    (layers,) = [rung for rung in case.rungs if rung.name == "layers"]
+    assert "albedo and normal: 0 in every pixel of both" in layers.reason
+    rng = np.random.default_rng(1)
+    varied = rng.uniform(size=(4, 5, 3))
+    flat = np.ones((4, 5, 3))
+    assert plain(Images(flat, 2.0 * flat))
+    for images in (Images(varied, flat), Images(flat, varied), Images(flat[:1, :1], flat[:1, :1])):
+        assert not plain(images)
+    assert not plain(Images(0.0 * flat, flat))
 
 
 BLACK = np.zeros((8, 12, 3))
