@@ -8,7 +8,7 @@ from comparisons.renderers import other
 from reference_rt.cli.doctor import Check
 from reference_rt.util.errors import ReferenceUnavailableError
 
-PACKAGES = ("skimage", "scipy", "jinja2", "junitparser", "manifold3d", "flint")
+PACKAGES = ("skimage", "scipy", "jinja2", "junitparser", "manifold3d", "flint", "ruamel")
 """Modules of the extra `compare`, besides Mitsuba."""
 
 

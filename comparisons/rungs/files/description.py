@@ -23,7 +23,7 @@ from ruamel.yaml.error import YAMLError
 
 MOST_TEXT = 1 << 16
 """Characters of the longest YAML text that is read again: ruamel.yaml, which is written in Python,
-takes a second for 45,000 (two cores, 2026-11-28)."""
+takes a second of a core for as many."""
 
 MOST_PARTS = 1000
 """Parts of a list, or of a key that has names, that are compared, evenly chosen."""

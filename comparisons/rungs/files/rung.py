@@ -19,6 +19,7 @@ from comparisons.shapes import type_of
 from comparisons.translator.reference import file_of
 from reference_rt.lights import EnvironmentMap
 from reference_rt.rendering.scene import Scene
+from reference_rt.scene.yaml_text import load_any
 from reference_rt.shapes import Mesh, Triangle
 from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.shape import Shape, Solid
@@ -85,10 +86,11 @@ def _check_description(scene: Scene, findings: Findings) -> int:
             findings.unread.append(str(error))
     found = Description(scene, said)
     wrong = found.differences
-    if wrong and said is not None:
+    if wrong and said is not None and scene._source is not None:
+        ours = load_any(scene._source[1])
         if all(one.startswith(ALONE) for one in wrong):
-            said = {key: said[key] for key in ALONE if key in said}
-        there = Description(type(scene).model_validate(said), said).differences
+            ours, said = ({key: of[key] for key in ALONE if key in of} for of in (ours, said))
+        there = Description(type(scene).model_validate(ours), said).differences
         wrong = [one for one in wrong if one in there]
     findings.differences += wrong
     return found.values

@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 from faulty_sources import plant
 
+from comparisons.compare.budget import Budget
+from comparisons.compare.compare import Subject, compare_scene
 from comparisons.experiments.selftest import SourceFault
 from comparisons.rungs import files
 from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
@@ -67,6 +69,15 @@ ROWS = "[[1, 2, 0, 4], [0, 1, 3, 5], [0, 0, 1, 6]]"
 METAL = "materials: {a: {type: rough_conductor, eta: [0.2, 0.9, 1.1], k: 3"
 
 VALIDATORS: dict[str, tuple[str, str, Callable[[], Planted]]] = {
+    "exponents lose their sign": (
+        "lights: [{type: point, position: [1e-3, 0, 0], intensity: 2}]",
+        "lights[0].position: the description says 0.001 0 0, the rendered scene has 1000 0 0",
+        lambda: code(
+            "scene/yaml_text.py",
+            'digits.replace(".", "", 1) if digits[-1] in "fF" else digits)',
+            'digits.replace("e-", "e"))',
+        ),
+    ),
     "one factor of a scale leaves z": (
         "shapes: [{type: box, transform: [{translate: [0, 0, 1]}, {scale: 0.5}]}]",
         "shapes[0].transform[1].scale: the description says 0.5 0.5 0.5, the rendered scene has "
@@ -235,6 +246,18 @@ def test_faults_of_validators(name: str) -> None:
     assert found.status == "differ"
     assert place in found.reason
     assert files(Scene.parse(text)).status == "agree"
+
+
+def test_compare_says_it() -> None:
+    """The case as a whole, which does not go on to pictures."""
+    text, place, planted = VALIDATORS["one factor of a scale leaves z"]
+    with planted():
+        budget = Budget(pixels=20, light_pixels=16)
+        subject = Subject(Scene.parse(text))
+        case = compare_scene(subject, budget, lambda line: None, 1, ("files", "geometry"))
+    assert case.verdict == "differ"
+    assert case.reason.startswith(f"files: {place}")
+    assert [rung.status for rung in case.rungs] == ["differ", "not-applicable"]
 
 
 @pytest.mark.parametrize("fault", DEFAULTS, ids=lambda fault: f"{fault[0].__name__}.{fault[1]}")
