@@ -9,6 +9,7 @@ programs, the fields that nobody has set are compared with the documented defaul
 """
 
 import json
+import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -19,6 +20,7 @@ from typing import Any
 
 import numpy as np
 from ruamel.yaml import YAML
+from ruamel.yaml.constructor import SafeConstructor
 from ruamel.yaml.error import YAMLError
 
 MOST_TEXT = 1 << 16
@@ -53,6 +55,20 @@ def fields_of(section: str, name: str) -> Table | None:
     return None if table is None else {**documented()["all"].get(section, {}), **table}
 
 
+class _Core(SafeConstructor):
+    """YAML 1.2's core schema, which scene files have: ruamel.yaml makes dates of `2001-09-09`,
+    refuses `=`, and takes `.5e3` for text."""
+
+    def text(self, node: Any) -> Any:
+        word = self.construct_scalar(node)
+        is_number = node.style is None and re.fullmatch(r"[-+]?\.[0-9]+[eE][0-9]+", word)
+        return float(word) if is_number else word
+
+
+for _tag in ("str", "timestamp", "value"):
+    _Core.add_constructor(f"tag:yaml.org,2002:{_tag}", _Core.text)
+
+
 def second_reading(written: str) -> Any:
     """The data of a text in YAML or JSON.  Raises ValueError, in words, where it cannot be read."""
     if written.lstrip().startswith("{"):
@@ -60,10 +76,17 @@ def second_reading(written: str) -> Any:
             return json.loads(written)
     if len(written) > MOST_TEXT:
         raise ValueError(f"descriptions of more than {MOST_TEXT:,} characters")
+    if re.search("^%YAML", written, re.MULTILINE):  # which may ask for other rules
+        raise ValueError("descriptions with a directive %YAML")
+    reader = YAML(typ="safe", pure=True)
+    reader.Constructor = _Core
     try:
-        return YAML(typ="safe", pure=True).load(written)
+        found = reader.load(written)
     except (YAMLError, ValueError, RecursionError):
-        raise ValueError("descriptions that ruamel.yaml does not read") from None
+        found = None
+    if not isinstance(found, dict):
+        raise ValueError("descriptions that ruamel.yaml does not read")
+    return found
 
 
 class Description:
@@ -118,6 +141,12 @@ class Description:
 
     def _value(self, place: str, kind: str, said: Any, ours: Any, by_default: bool) -> None:
         """One value;  kind: as in the table;  by_default: whether `said` is the table's."""
+        try:
+            self._compare(place, kind, said, ours, by_default)
+        except (AttributeError, IndexError, KeyError, StopIteration, TypeError, ValueError):
+            self.differences.append(f"{place}: the description has another form than ours, {kind}")
+
+    def _compare(self, place: str, kind: str, said: Any, ours: Any, by_default: bool) -> None:
         nothing = said is not _UNKNOWN and _is_nothing(said)
         match kind.split():
             case ["one", "of", section]:

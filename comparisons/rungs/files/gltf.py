@@ -45,7 +45,11 @@ Value = tuple[str, Any, Any]
 
 def check_gltf(path: Path, scene: Any, findings: Findings) -> list[str]:
     """What the scene has otherwise than the file;  path: that it was read from."""
-    root = _json(path)
+    try:
+        root = _json(path)
+    except (OSError, ValueError, struct.error):  # it was changed after it was read
+        findings.unread.append(f"{path.suffix.lower()} that cannot be read again")
+        return []
     values = [*_materials(root, scene), *_lamps(root, scene), *_camera(root, scene)]
     findings.count("values of glTF", len(values))
     return [

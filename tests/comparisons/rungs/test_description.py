@@ -266,12 +266,47 @@ def test_what_options_and_python_change_is_no_difference() -> None:
         assert Description(changed, second_reading(text)).differences
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("shapes: 5", "shapes: [5]", "shapes: [{type: 5}]", "camera: [1]", "film: 7", "film: [a]"),
+        *("textures: [a]", "materials: {a: 5}", "materials: {}", "groups: {a: 5}", "sampler: 5"),
+        *("shapes: [{type: sphere, center: {}}]", "shapes: [{type: sphere, transform: 5}]"),
+        *("shapes: [{type: sphere, transform: [5]}]", "shapes: [{type: sphere, transform: [{}]}]"),
+        *("shapes: [{type: sphere, transform: [{matrix: 5}]}]", "film: {filter: 5}"),
+    ],
+)
+def test_another_form_is_a_difference(text: str) -> None:
+    """Whatever another reader finds: no error of the comparison."""
+    scene = Scene.parse(
+        "materials: {a: {type: mirror}}\nshapes: [{type: sphere, transform: [{scale: 2}]}]\n"
+        "groups: {a: [{type: disk}]}\ntextures: {a: {type: checker}}\n"
+    )
+    assert Description(scene, second_reading(text)).differences
+
+
+def test_words_of_yaml_that_others_read_otherwise() -> None:
+    text = """
+description: 2026-11-28
+shapes: [{type: sphere, radius: .5e3, material: =}, {type: mesh, file: ".5e3"}]
+materials: {=: {type: mirror}, 2001-09-09: {type: diffuse, reflectance: +.5}, "1e3": {type: mirror}}
+lights: [{type: point, position: [1_0, 0x10, 1.E-1], intensity: 0o17}]
+sampler: &it {type: sobol, spp: 4}
+"""
+    assert agrees(Scene.parse(text), second_reading(text)) > 20
+
+
 def test_what_is_not_read_again_is_named() -> None:
     long = f"{SMALL}# {'x' * MOST_TEXT}\n"
     found = files(Scene.parse(long))
     assert found.status == "agree"
     assert "more than 65,536 characters" in found.reason
     assert "values and defaults" in found.reason
+    found = files(Scene.parse("%YAML 1.1\n---\nfilm: {width: 010}"))
+    assert (found.status, found.numbers["unread"]) == (
+        "agree",
+        ["descriptions with a directive %YAML"],
+    )
     # JSON of any length is read.
     text = json.dumps({"description": "x" * MOST_TEXT, "film": {"width": 7}})
     assert files(Scene.parse(text)).numbers["unread"] == []
