@@ -108,9 +108,10 @@ def _materials(root: Any, scene: Any) -> Iterator[Value]:
 def _layers(scene: Any, name: str) -> dict[str, Any]:
     """The material and those it is made of, by type."""
     found: dict[str, Any] = {}
-    while name is not None and name in scene.materials:
-        found[scene.materials[name].type] = scene.materials[name]
-        name = getattr(scene.materials[name], "base", None)
+    inner: Any = name
+    while inner in scene.materials:
+        found[scene.materials[inner].type] = scene.materials[inner]
+        inner = getattr(scene.materials[inner], "base", None)
     return found
 
 
