@@ -10,6 +10,7 @@ from comparisons import rungs as ladder
 from comparisons.compare import looks, pictures, ray_starts
 from comparisons.compare.budget import LEAST, Budget
 from comparisons.compare.control import control
+from comparisons.compare.darkness import why_dark
 from comparisons.compare.judge import Evidence, Rendered, at_look, check, judge
 from comparisons.compare.path_length import path_lengths
 from comparisons.compare.single_lights import single_lights
@@ -190,6 +191,7 @@ def _gather(
         ray_starts=None
         if budget.seconds is None or not ray_starts.may_matter(scene, shown)
         else partial(ray_starts.explained, scene, shown, budget.limit, budget.seconds, say),
+        darkness=partial(why_dark, scene),
     )
 
 

@@ -4,11 +4,13 @@ harness or of Mitsuba, not of reference_rt."""
 import math
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from comparisons.compare import pictures
 from comparisons.compare.budget import Budget
+from comparisons.compare.darkness import why_dark
 from comparisons.compare.judge import Evidence, Rendered, judge, of_replicates
 from comparisons.mitsuba import backend
 from comparisons.mitsuba import scene as mitsuba_scene
@@ -51,9 +53,10 @@ def control(scene: Scene, budget: Budget, say: Callable[[str], None]) -> Case:
             rendered = Rendered(Images(replicates[0][0], replicates[1][0]))
         else:
             rendered = of_replicates(replicates[0], replicates[1], seconds)
-    return judge(
-        Evidence(f"{scene.name} (control)", rungs, rendered, seconds, sides=sides), budget.limit
-    )
+    darkness = partial(why_dark, scene)
+    name = f"{scene.name} (control)"
+    evidence = Evidence(name, rungs, rendered, seconds, sides=sides, darkness=darkness)
+    return judge(evidence, budget.limit)
 
 
 def _smaller(scene: Scene) -> Scene:

@@ -7,6 +7,7 @@ import numpy as np
 
 from comparisons import statistics
 from comparisons.compare import diagnosis
+from comparisons.compare.darkness import Darkness, lit, plain
 from comparisons.compare.diagnosis.brightness import LITTLE
 from comparisons.compare.looks import Looks
 from comparisons.compare.path_length import Lengths
@@ -94,7 +95,8 @@ class Evidence:
     pictures of both sides, if any;  lights, lengths: for the diagnosis;  looks: those at a growing
     number of replicates, the last of which gives the statistics;  ray_starts: see
     `comparisons.compare.ray_starts`, None where they cannot matter;  witness: a third renderer;
-    the rest as in `Case`."""
+    darkness: why pictures may be black, None where nothing is known of the scene;  the rest as in
+    `Case`."""
 
     name: str
     rungs: tuple[RungResult, ...]
@@ -108,6 +110,7 @@ class Evidence:
     looks: Looks | None = None
     ray_starts: RayStarts | None = None
     witness: Witness | None = None
+    darkness: Darkness | None = None
 
 
 def judge(evidence: Evidence, limit: float) -> Case:
@@ -116,9 +119,11 @@ def judge(evidence: Evidence, limit: float) -> Case:
     limit: the smallest relative bias of the image mean that must be detectable.
     """
     rungs, rendered = list(evidence.rungs), evidence.rendered
-    metrics, images = None, None
+    metrics, images, notes = None, None, evidence.notes
     if rendered is not None:
         checked, *tested = picture_rungs(rendered, limit, evidence.looks)
+        checked = lit(checked, rendered.images, evidence.darkness)
+        notes += plain(rendered.images)
         decided = any(rung.status in ("differ", "invalid") for rung in [*rungs, checked])
         if evidence.ray_starts and not decided and tested[0].status == "differ":
             assert rendered.resampled is not None
@@ -149,7 +154,7 @@ def judge(evidence: Evidence, limit: float) -> Case:
         metrics=metrics,
         seconds={side: dict(times) for side, times in evidence.seconds.items()},
         images=images,
-        notes=evidence.notes,
+        notes=notes,
         sides=evidence.sides,
         cause=cause,
         worst=worst,

@@ -70,6 +70,7 @@ def gate_pictures(
         lengths=question.lengths,
         looks=looks,
         witness=question.witness,
+        darkness=question.darkness,
     )
     return judge(evidence, question.limit)
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from comparisons.compare.darkness import Darkness
 from comparisons.compare.judge import Lights
 from comparisons.compare.path_length import Lengths
 from comparisons.gate.edges import Edges
@@ -18,7 +19,8 @@ class Question:
     limit: the smallest relative bias of the image mean that must be detectable;  name: the case's;
     lights, lengths: for the diagnosis of a difference;  edges: for pictures without noise;
     witness: a third renderer, where there is no rim;  rim: how many of the outermost pixels are
-    left out on each side.
+    left out on each side;  darkness: why pictures of the scene may be black, None where it is not
+    known.
     """
 
     limit: float = LIMIT
@@ -28,6 +30,7 @@ class Question:
     edges: Edges | None = None
     witness: Witness | None = None
     rim: int = 0
+    darkness: Darkness | None = None
 
 
 USUAL = Question()

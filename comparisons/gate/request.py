@@ -7,6 +7,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
+from comparisons.compare.darkness import why_dark
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.looks import Looks
 from comparisons.compare.misreadings import misreadings
@@ -235,7 +236,14 @@ class Judge:
             else partial(single_lights, known, threads=request.threads)
         )
         question = Question(
-            request.limit, request.name, lights, lengths, edges, self._witness(), request.rim
+            request.limit,
+            request.name,
+            lights,
+            lengths,
+            edges,
+            self._witness(),
+            request.rim,
+            None if scene is None else partial(why_dark, scene),
         )
         return gate_pictures(candidates, self.reference, question, notes, looks)
 

@@ -11,7 +11,10 @@ share nothing with them:
   NumPy;
 - transforms and maps of instances: SciPy's rotations and NumPy's inverse, for normals too;
 - spheres, boxes, cylinders, ... (`equations`): the equation of the description's own numbers, at
-  the points and for the normals that our tracer finds.
+  the points and for the normals that our tracer finds;
+- the description itself (`description`): its text by ruamel.yaml, and what it leaves out by
+  `documented.toml`, a table of the documented fields and defaults; a glTF file's numbers by its
+  JSON and glTF's defaults (`gltf`).
 
 What no second source reads is counted, and named.
 """

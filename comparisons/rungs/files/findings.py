@@ -16,8 +16,8 @@ class Findings:
     differences: list[str] = field(default_factory=list)
     triangles: int = 0
 
-    def count(self, kind: str) -> None:
-        self.checked[kind] = self.checked.get(kind, 0) + 1
+    def count(self, kind: str, number: int = 1) -> None:
+        self.checked[kind] = self.checked.get(kind, 0) + number
 
 
 def text(numbers: Any) -> str:

@@ -9,13 +9,17 @@ import numpy as np
 
 from comparisons.geometry.flatten import maps_of
 from comparisons.results.case import RungResult
+from comparisons.rungs.files.description import Description, second_reading
 from comparisons.rungs.files.equations import check_equation
 from comparisons.rungs.files.findings import Findings, text
+from comparisons.rungs.files.gltf import check_gltf
 from comparisons.rungs.files.images import check_bitmap, check_environment
 from comparisons.rungs.files.meshes import check_mesh
 from comparisons.shapes import type_of
+from comparisons.translator.reference import file_of
 from reference_rt.lights import EnvironmentMap
 from reference_rt.rendering.scene import Scene
+from reference_rt.scene.yaml_text import load_any
 from reference_rt.shapes import Mesh, Triangle
 from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.shape import Shape, Solid
@@ -32,6 +36,7 @@ def files(scene: Scene) -> RungResult:
     step = max(1, -(-len(shapes) // MOST_SHAPES))
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")  # they were issued when the scene was built
+        values = _check_description(scene, findings)
         for where, shape in shapes[::step]:
             _check_shape(where, shape, scene.folder, findings)
         for name, texture in scene.textures.items():
@@ -40,19 +45,55 @@ def files(scene: Scene) -> RungResult:
         for i, light in enumerate(scene.lights):
             if isinstance(light, EnvironmentMap):
                 check_environment(f"lights[{i}]", light, scene.folder, findings)
-    numbers: dict[str, Any] = {"checked": findings.checked, "unread": sorted(set(findings.unread))}
+    unread = sorted(set(findings.unread))
+    numbers: dict[str, Any] = {"checked": findings.checked, "unread": unread, "values": values}
     if findings.differences:
         more = len(findings.differences) - 1
         others = f"; and {more} more" if more else ""
         return RungResult("files", "differ", findings.differences[0] + others, numbers)
-    if not findings.checked:
+    if not findings.checked and not values:
         return RungResult(
             "files", "not-applicable", "no file or shape has a second source", numbers
         )
-    facts = ", ".join(f"{kind} {count}" for kind, count in sorted(findings.checked.items()))
-    left_out = f"; without a second source: {', '.join(numbers['unread'])}"
-    reason = f"as second sources say: {facts}{left_out if findings.unread else ''}"
+    counted = {**findings.checked, "values and defaults": values}
+    facts = ", ".join(f"{kind} {count:,}" for kind, count in sorted(counted.items()))
+    left_out = f"; without a second source: {', '.join(unread)}"
+    reason = f"as second sources say: {facts}{left_out if unread else ''}"
     return RungResult("files", "agree", reason, numbers)
+
+
+ALONE = ("camera", "film", "sampler", "integrator")
+"""Keys whose values refer to no other key's."""
+
+
+def _check_description(scene: Scene, findings: Findings) -> int:
+    """How many values were compared.
+
+    An option, or Python code, may have changed a part after it was read: a difference counts only
+    if what we read anew has it, too.
+    """
+    path, said = scene.source_file, None
+    if path is not None and path.suffix.lower() in (".gltf", ".glb"):
+        wrong = check_gltf(path, scene, findings)
+        if wrong:
+            again = type(scene).load(path, scene.defaults, scene.allows_missing)
+            there = check_gltf(path, again, Findings())
+            findings.differences += [one for one in wrong if one in there]
+    elif scene._source is not None and file_of(scene) is None:
+        try:
+            said = second_reading(scene._source[1])
+        except ValueError as error:
+            findings.unread.append(str(error))
+    found = Description(scene, said)
+    wrong = found.differences
+    if wrong and said is not None and scene._source is not None:
+        ours = load_any(scene._source[1])
+        if all(one.startswith(ALONE) for one in wrong):
+            ours, said = ({key: of[key] for key in ALONE if key in of} for of in (ours, said))
+        there = Description(type(scene).model_validate(ours), said).differences
+        wrong = [one for one in wrong if one in there]
+    findings.differences += wrong
+    return found.values
 
 
 def _shapes(scene: Scene) -> Iterator[tuple[str, Shape]]:

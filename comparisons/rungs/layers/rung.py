@@ -123,6 +123,8 @@ def _of_means(
             f"{name}_bias": means.bias,
             f"{name}_seen": means.seen,
         }
+        if not any(half.any() for half in (*ours, theirs[0][name], theirs[1][name])):
+            numbers.setdefault("empty", []).append(name)
         if not means.score <= LIMIT:
             problems.append(
                 f"{name}: the means of pixels are off by {100.0 * means.bias:.2g} % of the largest "
@@ -218,8 +220,11 @@ def _result(numbers: dict[str, Any], compared: Centres | None, problems: list[st
         f"{name} agrees (a bias of {100.0 * numbers[f'{name}_seen']:.2g} % of its largest value, "
         "root mean square, would be seen)"
         for name in ("albedo", "normal")
-        if f"{name}_seen" in numbers
+        if f"{name}_seen" in numbers and name not in numbers.get("empty", ())
     ]
+    if "empty" in numbers:
+        names = " and ".join(numbers["empty"])
+        said.append(f"{names}: 0 in every pixel of both, which shows little agreement")
     if "variance_ratio" in numbers:
         said.append(f"variance is {numbers['variance_ratio']:.3f} times the pictures' spread")
     return RungResult("layers", "agree", "; ".join(said), numbers)

@@ -90,6 +90,22 @@ def test_no_table_and_no_reader_of_ours(path: Path) -> None:
     assert _names(path) <= EXCEPTIONS.get(_place(path), set())
 
 
+@pytest.mark.parametrize("name", ["description", "gltf"])
+def test_second_readers_of_scene_files_import_nothing_of_ours(name: str) -> None:
+    """Nor do they get defaults from our types: `documented.toml` is held against the page alone."""
+    text = (PACKAGE / f"rungs/files/{name}.py").read_text(encoding="utf-8")
+    modules = [
+        module
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for module in [getattr(node, "module", None), *(alias.name for alias in node.names)]
+    ]
+    assert not [module for module in modules if str(module).startswith("reference_rt")]
+    assert not {"__pydantic_fields__", "model_fields", "get_default"} & {
+        node.attr for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Attribute)
+    }
+
+
 def test_exceptions_are_needed() -> None:
     by_name = {_place(path): _names(path) for path in SOURCES}
     assert {name: by_name[name] for name in EXCEPTIONS} == EXCEPTIONS
