@@ -7,13 +7,7 @@ from comparisons.mitsuba import backend
 from comparisons.renderers import other
 from reference_rt.cli.doctor import Check
 from reference_rt.util.errors import ReferenceUnavailableError
-<<<<<<< HEAD
 from reference_rt.util.extras import missing
-=======
-
-PACKAGES = ("skimage", "scipy", "jinja2", "junitparser", "manifold3d", "flint", "ruamel")
-"""Modules of the extra `compare`, besides Mitsuba."""
->>>>>>> mend-second
 
 
 def checks() -> Iterable[Check]:
