@@ -98,8 +98,8 @@ MISTAKES = (
     Mistake(
         misplaces,
         lambda scene: (
-            "Mitsuba misplaces what lies behind hidden lamps unless it is a mesh or a rectangle; our "
-            "own integrator, which runs in Mitsuba, takes the place of its own"
+            "Mitsuba misplaces what lies behind hidden lamps unless it is a mesh or a rectangle; "
+            "our own integrator, which runs in Mitsuba, takes the place of its own"
         ),
     ),
 )
