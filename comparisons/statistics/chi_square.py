@@ -81,7 +81,7 @@ def chi_square(
     Raises ArithmeticError for a density that does not settle.
     """
     pilots, n = len(samples) // 10, len(samples)
-    is_kept = np.isfinite(samples).all(axis=1)
+    is_kept = np.asarray(np.isfinite(samples).all(axis=1))
     kept = samples[is_kept]
     outside = int(np.count_nonzero(density(kept) <= 0.0))
     rule = gauss_legendre(points)
