@@ -185,7 +185,7 @@ def stratified(strata: tuple[int, int, int], rng: np.random.Generator) -> FloatA
 def share(counted: BoolArray) -> tuple[float, float]:
     """The share of draws of `stratified`, and its standard error, from the two of each cell."""
     pairs = counted.reshape(-1, 2)
-    apart = max(FEW, np.count_nonzero(pairs[:, 0] != pairs[:, 1]))
+    apart = max(FEW, int(np.count_nonzero(pairs[:, 0] != pairs[:, 1])))
     return float(counted.mean()), math.sqrt(apart) / len(counted)
 
 

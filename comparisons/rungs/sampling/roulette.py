@@ -89,7 +89,8 @@ def _likely(count: int, of: int, chance: float) -> bool:
     """Whether so many of `of` paths may have come, each with this chance."""
     if chance > 1.0 - SAME:
         return chance < 1.0 + SAME and count == of
-    return binom.cdf(count, of, chance) >= LEVEL and binom.sf(count - 1, of, chance) >= LEVEL
+    tails = binom.cdf(count, of, chance), binom.sf(count - 1, of, chance)
+    return bool(min(tails) >= LEVEL)
 
 
 def _fault(values: FloatArray, reflectance: FloatArray) -> str:
