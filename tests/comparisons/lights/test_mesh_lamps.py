@@ -140,6 +140,16 @@ def test_mitsubas_own_differs(name, tmp_path):
 
 
 @FAST
+def test_files_that_name_our_emitter(tmp_path):
+    """As `convert` writes them: Mitsuba renders them, with the plugin registered."""
+    scene = scene_of(tmp_path, "ply", ply(TILTED), WHITE)
+    text = (tmp_path / "own.xml").read_text().replace('"area"', '"mesh_area"')
+    (tmp_path / "ours.xml").write_text(text)
+    sigmas, off = deviation(scene, mitsuba().load_file(str(tmp_path / "ours.xml")))
+    assert sigmas < 5.0, off
+
+
+@FAST
 def test_what_mitsuba_has_right_stays(tmp_path):
     scene = scene_of(tmp_path, "obj", obj(TILTED), FLAT + WHITE)
     assert changes_to(scene) == []
