@@ -247,8 +247,6 @@ def _deterministic_rungs(
         "sampling": lambda: ladder.sampling(scene, tables),
         "whitted": lambda: ladder.whitted(scene, tables, counterpart, budget.pixels),
     }
-    if isinstance(scene.integrator, RayCast | Whitted):  # they sample no light
-        del climbs["sampling"]
     if any(not isinstance(film_filter, BoxFilter) for film_filter in film_filters):
         climbs = {"film": lambda: ladder.film(*film_filters), **climbs}
     climbs = {"files": lambda: ladder.files(written), **climbs}

@@ -22,7 +22,7 @@ def in_place_of(scene: SceneModel, has_solids: bool = False) -> dict[str, Any] |
 
 def misplaces(scene: SceneModel) -> bool:
     """What Mitsuba's integrators see behind a hidden lamp is placed by the new ray's distance from
-    the old ray's origin, unless it is a mesh (Mitsuba 3.9.1,
+    the old ray's origin, unless it is a mesh, as rectangles and cubes are to Mitsuba (3.9.1,
     `SamplingIntegrator::skip_area_emitters`)."""
     return isinstance(scene.integrator, Path | Direct) and scene.integrator.hide_emitters
 
@@ -98,8 +98,8 @@ MISTAKES = (
     Mistake(
         misplaces,
         lambda scene: (
-            "Mitsuba misplaces what lies behind hidden lamps unless it is a mesh; our own "
-            "integrator, which runs in Mitsuba, takes the place of its own"
+            "Mitsuba misplaces what lies behind hidden lamps unless it is a mesh or a rectangle; "
+            "our own integrator, which runs in Mitsuba, takes the place of its own"
         ),
     ),
 )

@@ -57,8 +57,8 @@ def _look(material: Bump, name: str, writing: GltfWriter) -> Look:
 def _note(material: Bump, context: TranslationContext) -> str:
     return (
         "Mitsuba's bump maps are wrong over anisotropic materials and by rotated images that are "
-        "not square, and not a number where they are flat and u runs along the z axis: our plugin "
-        "is used instead"
+        "not square, and not a number where they are flat and the tangent is exactly the z axis: "
+        "our plugin is used instead"
     )
 
 

@@ -2,11 +2,11 @@
 
 A rung is one test of the ladder `comparisons.results.rungs.RUNGS`.  `files` holds our tables
 against second sources of what the scene's files and descriptions say.  `film`, `geometry`, `direct`
-and `whitted` compare without noise, ray by ray; `sampling` holds our light samples against their
-densities; `layers` compares what is written beside the colour; `input` checks the pictures
-themselves, `images` compares them by metrics, `comparisons.statistics` their means; `witness` asks
-a third renderer.  `limited` changes `differ` to `reference-limited` above a rung that shows that
-Mitsuba's precision is too low.
+and `whitted` compare without noise, ray by ray; `sampling` holds our samples of lights and
+materials against their densities, and counts Russian roulette; `layers` compares what is written
+beside the colour; `input` checks the pictures themselves, `images` compares them by metrics,
+`comparisons.statistics` their means; `witness` asks a third renderer.  `limited` changes `differ`
+to `reference-limited` above a rung that shows that Mitsuba's precision is too low.
 
 Contract: a rung takes the scene, our tables and Mitsuba's counterpart (or pictures, or nothing else
 but the scene), and returns a

@@ -44,7 +44,8 @@ def turned_inside_out(
     if reading.uses_uv(material):
         raise node.error(
             "is turned inside out ('flip_normals', or a mirroring 'to_world') and has a texture or "
-            "a grain, which is not supported; expected another shape or a plain material"
+            "a grain, which is not supported: the quadric that stands in for it has other texture "
+            "coordinates; expected a mesh, or a plain material"
         )
     return Quadric(
         coefficients=form, lower=lower, upper=upper, transform=transform_of(m), material=material

@@ -98,6 +98,35 @@ def sample_visible(parsed: Parsed) -> list[str]:
     ]
 
 
+MESH_FILES = ("obj", "ply", "serialized")
+
+
+def exact_lamps(parsed: Parsed) -> list[str]:
+    """Replace Mitsuba's emitter of meshes where it is not exact (see `plugins.mesh_area`): beside
+    vertex normals, which meshes without `face_normals` have, and with a texture.  Returns a note if
+    any was."""
+    replaced = False
+    nodes = parsed.state.nodes
+    for index in range(len(nodes)):
+        node = Node(parsed, index)
+        if node.kind != "Shape" or node.plugin not in MESH_FILES:
+            continue
+        for _, emitter in node.named_children("Emitter"):
+            props = nodes[emitter.index].props
+            of_texture = any(True for _ in emitter.named_children("Texture"))
+            if of_texture or not nodes[index].props.get("face_normals", False):
+                props.set_plugin_name("mesh_area")
+                props["turned"] = True
+                replaced = True
+    if not replaced:
+        return []
+    return [
+        "lamps that are meshes with vertex normals or a texture have an emitter of ours: Mitsuba's "
+        "weighs samples by the vertex normals, which also decide which side shines, and looks for "
+        "the place of a texture's bright texels, of which a mesh may have several or none"
+    ]
+
+
 def _bump(state: Any, index: int, node: Node) -> None:
     """Replace a bump map.  Its image is looked up in its own coordinates: a copy of it without
     `to_uv`, which the plugin applies itself, and to the slopes rightly."""
@@ -223,6 +252,7 @@ def own_scene(scene: Scene, sampler: ReferenceSampler = "independent") -> Any:
     if drops_light(scene):
         _with_black_environment(mi, state)
     sample_visible(parsed)
+    exact_lamps(parsed)
     make_exact(parsed, scene)
     config = mi.parser.ParserConfig(mi.variant())
     config.merge_equivalent = config.merge_meshes = False
@@ -247,6 +277,7 @@ def changes_to(scene: Scene) -> list[str]:
     changes += notes_of_integrator(scene)
     changes += dict.fromkeys(note for _, note in inexact(scene))
     changes += sample_visible(parsed)
+    changes += exact_lamps(parsed)
     changes += dict.fromkeys(text for _, text in parsed.notes)
     return changes
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 _REQUIREMENT = re.compile(r"""([\w.-]+)[^;]*;\s*extra\s*==\s*["']([\w-]+)["']""")
 
-_DISTRIBUTIONS = {"skimage": "scikit-image", "flint": "python-flint"}
+_DISTRIBUTIONS = {"flint": "python-flint", "ruamel": "ruamel.yaml", "skimage": "scikit-image"}
 """Modules whose packages have other names."""
 
 

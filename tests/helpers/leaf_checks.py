@@ -5,8 +5,8 @@ import math
 
 import numpy as np
 from builders import U
-from chi_square import chi_square, integrate
 
+from comparisons.statistics.chi_square import chi_square, integrate
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import ByClass, entry_kernel
 from reference_rt.materials.bsdfs.tables import TABLES

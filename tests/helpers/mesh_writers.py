@@ -4,6 +4,7 @@ import base64
 import json
 import struct
 import zipfile
+import zlib
 
 import numpy as np
 
@@ -183,3 +184,23 @@ def model_3mf(folder, vertices, faces):
 def expect_one_line(error, start):
     assert str(error).startswith(start)
     assert "\n" not in str(error)
+
+
+def packed(version, *meshes):
+    """A .serialized file of meshes: vertices, triangles, normals, whether in double precision."""
+    content, offsets = b"", []
+    for vertices, faces, normals, double in meshes:
+        offsets.append(len(content))
+        kind = "<f8" if double else "<f4"
+        flags = (1 if normals is not None else 0) | 0x0002 | 0x0008 | (0x2000 if double else 0x1000)
+        body = struct.pack("<I", flags) + (b"name\0" if version == 4 else b"")
+        body += struct.pack("<QQ", len(vertices), len(faces)) + vertices.astype(kind).tobytes()
+        if normals is not None:
+            body += normals.astype(kind).tobytes()
+        body += vertices[:, :2].astype(kind).tobytes()  # uv
+        body += vertices.astype(kind).tobytes()  # colours
+        body += np.asarray(faces, "<u4").tobytes()
+        content += struct.pack("<HH", 0x041C, version) + zlib.compress(body)
+    table = "<Q" if version == 4 else "<I"
+    content += b"".join(struct.pack(table, x) for x in offsets)
+    return content + struct.pack("<I", len(offsets))

@@ -282,6 +282,17 @@ FAULTS = (
         "    ended = Step(False, Ray(point.p, point.n, 0.0), state)\n",
     ),
     SourceFault(
+        "density of rough glass without eta²", "material_rough_dielectric",
+        "materials/bsdfs/rough_dielectric.py",
+        "    spread = refraction.cos_t / (gap * gap)  # wo + eta wi is eta gap h\n",
+        "    spread = refraction.cos_t / (gap * gap * eta * eta)\n", "sampling",
+    ),
+    SourceFault(
+        "roulette 1 % too bright", BOX, "integrators/path.py",
+        "        throughput = throughput * (1.0 / survival)\n",
+        "        throughput = throughput * (1.01 / survival)\n", "sampling",
+    ),
+    SourceFault(
         "repeated images clamped at their last texel", IMAGES, "textures/bitmap.py",
         "        return min(i, 2 * n - 1 - i)\n    return i % n\n",
         "        return min(i, 2 * n - 1 - i)\n    return n - 1 if i == n else i % n\n", "files",

@@ -4,11 +4,12 @@ Bump maps, since Mitsuba's own are wrong: `{"type": "exact_bump"}`.
 
 Mitsuba 3.9.1 builds the tangent of the tilted frame from a local normal and a world-space
 derivative (src/bsdfs/bumpmap.cpp), which anisotropic materials show.  Where the map is flat the
-local normal is (0, 0, 1): if u runs along the z axis too, the tangent is 0 / 0, and so is all light
-but that of diffuse materials.  And where a texture's coordinates are rotated, it rotates the
-gradient before it multiplies by the image's width and height (src/textures/bitmap.cpp), which is
-wrong unless these are the same.  It turns the tilted normal to the side of the geometric one, which
-is the wrong side where a mesh's triangle is wound against the normals of its vertices: black.
+local normal is (0, 0, 1): if the tangent is the z axis itself, the new one is 0 / 0; metals are
+black then, and a diffuse surface has 0.18 of its light.  And where a texture's coordinates are
+rotated, it rotates the gradient before it multiplies by the image's width and height
+(src/textures/bitmap.cpp), which is wrong unless these are the same.  It turns the tilted normal to
+the side of the geometric one, which is the wrong side where a mesh's triangle is wound against the
+normals of its vertices: black.
 
 The law is Blinn's (1978): the normal of the surface whose points are raised by the height, of which
 the derivatives of the position are dp/du + n dh/du and dp/dv + n dh/dv.

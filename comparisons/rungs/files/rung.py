@@ -19,11 +19,11 @@ from comparisons.shapes import type_of
 from comparisons.translator.reference import file_of
 from reference_rt.lights import EnvironmentMap
 from reference_rt.rendering.scene import Scene
-from reference_rt.scene.yaml_text import load_any
 from reference_rt.shapes import Mesh, Triangle
 from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.shape import Shape, Solid
 from reference_rt.textures import Bitmap
+from reference_rt.util.yaml_text import load_any
 
 MOST_SHAPES = 200
 """Most shapes of a scene that are checked, evenly chosen: a shape takes some milliseconds."""

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from command_line import invoke
 from gltf_scenes import full_scene
+from mesh_writers import packed
 from mitsuba_dicts import hits_of, rays_at
 from PIL import Image
 from typer.testing import Result
@@ -19,7 +20,6 @@ from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.files import write_scene
 from comparisons.shapes import reading_meshes
 from comparisons.translator.reading import read_file
-from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ImageError, SceneError, SceneWarning, UsageError
 
@@ -74,26 +74,6 @@ end_header
 3 0 1 2 0.5 0.25 0.125
 3 0 2 3 0.75 0.5 0.25
 """
-
-
-def packed(version: int, *meshes: tuple[FloatArray, Any, FloatArray | None, bool]) -> bytes:
-    """A .serialized file of meshes: vertices, triangles, normals, whether in double precision."""
-    content, offsets = b"", []
-    for vertices, faces, normals, double in meshes:
-        offsets.append(len(content))
-        kind = "<f8" if double else "<f4"
-        flags = (1 if normals is not None else 0) | 0x0002 | 0x0008 | (0x2000 if double else 0x1000)
-        body = struct.pack("<I", flags) + (b"name\0" if version == 4 else b"")
-        body += struct.pack("<QQ", len(vertices), len(faces)) + vertices.astype(kind).tobytes()
-        if normals is not None:
-            body += normals.astype(kind).tobytes()
-        body += vertices[:, :2].astype(kind).tobytes()  # uv
-        body += vertices.astype(kind).tobytes()  # colours
-        body += np.asarray(faces, "<u4").tobytes()
-        content += struct.pack("<HH", 0x041C, version) + zlib.compress(body)
-    table = "<Q" if version == 4 else "<I"
-    content += b"".join(struct.pack(table, x) for x in offsets)
-    return content + struct.pack("<I", len(offsets))
 
 
 CORNERS = np.array([[-1.0, 0, 0], [1, 0, 0], [1, 1, 0.3], [-1, 1, 0]])

@@ -51,6 +51,28 @@ def test_faults_are_found(name):
     assert "light" in found.reason
 
 
+BALL = rt.Sphere(center=(0, 0, -3))
+
+
 def test_without_lights():
-    scene = rt.Scene(shapes=(rt.Sphere(center=(0, 0, -3)),))
-    assert sampling(scene, scene.tables).status == "not-applicable"
+    scene = rt.Scene(shapes=(BALL,))
+    found = sampling(scene, scene.tables)
+    assert found.status == "agree"
+    assert "no light is sampled" in found.reason
+    assert "1 materials" in found.reason
+
+
+@pytest.mark.parametrize(
+    ("integrator", "reason"),
+    [
+        (rt.Whitted(), "whitted draws no samples"),
+        (rt.RayCast(), "ray_cast draws no samples"),
+        (rt.Direct(bsdf_samples=0), "direct samples no materials"),
+    ],
+    ids=lambda x: getattr(x, "type", ""),
+)
+def test_what_draws_nothing(integrator, reason):
+    scene = rt.Scene(shapes=(BALL,), integrator=integrator)
+    found = sampling(scene, scene.tables)
+    assert found.status == "not-applicable"
+    assert reason in found.reason

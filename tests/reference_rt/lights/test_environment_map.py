@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 from builders import random_turn
-from chi_square import chi_square, integrate, sidak
 from PIL import Image
 
+from comparisons.statistics.chi_square import chi_square, integrate, sidak
 from reference_rt.core import transform
 from reference_rt.core.ray import BLOCK
 from reference_rt.core.vec3 import Vec3, row

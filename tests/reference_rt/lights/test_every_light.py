@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 from builders import random_turn
-from chi_square import chi_square, sidak
 
 import reference_rt as rt
+from comparisons.statistics.chi_square import chi_square, sidak
 from reference_rt.core.model import types_of
 from reference_rt.core.transform import Matrix
 from reference_rt.lights import AnyLight

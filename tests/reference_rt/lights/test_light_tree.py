@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from chi_square import sidak
 from scipy.stats import chi2
 
+from comparisons.statistics.chi_square import sidak
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.lights.emitters import point as points

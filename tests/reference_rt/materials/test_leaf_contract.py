@@ -3,7 +3,6 @@ densities are values.  Those of rough conductors and dielectrics: F11 of the sta
 
 import numpy as np
 import pytest
-from chi_square import sidak
 from leaf_checks import (
     check_same_bits,
     check_weights,
@@ -22,6 +21,7 @@ from random_bsdfs import (
     random_thin,
 )
 
+from comparisons.statistics.chi_square import sidak
 from reference_rt.core.model import name_of, types_of
 from reference_rt.materials import Bsdf
 from reference_rt.materials.bsdfs.gltf_pbr import GltfPbr

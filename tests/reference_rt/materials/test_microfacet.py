@@ -6,11 +6,11 @@ import math
 import numpy as np
 import pytest
 from builders import U
-from chi_square import chi_square, sidak
 from flint import arb, ctx
 from leaf_checks import vec_towards as towards
 from pydantic import TypeAdapter, ValidationError
 
+from comparisons.statistics.chi_square import chi_square, sidak
 from reference_rt.core.vec3 import Vec3, dot
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.materials.bsdfs.rough_conductor import Rough

@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 from builders import U, unit_vectors
-from chi_square import integrate
 from leaf_checks import NOWHERE, albedo, evaluate, sample
 from random_bsdfs import random_phong
 
+from comparisons.statistics.chi_square import integrate
 from reference_rt.core.vec3 import Vec3
 from reference_rt.materials.bsdfs import phong
 from reference_rt.materials.bsdfs.phong import Phong, power

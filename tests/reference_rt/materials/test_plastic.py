@@ -7,10 +7,10 @@ import mpmath
 import numpy as np
 import pytest
 from builders import U, unit_vectors
-from chi_square import integrate
 from leaf_checks import NOWHERE, albedo, evaluate, sample, towards
 from random_bsdfs import random_plastic
 
+from comparisons.statistics.chi_square import integrate
 from reference_rt.core.vec3 import Vec3
 from reference_rt.materials.bsdfs import plastic, rough_plastic
 from reference_rt.materials.bsdfs.plastic import Plastic, hemispherical_fresnel

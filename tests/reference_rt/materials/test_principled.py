@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 from builders import U, unit_vectors
-from chi_square import UNIT_SQUARE, integrate
 from leaf_checks import albedo, evaluate, random_direction, rows, sample, towards
 from random_bsdfs import NUMBERS, random_principled
 
+from comparisons.statistics.chi_square import UNIT_SQUARE, integrate
 from reference_rt.core.vec3 import Vec3
 from reference_rt.materials.bsdfs import principled, principled_lobes, rough_dielectric
 from reference_rt.materials.bsdfs.principled import Principled

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from chi_square import integrate
 from leaf_checks import evaluate, sample, towards
 
+from comparisons.statistics.chi_square import integrate
 from reference_rt.core.vec3 import Vec3
 from reference_rt.materials.bsdfs.rough_conductor import RoughConductor
 from reference_rt.materials.bsdfs.rough_dielectric import RoughDielectric

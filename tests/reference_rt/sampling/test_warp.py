@@ -6,9 +6,9 @@ from decimal import Decimal, getcontext
 import numpy as np
 import pytest
 from builders import U
-from chi_square import SPHERE, Chart, chi_square, sidak
 from scipy.special import ndtri
 
+from comparisons.statistics.chi_square import SPHERE, Chart, chi_square, sidak
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.sampling.warp import (
     about_normal,

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 from builders import U
-from chi_square import UNIT_SQUARE, chi_square, sidak
 
+from comparisons.statistics.chi_square import UNIT_SQUARE, chi_square, sidak
 from reference_rt.core import transform
 from reference_rt.core.ray import SurfacePoint
 from reference_rt.core.vec3 import row

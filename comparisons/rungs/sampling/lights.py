@@ -1,4 +1,4 @@
-"""The rung of light samples: how often our sampler picks each light, and where on it, is what its
+"""Light samples: how often our sampler picks each light, and where on it, is what its
 densities say.
 
 There is no chance in it and no second renderer: the interval of numbers that pick a light is found
@@ -48,7 +48,7 @@ AHEAD = 1e-6
 end; as a fraction of its distance."""
 
 
-def sampling(scene: Scene, tables: SceneTables) -> RungResult:
+def check(scene: Scene, tables: SceneTables) -> RungResult:
     """Compare the picks, positions and densities of light samples at points of surfaces."""
     most = 4 * POINTS
     rays = mixed_rays(scene, tables, ShapeSizes(scene), most, seed=3)

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from chi_square import SPHERE, UNIT_SQUARE, chi_square, integrate
+
+from comparisons.statistics.chi_square import SPHERE, UNIT_SQUARE, chi_square, integrate
 
 
 def lobe(width):

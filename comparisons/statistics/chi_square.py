@@ -67,6 +67,7 @@ def chi_square(
     chart: Chart = SPHERE,
     cells: int = 128,
     tolerance: float = 1e-7,
+    points: int = 8,
 ) -> Fit:
     """Whether samples (n, k) have this density.  Rows of NaN are samples that failed: where there
     are some the density integrates to less than 1.
@@ -75,13 +76,17 @@ def chi_square(
     others are counted in cells of about 1/`cells` of the probability each.  Boxes of the quadrature
     are right to about `tolerance`; what it can overlook is where so little of the density is that
     no sample fell on it, the share of a few samples, which chi-square cannot see either.
+
+    points: of the quadrature, along either side of a box.
+    Raises ArithmeticError for a density that does not settle.
     """
     pilots, n = len(samples) // 10, len(samples)
-    is_kept = np.isfinite(samples).all(axis=1)
+    is_kept = np.asarray(np.isfinite(samples).all(axis=1))
     kept = samples[is_kept]
     outside = int(np.count_nonzero(density(kept) <= 0.0))
+    rule = gauss_legendre(points)
     probability, count = _cells(
-        density, chart, 1.0 / cells, tolerance, kept, int(is_kept[:pilots].sum())
+        density, chart, 1.0 / cells, tolerance, kept, int(is_kept[:pilots].sum()), rule
     )
     integral = float(probability.sum())
     # What is missing to 1 belongs to the failed.
@@ -99,7 +104,8 @@ def integrate(
     """The integral of a function that is at least 0, by the same quadrature: right to a few times
     `tolerance` where it is smooth, and the share of a few hints where it is not.  hints (n, k):
     points that are dense where it is peaked."""
-    return float(_cells(function, chart, math.inf, tolerance, hints, 0)[0].sum())
+    rule = gauss_legendre(8)
+    return float(_cells(function, chart, math.inf, tolerance, hints, 0, rule)[0].sum())
 
 
 def sidak(cases: int, family: float = FAMILY) -> float:
@@ -119,8 +125,19 @@ def _pooled(expected: FloatArray, observed: IntArray) -> tuple[FloatArray, IntAr
     )
 
 
-_NODES, _WEIGHTS = (0.5 * x for x in np.polynomial.legendre.leggauss(8))
-_NODES = _NODES + 0.5
+class Rule(NamedTuple):
+    """A quadrature of the unit square: nodes (n, 2) and weights (n,)."""
+
+    nodes: FloatArray
+    weights: FloatArray
+
+
+def gauss_legendre(points: int) -> Rule:
+    """points x points nodes: exact for polynomials of degrees up to 2 points - 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(points)
+    grid = np.stack(np.meshgrid(0.5 + 0.5 * nodes, 0.5 + 0.5 * nodes, indexing="ij"), axis=-1)
+    return Rule(grid.reshape(-1, 2), 0.25 * np.outer(weights, weights).reshape(-1))
+
 
 _SLENDER = 8.0
 
@@ -128,14 +145,13 @@ _START = (8, 16)
 """Rectangles to begin with: an even number, so that the equator is an edge."""
 
 
-def _quadrature(density: Density, chart: Chart, boxes: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Gauss-Legendre, 8 x 8 points, over boxes (n, 2, 2): corner, size.  The integrals, and the
-    greatest values met."""
-    grid = np.stack(np.meshgrid(_NODES, _NODES, indexing="ij"), axis=-1).reshape(-1, 2)
-    weights = np.outer(_WEIGHTS, _WEIGHTS).reshape(-1)
-    at = boxes[:, None, 0] + grid * boxes[:, None, 1]
+def _quadrature(
+    density: Density, chart: Chart, boxes: FloatArray, rule: Rule
+) -> tuple[FloatArray, FloatArray]:
+    """Over boxes (n, 2, 2): corner, size.  The integrals, and the greatest values met."""
+    at = boxes[:, None, 0] + rule.nodes * boxes[:, None, 1]
     values = density(chart.points(at.reshape(-1, 2))).reshape(len(boxes), -1)
-    return boxes[:, 1].prod(axis=1) * (values @ weights), values.max(axis=1)
+    return boxes[:, 1].prod(axis=1) * (values @ rule.weights), values.max(axis=1)
 
 
 def _half(boxes: FloatArray, axis: IntArray, side: int) -> FloatArray:
@@ -167,8 +183,9 @@ def _start(chart: Chart) -> FloatArray:
 
 
 def _cells(
-    density: Density, chart: Chart, share: float, tolerance: float, samples: FloatArray, pilots: int
-) -> tuple[FloatArray, IntArray]:
+    density: Density, chart: Chart, share: float, tolerance: float, samples: FloatArray,
+    pilots: int, rule: Rule,
+) -> tuple[FloatArray, IntArray]:  # fmt: skip
     """Cells with at most about `share` of the density and of the pilots, the first of the samples,
     each: their integrals, and how many of the other samples are in each.
 
@@ -189,15 +206,12 @@ def _cells(
     for _ in range(100):
         if len(boxes) == 0:
             return sums, counts
-        whole, _ = _quadrature(density, chart, boxes)
-        halves = [
-            [
-                _quadrature(density, chart, _half(boxes, np.full(len(boxes), axis), k))
-                for k in (0, 1)
-            ]
-            for axis in (0, 1)
-        ]
-        halved, highest = np.moveaxis(np.array(halves), 2, 0)
+        # The box itself, and its halves across either axis, in one call of the density.
+        axes = (np.full(len(boxes), axis) for axis in (0, 0, 1, 1))
+        parts = [_half(boxes, axis, k % 2) for k, axis in enumerate(axes)]
+        values, tops = _quadrature(density, chart, np.concatenate([boxes, *parts]), rule)
+        whole, halved = values[: len(boxes)], values[len(boxes) :].reshape(2, 2, -1)
+        highest = tops[len(boxes) :].reshape(2, 2, -1)
         change = np.abs(halved.sum(axis=1) - whole)
         sides = _sides(chart, boxes)
         is_compact = sides.max(axis=0) <= _SLENDER * sides.min(axis=0)
@@ -231,4 +245,4 @@ def _cells(
         is_upper = where[active, axis[own]] >= upper[own, 0, axis[own]]
         box[active] += len(boxes) * is_upper
         boxes = np.concatenate([_half(boxes, axis, 0), upper])
-    raise AssertionError("the density does not settle: is it bounded?")
+    raise ArithmeticError("the density does not settle: is it bounded?")
