@@ -8,6 +8,7 @@ import pytest
 import reference_rt as rt
 from comparisons.cycles.surfaces import placed_arrays, triangles_of
 from comparisons.geometry import affine
+from comparisons.materials import type_of as type_of_material
 from comparisons.renderers import NoCounterpartError
 from comparisons.shapes import type_of
 from comparisons.shapes.fine import FINE
@@ -85,3 +86,11 @@ def test_volumes(shape, volume):
 def test_others_do_not_vote(shape):
     with pytest.raises(NoCounterpartError, match=shape.type):
         triangles_of(shape, Path())
+
+
+def test_cycles_squares_the_roughness_of_metals() -> None:
+    """Its microfacets have alpha = roughness² (Cycles' manual, "Metallic BSDF")."""
+    alpha = 0.04
+    metal = rt.RoughConductor(eta=0.2, k=3.0, alpha=(alpha, alpha))
+    shader = type_of_material(metal).to_cycles(metal, None)
+    assert shader["front"]["roughness"] == pytest.approx(0.2, rel=1e-15)
