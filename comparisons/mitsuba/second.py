@@ -233,6 +233,8 @@ def _by_trimesh(path: Path) -> Corners:
     content, is_gltf = path.read_bytes(), path.suffix.lower() in (".gltf", ".glb")
     if is_gltf and b'"sparse"' in content:
         raise ValueError("trimesh ignores sparse accessors")
+    if is_gltf and (b"_draco_" in content or b"_meshopt_" in content):
+        raise ValueError("trimesh has the decoders that ours has, or none")
     scene = trimesh.load(path, process=False, force="scene")
     columns: dict[str, list[Any]] = {"points": [], "normals": [], "uv": []}
     for node in scene.graph.nodes_geometry:

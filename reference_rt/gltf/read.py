@@ -23,6 +23,7 @@ from reference_rt.scene.model import SceneModel
 from reference_rt.shapes import Mesh
 from reference_rt.shapes.csg import AnyShape
 from reference_rt.shapes.instances import Instance
+from reference_rt.shapes.meshes.files.data import NotRead
 from reference_rt.shapes.meshes.files.gltf import GltfFile, local_map, open_glb
 from reference_rt.util.errors import SceneError, SceneWarning
 from reference_rt.util.files import read_input
@@ -38,6 +39,9 @@ MOST_COPIES = 1 << 20
 LARGEST_LAMP = 1 << 20
 """Triangles up to which an emissive mesh is repeated for each node that shows it: light sampling
 covers no instances."""
+
+MOST_NAMES = 12
+"""Extensions that one line names."""
 
 _OPTIONS = ("camera", "environment", "scene")
 
@@ -69,6 +73,8 @@ def read_file(
             raise SceneError(error.message, error.path, str(path), others=error.others) from None
         except MemoryError:
             raise SceneError("does not fit into memory", file=str(path)) from None
+        except NotRead as error:
+            raise SceneError(f"cannot be read: {error}", file=str(path)) from None
         except Exception as error:
             # Accessors, views and buffers have no schema: any error of reading them means that the
             # file is malformed.
@@ -114,8 +120,16 @@ def _opened(path: Path) -> Reading:
         shown = json.dumps(required[0][:60])
         raise SceneError(f"requires the extension {shown}, which is unknown; expected {known}")
     reading = Reading(path, document, file)
-    for name in sorted(_extensions(file.root) - READ - HARMLESS):
-        reading.lack(f"uses the extension {json.dumps(name[:60])}, which is unknown")
+    unknown = sorted(_extensions(file.root) - READ - HARMLESS)
+    for name in unknown:
+        if name.startswith("KHR_"):
+            reading.lack(f"uses the extension {json.dumps(name[:60])}, which is unknown")
+    if vendors := [json.dumps(name[:60]) for name in unknown if not name.startswith("KHR_")]:
+        more = f" and {len(vendors) - MOST_NAMES} more" if len(vendors) > MOST_NAMES else ""
+        reading.note(
+            "extensions of vendors that the file does not require are left out: "
+            f"{', '.join(vendors[:MOST_NAMES])}{more}"
+        )
     if document.animations:
         reading.note("animations are ignored: nodes are where the file puts them")
     return reading

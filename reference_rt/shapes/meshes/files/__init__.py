@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from reference_rt.shapes.meshes.files import gltf, obj, other, ply
-from reference_rt.shapes.meshes.files.data import MeshData, RawMesh, checked
+from reference_rt.shapes.meshes.files.data import MeshData, NotRead, RawMesh, checked
 from reference_rt.util.files import read_input
 
 __all__ = ["MeshData", "read_mesh"]
@@ -64,6 +64,8 @@ def _parsed(path: Path, reader: Reader, content: bytes) -> RawMesh:
         return reader(content, path.parent)
     except MemoryError:
         raise ValueError(f"mesh {path}: it does not fit into memory") from None
+    except NotRead as error:
+        raise ValueError(f"mesh {path} cannot be read: {error}") from None
     except Exception as error:
         # Any error of parsing, also one raised inside a library, means a malformed file.
         detail = (str(error).splitlines() or [""])[0][:200]
