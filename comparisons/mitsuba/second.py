@@ -1,4 +1,4 @@
-"""Meshes and images by other readers than ours: Mitsuba's own loaders, and trimesh.
+"""Meshes and images by other readers than ours: Mitsuba's own loaders, trimesh and lib3mf.
 
 The rung `files` holds our tables against them, and the counterpart is made from them: a mesh that
 we read 5 % too large is then too large in one renderer only.
@@ -177,6 +177,8 @@ def _read(path: Path, modified: int) -> Corners | None:
 
 def _by_mitsuba(path: Path) -> Corners:
     mi, kind = mitsuba(), path.suffix[1:].lower()
+    if kind == "ply" and _has_texcoord(path):
+        raise ValueError("Mitsuba ignores texture coordinates of corners")
     own = {"flip_tex_coords": False} if kind == "obj" else {}
     mesh = mi.load_dict({"type": kind, "filename": str(path), **own})
     values = mi.traverse(mesh)
@@ -224,6 +226,11 @@ def _has_normals(path: Path) -> bool:
     return b" nx\n" in content[: content.find(b"end_header")].replace(b"\r", b"\n")
 
 
+def _has_texcoord(path: Path) -> bool:
+    """Whether a .ply file has texture coordinates of the corners of its faces."""
+    return b" texcoord" in path.read_bytes()[:_HEADER].partition(b"end_header")[0]
+
+
 TRIMESH = "trimesh"
 
 
@@ -257,13 +264,64 @@ def _by_trimesh(path: Path) -> Corners:
         elif said or not is_gltf:
             # trimesh makes normals where a file has none, and drops uv without a material.
             silent.append(name)
+    if path.suffix.lower() == ".ply" and _has_texcoord(path):
+        (mesh,) = scene.geometry.values()
+        columns_of_faces = mesh.metadata["_ply_raw"]["face"]["data"]
+        found = columns_of_faces["texcoord"]
+        found = found if isinstance(columns_of_faces, dict) else found["f1"]
+        arrays["uv"] = np.reshape(np.asarray(found, np.float64), (-1, 3, 2))
+        silent.remove("uv")
     return Corners(**arrays, source=TRIMESH, silent=tuple(silent))
+
+
+def _by_lib3mf(path: Path) -> Corners:
+    """Items and components of a .3mf file, in millimetres, by the library of the 3MF Consortium."""
+    import lib3mf
+
+    model = lib3mf.get_wrapper().CreateModel()
+    model.QueryReader("3mf").ReadFromFile(str(path))
+    parts: list[FloatArray] = []
+
+    def add(part: Any, outer: FloatArray) -> None:
+        if part.IsMeshObject():
+            points = np.array([[*p.Coordinates] for p in part.GetVertices()]).reshape(-1, 3)
+            faces = np.array([[*f.Indices] for f in part.GetTriangleIndices()], np.int64)
+            parts.append((points @ outer[:3] + outer[3])[faces.reshape(-1, 3)])
+        for k in range(part.GetComponentCount() if part.IsComponentsObject() else 0):
+            one = part.GetComponent(k)
+            inner = _rows_of(one.GetTransform()) if one.HasTransform() else np.eye(4, 3)
+            add(one.GetObjectResource(), inner @ outer[:3] + np.eye(4)[:, 3:] * outer[3])
+
+    items = model.GetBuildItems()
+    while items.MoveNext():
+        item = items.GetCurrent()
+        place = _rows_of(item.GetObjectTransform()) if item.HasObjectTransform() else np.eye(4, 3)
+        add(item.GetObjectResource(), place)
+    unit = _MILLIMETRES[model.GetUnit().name]
+    silent = ("normals", "uv", "colours")
+    return Corners(unit * np.concatenate(parts), source="lib3mf", silent=silent)
+
+
+_MILLIMETRES = {
+    "MicroMeter": 0.001,
+    "MilliMeter": 1.0,
+    "CentiMeter": 10.0,
+    "Inch": 25.4,
+    "Foot": 304.8,
+    "Meter": 1000.0,
+}
+
+
+def _rows_of(transform: Any) -> FloatArray:
+    """(4, 3): a map of rows on its left, the last row its translation."""
+    return np.array([[*row] for row in transform.Fields], np.float64)
 
 
 READERS: dict[str, tuple[Callable[[Path], Corners], ...]] = {
     ".obj": (_by_mitsuba, _by_trimesh),
     ".ply": (_by_mitsuba, _by_trimesh),  # Mitsuba refuses polygons
     **dict.fromkeys((".stl", ".off", ".gltf", ".glb"), (_by_trimesh,)),
+    ".3mf": (_by_lib3mf,),
 }
 """The second readers of each format: never the library that ours reads it with."""
 

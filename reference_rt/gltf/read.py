@@ -23,7 +23,7 @@ from reference_rt.scene.model import SceneModel
 from reference_rt.shapes import Mesh
 from reference_rt.shapes.csg import AnyShape
 from reference_rt.shapes.instances import Instance
-from reference_rt.shapes.meshes.files.data import NotRead
+from reference_rt.shapes.meshes.files.data import NotReadError
 from reference_rt.shapes.meshes.files.gltf import GltfFile, local_map, open_glb
 from reference_rt.util.errors import SceneError, SceneWarning
 from reference_rt.util.files import read_input
@@ -73,7 +73,7 @@ def read_file(
             raise SceneError(error.message, error.path, str(path), others=error.others) from None
         except MemoryError:
             raise SceneError("does not fit into memory", file=str(path)) from None
-        except NotRead as error:
+        except NotReadError as error:
             raise SceneError(f"cannot be read: {error}", file=str(path)) from None
         except Exception as error:
             # Accessors, views and buffers have no schema: any error of reading them means that the

@@ -165,14 +165,14 @@ def changed(change, form="gltf"):
     return getattr(file, form)()
 
 
-def model_3mf(folder, vertices, faces):
+def model_3mf(folder, vertices, faces, unit="millimeter"):
     space = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
     points = "".join('<vertex x="{}" y="{}" z="{}"/>'.format(*v) for v in vertices)
     corners_ = "".join('<triangle v1="{}" v2="{}" v3="{}"/>'.format(*f) for f in faces)
     with zipfile.ZipFile(folder / "a.3mf", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(
             "3D/3dmodel.model",
-            f'<?xml version="1.0"?><model xmlns="{space}"><resources><object id="1"><mesh>'
+            f'<?xml version="1.0"?><model unit="{unit}" xmlns="{space}"><resources><object id="1"><mesh>'
             f"<vertices>{points}</vertices><triangles>{corners_}</triangles></mesh></object>"
             '</resources><build><item objectid="1" transform="1 0 0 0 1 0 0 0 1 9 0 0"/></build>'
             "</model>",

@@ -14,7 +14,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.diagnosis import FieldError
 
 
-class NotRead(ValueError):
+class NotReadError(ValueError):
     """A file may be sound, but is not read; the text says why, and what was expected."""
 
 

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from reference_rt.core import transform
 from reference_rt.core.arrays import IntArray
 from reference_rt.shapes.meshes.files import gltf_compression as compression
-from reference_rt.shapes.meshes.files.data import NotRead, RawMesh, joined
+from reference_rt.shapes.meshes.files.data import NotReadError, RawMesh, joined
 from reference_rt.shapes.meshes.files.polygons import fans
 from reference_rt.util.files import read_input
 from reference_rt.util.memory import check_unpacked
@@ -81,10 +81,10 @@ def open_glb(content: bytes, folder: Path) -> "GltfFile":
 def _joined(file: "GltfFile") -> RawMesh:
     version = str(file.root.get("asset", {}).get("version", "2.0"))[:20]
     if version.partition(".")[0] != "2":
-        raise NotRead(f"it has version {version!r} of glTF; expected 2.0")
+        raise NotReadError(f"it has version {version!r} of glTF; expected 2.0")
     for name in file.root.get("extensionsRequired", []):
         if not str(name).startswith(_HARMLESS):
-            raise NotRead(
+            raise NotReadError(
                 f"it requires the extension {str(name)[:60]!r}, which is unknown; expected one "
                 "that does not change the shape"
             )

@@ -4,14 +4,13 @@ EXT_meshopt_compression, and KHR_meshopt_compression of the same form, by meshop
 Both are in the extra `gltf`.  Where one is missing the message names the extension and the extra.
 """
 
-from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from reference_rt.core.arrays import IntArray
-from reference_rt.shapes.meshes.files.data import NotRead
+from reference_rt.shapes.meshes.files.data import NotReadError
 from reference_rt.util.memory import check_unpacked
 
 DRACO = "KHR_draco_mesh_compression"
@@ -30,9 +29,12 @@ class DracoMesh(NamedTuple):
 
 def draco(data: bytes) -> DracoMesh:
     """A mesh that Draco compressed.  Raises ValueError."""
-    library = _library("DracoPy", DRACO)
     try:
-        found = library.decode(data)
+        import DracoPy
+    except ImportError:
+        raise _missing("DracoPy", DRACO) from None
+    try:
+        found = DracoPy.decode(data)
     except Exception as error:  # the library's own classes
         raise ValueError(f"its data of {DRACO} are damaged: {error}") from None
     if not hasattr(found, "faces"):
@@ -53,15 +55,15 @@ def meshopt(data: bytes, part: dict[str, Any], extension: str, name: str) -> byt
     if type(count) is not int or type(size) is not int or not (count > 0 and 0 < size <= 256):
         raise ValueError(f"{name} has {str(count)[:20]} rows of {str(size)[:20]} bytes")
     check_unpacked(len(data), count * size, name)
-    library = _library("meshopt", extension)
-    return np.asarray(library.decode_gltf_buffer(data, count, size, mode, decode)).tobytes()
-
-
-def _library(name: str, extension: str) -> Any:
     try:
-        return import_module(name)
+        from meshopt import decode_gltf_buffer
     except ImportError:
-        raise NotRead(
-            f"its data are compressed by {extension}, which {name} reads; expected: "
-            "pip install 'reference-rt[gltf]'"
-        ) from None
+        raise _missing("meshopt", extension) from None
+    return np.asarray(decode_gltf_buffer(data, count, size, mode, decode)).tobytes()
+
+
+def _missing(library: str, extension: str) -> NotReadError:
+    return NotReadError(
+        f"its data are compressed by {extension}, which {library} reads; expected: "
+        "pip install 'reference-rt[gltf]'"
+    )
