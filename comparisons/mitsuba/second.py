@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from comparisons.mitsuba.backend import mitsuba
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.image_files import open_image
+from reference_rt.core.image_files.exr import ExrFile
 from reference_rt.shapes import Mesh, Triangle
 from reference_rt.shapes.meshes.topology import smooth_normals
 from reference_rt.textures.image_file import COLOURS
@@ -355,11 +356,14 @@ def _in_order(theirs: Corners, ours: Corners) -> Corners:
 def image(path: Path, encoding: str, layer: str, channel: str = "all") -> FloatArray | None:
     """An image (h, w, 3) as Mitsuba reads it, in linear values, `encoding`, `layer` and `channel`
     as of `Bitmap`; None where it does not, or reads something else."""
+    opened = open_image(path)
+    # Mitsuba reads no deep pixels, and takes samples of chroma for those of the pixels' middles.
     if (
         layer
         or channel == "alpha"
         or encoding == "radiance"
-        or getattr(open_image(path), "gamma", None) is not None
+        or getattr(opened, "gamma", None) is not None
+        or (isinstance(opened, ExrFile) and (opened.is_deep or opened.chromaticities))
     ):
         return None
     mi = mitsuba()

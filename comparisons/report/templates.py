@@ -9,7 +9,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Te
 
 from comparisons.report.values import flip, label, rows_of, shown, soft, typeset
 from reference_rt.util.errors import UsageError, printable
-from reference_rt.util.files import not_utf8, check_writable, read_text, replacing
+from reference_rt.util.files import check_writable, not_utf8, read_text, replacing
 
 # Replaces a marker block of a text file: what is between `<!-- NAME -->` and `<!-- end -->`.
 

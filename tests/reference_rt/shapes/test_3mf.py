@@ -112,7 +112,7 @@ def test_parts_of_an_archive(tmp_path):
     root = model_text(
         f'{OBJECT}<object id="2"><components><component objectid="1"/>'
         '<component p:path="/3D/Other/part.MODEL" objectid="2"/></components></object>',
-        f'<item objectid="2"/><item objectid="1" p:path="/3D/Other/part.model"/>',
+        '<item objectid="2"/><item objectid="1" p:path="/3D/Other/part.model"/>',
         'requiredextensions="p"',
     )
     relationships = (
