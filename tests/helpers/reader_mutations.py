@@ -100,7 +100,9 @@ def damage(rng, name, content):
     if name == "text.3mf":
         return rezipped(rng, content, count)
     if name.endswith(".gltf") and rng.random() < 0.6:
-        return json.dumps(with_structure(rng, json.loads(content), count)).encode("utf-8", "replace")
+        return json.dumps(with_structure(rng, json.loads(content), count)).encode(
+            "utf-8", "replace"
+        )
     if name.endswith(".glb") and rng.random() < 0.6:
         return rebuilt(rng, content, count)
     return damaged(rng, content, count)
@@ -136,8 +138,9 @@ def rebuilt(rng, content, count):
 def read(path):
     """By the reader of its suffix, and as a scene where it is one.  Returns how often it was
     read."""
-    import reference_rt as rt
     from mesh_writers import check
+
+    import reference_rt as rt
     from reference_rt.shapes.meshes.files import read_mesh
     from reference_rt.textures.image_file import read_image, read_texels
 
