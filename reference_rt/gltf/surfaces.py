@@ -74,8 +74,8 @@ class Reading:
 
 class Surface(NamedTuple):
     """name: of our material;  emits: whether it is a lamp;  is_bright: one of more than 1, which is
-    meant to light others;  is_clear: whether opacity is less than 1 anywhere;  tilt: the name of its
-    normal map, None for none."""
+    meant to light others;  is_clear: whether opacity is less than 1 anywhere;  tilt: the name of
+    its normal map, None for none."""
 
     name: str
     emits: bool
