@@ -356,14 +356,12 @@ def _in_order(theirs: Corners, ours: Corners) -> Corners:
 def image(path: Path, encoding: str, layer: str, channel: str = "all") -> FloatArray | None:
     """An image (h, w, 3) as Mitsuba reads it, in linear values, `encoding`, `layer` and `channel`
     as of `Bitmap`; None where it does not, or reads something else."""
+    if layer or channel == "alpha" or encoding == "radiance":
+        return None
     opened = open_image(path)
     # Mitsuba reads no deep pixels, and takes samples of chroma for those of the pixels' middles.
-    if (
-        layer
-        or channel == "alpha"
-        or encoding == "radiance"
-        or getattr(opened, "gamma", None) is not None
-        or (isinstance(opened, ExrFile) and (opened.is_deep or opened.chromaticities))
+    if getattr(opened, "gamma", None) is not None or (
+        isinstance(opened, ExrFile) and (opened.is_deep or opened.chromaticities)
     ):
         return None
     mi = mitsuba()
@@ -384,6 +382,13 @@ def image(path: Path, encoding: str, layer: str, channel: str = "all") -> FloatA
     if channel == "all":
         return values
     return np.repeat(values[..., COLOURS.index(channel), None], 3, axis=2)
+
+
+def reads_image(path: Path, encoding: str, layer: str) -> bool:
+    """Whether Mitsuba reads of an image what we do, or it is none, which is said elsewhere."""
+    with suppress(OSError, ValueError):
+        return image(path, encoding, layer) is not None
+    return True
 
 
 def _decoded(encoded: FloatArray) -> FloatArray:
