@@ -213,6 +213,7 @@ class _Reader:
         self.model = _Model(1.0, {}, [], {})
         self.prefixes: dict[str, str] = {}
         self.above: list[str] = []
+        self.object = _Object(array("d"), array("q"), [])  # the one that is being read
         self.core = ""
 
     def read(self, content: bytes, name: str) -> _Model:
