@@ -58,6 +58,7 @@ def sound(folder):
     found["archive.3mf"] = found["text.3mf"] = archive.read_bytes()
     found["scene.glb"], found["scene.gltf"] = full_scene().glb(), full_scene().gltf()
     found["plain.gltf"] = plain().gltf()
+    found["two_sets.glb"] = two_sets().glb()
     for k, how in enumerate(({"preserve_order": True}, {"compression_level": 10}, {})):
         found[f"draco{k}.glb"] = by_draco(**how).glb()
     for k, name in enumerate(("EXT_meshopt_compression", "KHR_meshopt_compression")):
@@ -89,6 +90,18 @@ def sound(folder):
                          "faces": [[0, 1, 2]]}]}  # fmt: skip
     found["scene.yaml"] = found["scene.json"] = json.dumps(scene).encode()
     return found
+
+
+def two_sets():
+    """A scene whose material has textures by two sets of texture coordinates."""
+    from gltf_scenes import UV, GltfScene
+
+    file = GltfScene(emissiveFactor=[1, 1, 1])
+    texture = file.texture()
+    file.primitive["attributes"]["TEXCOORD_1"] = file.add((2.0 * UV[:, ::-1]).astype(np.float32))
+    file.material["pbrMetallicRoughness"] = {"baseColorTexture": {"index": texture}}
+    file.material["emissiveTexture"] = {"index": texture, "texCoord": 1}
+    return file
 
 
 IMAGES = (".png", ".exr", ".hdr", ".pfm", ".npy", ".tif", ".jpg", ".webp", ".bmp", ".tga", ".ppm")

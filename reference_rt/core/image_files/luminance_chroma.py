@@ -3,9 +3,9 @@ of every second one in both directions (Technical Introduction to OpenEXR, "Lumi
 images").
 
 Between its samples chroma is a half-band filter of 14 of them along each axis, with the weights
-that OpenEXR's own reader (`RgbaInputFile`) has; beyond the border the last sample repeats.  A
-smooth picture comes back to 0.1 %.  That reader's cure of saturated pixels is left out.  Where the
-filter overshoots, colours below 0 become 0.
+that the reader of OpenEXR itself has; beyond the border the last sample repeats.  A smooth picture
+comes back to 0.1 %.  That reader's cure of saturated pixels is left out.  Where the filter
+overshoots, colours below 0 become 0.
 """
 
 from collections.abc import Sequence
