@@ -109,6 +109,8 @@ def _picture(image: ImageFile) -> Picture:
     if isinstance(image, ExrFile) and (found := _chromaticities(image.path, image.part)):
         radiance = radiance @ conversion(found, SRGB).T
         note = f"{image.path}: its header names other primaries than sRGB's, and was heeded"
+    if image.note:
+        note = "; ".join([*([note] if note else []), f"{image.path} {image.note}"])
     quantised = image.bits == 8
     return Picture(
         radiance,

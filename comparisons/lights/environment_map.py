@@ -24,7 +24,7 @@ from comparisons.mitsuba.context import TranslationContext, transform_steps
 from comparisons.mitsuba.files import Files
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.parse import as_transform
-from comparisons.mitsuba.second import described_image
+from comparisons.mitsuba.second import described_image, reads_image
 from reference_rt.core.transform import is_similarity
 from reference_rt.lights import EnvironmentMap
 from reference_rt.textures.image_file import read_image
@@ -48,8 +48,9 @@ def _to_mitsuba(light: EnvironmentMap, context: TranslationContext) -> Data:
 
 def _in_file(light: EnvironmentMap, context: TranslationContext, files: Files) -> Data:
     found: Data = {"type": "envmap", "scale": light.scale}
-    if light.encoding == "radiance":
-        texels = read_image(context.folder / light.file, "radiance")
+    path = context.folder / light.file
+    if not reads_image(path, light.encoding, light.layer):
+        texels = read_image(path, light.encoding, layer=light.layer)
         found |= context.image(Path(light.file).stem, texels)
     else:
         number = files.scene.lights.index(light)

@@ -1,4 +1,4 @@
-"""Meshes and images by other readers than ours: Mitsuba's own loaders, and trimesh.
+"""Meshes and images by other readers than ours: Mitsuba's own loaders, trimesh and lib3mf.
 
 The rung `files` holds our tables against them, and the counterpart is made from them: a mesh that
 we read 5 % too large is then too large in one renderer only.
@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from comparisons.mitsuba.backend import mitsuba
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.image_files import open_image
+from reference_rt.core.image_files.exr import ExrFile
 from reference_rt.shapes import Mesh, Triangle
 from reference_rt.shapes.meshes.topology import smooth_normals
 from reference_rt.textures.image_file import COLOURS
@@ -177,6 +178,8 @@ def _read(path: Path, modified: int) -> Corners | None:
 
 def _by_mitsuba(path: Path) -> Corners:
     mi, kind = mitsuba(), path.suffix[1:].lower()
+    if kind == "ply" and _has_texcoord(path):
+        raise ValueError("Mitsuba ignores texture coordinates of corners")
     own = {"flip_tex_coords": False} if kind == "obj" else {}
     mesh = mi.load_dict({"type": kind, "filename": str(path), **own})
     values = mi.traverse(mesh)
@@ -224,6 +227,11 @@ def _has_normals(path: Path) -> bool:
     return b" nx\n" in content[: content.find(b"end_header")].replace(b"\r", b"\n")
 
 
+def _has_texcoord(path: Path) -> bool:
+    """Whether a .ply file has texture coordinates of the corners of its faces."""
+    return b" texcoord" in path.read_bytes()[:_HEADER].partition(b"end_header")[0]
+
+
 TRIMESH = "trimesh"
 
 
@@ -233,6 +241,8 @@ def _by_trimesh(path: Path) -> Corners:
     content, is_gltf = path.read_bytes(), path.suffix.lower() in (".gltf", ".glb")
     if is_gltf and b'"sparse"' in content:
         raise ValueError("trimesh ignores sparse accessors")
+    if is_gltf and (b"_draco_" in content or b"_meshopt_" in content):
+        raise ValueError("trimesh has the decoders that ours has, or none")
     scene = trimesh.load(path, process=False, force="scene")
     columns: dict[str, list[Any]] = {"points": [], "normals": [], "uv": []}
     for node in scene.graph.nodes_geometry:
@@ -255,13 +265,64 @@ def _by_trimesh(path: Path) -> Corners:
         elif said or not is_gltf:
             # trimesh makes normals where a file has none, and drops uv without a material.
             silent.append(name)
+    if path.suffix.lower() == ".ply" and _has_texcoord(path):
+        (mesh,) = scene.geometry.values()
+        columns_of_faces = mesh.metadata["_ply_raw"]["face"]["data"]
+        found = columns_of_faces["texcoord"]
+        found = found if isinstance(columns_of_faces, dict) else found["f1"]
+        arrays["uv"] = np.reshape(np.asarray(found, np.float64), (-1, 3, 2))
+        silent.remove("uv")
     return Corners(**arrays, source=TRIMESH, silent=tuple(silent))
+
+
+def _by_lib3mf(path: Path) -> Corners:
+    """Items and components of a .3mf file, in millimetres, by the library of the 3MF Consortium."""
+    import lib3mf
+
+    model = lib3mf.get_wrapper().CreateModel()
+    model.QueryReader("3mf").ReadFromFile(str(path))
+    parts: list[FloatArray] = []
+
+    def add(part: Any, outer: FloatArray) -> None:
+        if part.IsMeshObject():
+            points = np.array([[*p.Coordinates] for p in part.GetVertices()]).reshape(-1, 3)
+            faces = np.array([[*f.Indices] for f in part.GetTriangleIndices()], np.int64)
+            parts.append((points @ outer[:3] + outer[3])[faces.reshape(-1, 3)])
+        for k in range(part.GetComponentCount() if part.IsComponentsObject() else 0):
+            one = part.GetComponent(k)
+            inner = _rows_of(one.GetTransform()) if one.HasTransform() else np.eye(4, 3)
+            add(one.GetObjectResource(), inner @ outer[:3] + np.eye(4)[:, 3:] * outer[3])
+
+    items = model.GetBuildItems()
+    while items.MoveNext():
+        item = items.GetCurrent()
+        place = _rows_of(item.GetObjectTransform()) if item.HasObjectTransform() else np.eye(4, 3)
+        add(item.GetObjectResource(), place)
+    unit = _MILLIMETRES[model.GetUnit().name]
+    silent = ("normals", "uv", "colours")
+    return Corners(unit * np.concatenate(parts), source="lib3mf", silent=silent)
+
+
+_MILLIMETRES = {
+    "MicroMeter": 0.001,
+    "MilliMeter": 1.0,
+    "CentiMeter": 10.0,
+    "Inch": 25.4,
+    "Foot": 304.8,
+    "Meter": 1000.0,
+}
+
+
+def _rows_of(transform: Any) -> FloatArray:
+    """(4, 3): a map of rows on its left, the last row its translation."""
+    return np.array([[*row] for row in transform.Fields], np.float64)
 
 
 READERS: dict[str, tuple[Callable[[Path], Corners], ...]] = {
     ".obj": (_by_mitsuba, _by_trimesh),
     ".ply": (_by_mitsuba, _by_trimesh),  # Mitsuba refuses polygons
     **dict.fromkeys((".stl", ".off", ".gltf", ".glb"), (_by_trimesh,)),
+    ".3mf": (_by_lib3mf,),
 }
 """The second readers of each format: never the library that ours reads it with."""
 
@@ -295,11 +356,12 @@ def _in_order(theirs: Corners, ours: Corners) -> Corners:
 def image(path: Path, encoding: str, layer: str, channel: str = "all") -> FloatArray | None:
     """An image (h, w, 3) as Mitsuba reads it, in linear values, `encoding`, `layer` and `channel`
     as of `Bitmap`; None where it does not, or reads something else."""
-    if (
-        layer
-        or channel == "alpha"
-        or encoding == "radiance"
-        or getattr(open_image(path), "gamma", None) is not None
+    if layer or channel == "alpha" or encoding == "radiance":
+        return None
+    opened = open_image(path)
+    # Mitsuba reads no deep pixels, and takes samples of chroma for those of the pixels' middles.
+    if getattr(opened, "gamma", None) is not None or (
+        isinstance(opened, ExrFile) and (opened.is_deep or opened.chromaticities)
     ):
         return None
     mi = mitsuba()
@@ -320,6 +382,13 @@ def image(path: Path, encoding: str, layer: str, channel: str = "all") -> FloatA
     if channel == "all":
         return values
     return np.repeat(values[..., COLOURS.index(channel), None], 3, axis=2)
+
+
+def reads_image(path: Path, encoding: str, layer: str) -> bool:
+    """Whether Mitsuba reads of an image what we do, or it is none, which is said elsewhere."""
+    with suppress(OSError, ValueError):
+        return image(path, encoding, layer) is not None
+    return True
 
 
 def _decoded(encoded: FloatArray) -> FloatArray:

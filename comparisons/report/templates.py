@@ -9,7 +9,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Te
 
 from comparisons.report.values import flip, label, rows_of, shown, soft, typeset
 from reference_rt.util.errors import UsageError, printable
-from reference_rt.util.files import check_writable, read_text, replacing
+from reference_rt.util.files import check_writable, not_utf8, read_text, replacing
 
 # Replaces a marker block of a text file: what is between `<!-- NAME -->` and `<!-- end -->`.
 
@@ -44,8 +44,8 @@ def around(path: Path, name: str) -> tuple[str, str]:
         text = read_text(path)
     except OSError as error:
         raise UsageError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise UsageError(f"{path}: is not text; expected UTF-8") from None
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{path}: {not_utf8(error)}") from None
     before, first, rest = text.partition(begin(name))
     _, end, after = rest.partition(END)
     if not first or not end:

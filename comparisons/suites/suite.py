@@ -18,7 +18,7 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.scene.model import OWN
 from reference_rt.util import yaml_text
 from reference_rt.util.errors import SceneError, SceneWarning, UsageError, printable
-from reference_rt.util.files import read_text
+from reference_rt.util.files import not_utf8, read_text
 from reference_rt.util.yaml_text import line_of
 
 # ---- cases: scenes, changes to them, budgets ----------------------------------------------------
@@ -186,8 +186,8 @@ def load_suite(name: str) -> Source:
         text = read_text(path)
     except OSError as error:
         raise SceneError(f"cannot be read: {error.strerror}", file=name) from None
-    except UnicodeDecodeError:
-        raise SceneError("is not text; expected UTF-8", file=name) from None
+    except UnicodeDecodeError as error:
+        raise SceneError(not_utf8(error), file=name) from None
     return Source(parse_suite(text, name), printable(path.stem), name, name, text)
 
 

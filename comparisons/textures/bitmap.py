@@ -9,7 +9,7 @@ from comparisons.geometry import affine
 from comparisons.mitsuba.context import TranslationContext, UntranslatableError
 from comparisons.mitsuba.files import Files, UnwritableError
 from comparisons.mitsuba.node import Node, Reading
-from comparisons.mitsuba.second import described_image
+from comparisons.mitsuba.second import described_image, reads_image
 from comparisons.renderers import NoCounterpartError
 from comparisons.renderers.vocabulary import (
     LINEAR,
@@ -79,6 +79,8 @@ def _in_file(
     suffix = path.suffix.lower()
     is_integer = suffix in (".png", ".jpg", ".jpeg", ".bmp", ".tga")
     is_plain = suffix in FILES and (texture.scale, texture.channel) == (1.0, "all")
+    if suffix == ".exr":  # of which Mitsuba reads some kinds otherwise, or not at all
+        is_plain = is_plain and reads_image(path, texture.encoding, texture.layer)
     if is_plain and (is_integer or texture.encoding not in ("srgb", "radiance")):
         raw = texture.encoding == "raw" or not is_integer
         return {"filename": files.copy(texture.file, "textures", name, "file"), "raw": raw}

@@ -9,6 +9,8 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic.alias_generators import to_camel
 
+from reference_rt.shapes.meshes.files.gltf_compression import DRACO, MESHOPT
+
 Index = Annotated[int, Field(ge=0)]
 Unit = Annotated[float, Field(ge=0, le=1)]
 NotNegative = Annotated[float, Field(ge=0)]
@@ -236,6 +238,8 @@ class Document(Part):
 
 READ = frozenset(
     (
+        DRACO,
+        *MESHOPT,
         "EXT_mesh_gpu_instancing",
         "EXT_texture_webp",
         "KHR_lights_punctual",

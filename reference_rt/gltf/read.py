@@ -16,13 +16,23 @@ from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.diagnosis import scene_error
 from reference_rt.core.transform import Affine
-from reference_rt.gltf.document import HARMLESS, READ, Document, Instancing, Light, Node
+from reference_rt.gltf.document import (
+    HARMLESS,
+    READ,
+    Document,
+    Instancing,
+    Light,
+    Node,
+    Primitive,
+)
 from reference_rt.gltf.surfaces import Reading, Surfaces
+from reference_rt.gltf.uv_sets import Maps, Piece, pieces
 from reference_rt.lights import AnyLight, Constant, Directional, EnvironmentMap, Point, Spot
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes import Mesh
 from reference_rt.shapes.csg import AnyShape
 from reference_rt.shapes.instances import Instance
+from reference_rt.shapes.meshes.files.data import NotReadError, RawMesh
 from reference_rt.shapes.meshes.files.gltf import GltfFile, local_map, open_glb
 from reference_rt.util.errors import SceneError, SceneWarning
 from reference_rt.util.files import read_input
@@ -38,6 +48,9 @@ MOST_COPIES = 1 << 20
 LARGEST_LAMP = 1 << 20
 """Triangles up to which an emissive mesh is repeated for each node that shows it: light sampling
 covers no instances."""
+
+MOST_NAMES = 12
+"""Extensions that one line names."""
 
 _OPTIONS = ("camera", "environment", "scene")
 
@@ -69,6 +82,8 @@ def read_file(
             raise SceneError(error.message, error.path, str(path), others=error.others) from None
         except MemoryError:
             raise SceneError("does not fit into memory", file=str(path)) from None
+        except NotReadError as error:
+            raise SceneError(f"cannot be read: {error}", file=str(path)) from None
         except Exception as error:
             # Accessors, views and buffers have no schema: any error of reading them means that the
             # file is malformed.
@@ -114,8 +129,16 @@ def _opened(path: Path) -> Reading:
         shown = json.dumps(required[0][:60])
         raise SceneError(f"requires the extension {shown}, which is unknown; expected {known}")
     reading = Reading(path, document, file)
-    for name in sorted(_extensions(file.root) - READ - HARMLESS):
-        reading.lack(f"uses the extension {json.dumps(name[:60])}, which is unknown")
+    unknown = sorted(_extensions(file.root) - READ - HARMLESS)
+    for name in unknown:
+        if name.startswith("KHR_"):
+            reading.lack(f"uses the extension {json.dumps(name[:60])}, which is unknown")
+    if vendors := [json.dumps(name[:60]) for name in unknown if not name.startswith("KHR_")]:
+        more = f" and {len(vendors) - MOST_NAMES} more" if len(vendors) > MOST_NAMES else ""
+        reading.note(
+            "extensions of vendors that the file does not require are left out: "
+            f"{', '.join(vendors[:MOST_NAMES])}{more}"
+        )
     if document.animations:
         reading.note("animations are ignored: nodes are where the file puts them")
     return reading
@@ -249,38 +272,54 @@ class _Shapes:
             if part.mode < 4:
                 self.reading.lack(f"{where} are points or lines; expected triangles")
                 continue
-            surface = self.surfaces.surface(part.material, "COLOR_0" in part.attributes)
-            self.lamps |= {surface.name} if surface.emits else set()
-            self.is_lit = self.is_lit or surface.is_bright
             raw = self.reading.file.root["meshes"][index]["primitives"][k]
-            found = self.reading.file.primitive(raw, surface.uv_set or 0)
+            sets = self.surfaces.uv_sets(part.material)
+            found, *others = (self.reading.file.primitive(raw, n) for n in sets or [0])
+            uv = {n: one.uv for n, one in zip(sets, [found, *others], strict=False)}
+            for n in [n for n, of in uv.items() if of is None]:
+                uv[n] = np.zeros((len(found.vertices), 2))
+                self.reading.note(f"{where} has no TEXCOORD_{n}: its textures show one point")
             if part.targets:
                 self.reading.note("morph targets are ignored")
-            if surface.is_clear and "alpha of COLOR_0" in found.ignored:
-                self.reading.lack(f"{where} has opacities of vertices; expected 1, or OPAQUE")
-            uv = found.uv if surface.uv_set is not None else None
-            if surface.uv_set is not None and uv is None:
-                uv = np.zeros((len(found.vertices), 2))
-                self.reading.note(
-                    f"{where} has no TEXCOORD_{surface.uv_set}: its textures show one point"
-                )
-            colours = None if found.colours is None else np.clip(found.colours, 0.0, 1.0)
-            try:
-                made = Mesh(
-                    vertices=found.vertices,
-                    faces=found.faces,
-                    normals=found.normals,
-                    uv=uv,
-                    colours=colours,
-                    material=surface.name,
-                )
-            except SceneError as error:
-                raise self.reading.error(f"{where}: {error}") from None
-            if surface.tilt is not None and made.uv is not None:
-                self.tilts[surface.name] = surface.tilt
-                if _is_mirrored(made.uv[made.faces]):
-                    self.mirrored.add(surface.tilt)
-            yield made
+            cut = [Piece(np.arange(len(found.faces)), ())]
+            if len(sets) > 1 and _is_whole(found):
+                at_corners = [np.asarray(uv[n], np.float64)[found.faces] for n in sets]
+                cut = pieces(at_corners[0], dict(zip(sets[1:], at_corners[1:], strict=True))) or cut
+            for piece in cut:
+                own = found if len(cut) == 1 else found._replace(faces=found.faces[piece.faces])
+                yield self._piece(part, own, uv[sets[0]] if sets else None, piece.maps, where)
+
+    def _piece(
+        self, part: Primitive, found: RawMesh, uv: FloatArray | None, maps: Maps, where: str
+    ) -> Mesh:
+        surface = self.surfaces.surface(part.material, "COLOR_0" in part.attributes, maps)
+        self.lamps |= {surface.name} if surface.emits else set()
+        self.is_lit = self.is_lit or surface.is_bright
+        if surface.is_clear and "alpha of COLOR_0" in found.ignored:
+            self.reading.lack(f"{where} has opacities of vertices; expected 1, or OPAQUE")
+        colours = None if found.colours is None else np.clip(found.colours, 0.0, 1.0)
+        try:
+            made = Mesh(
+                vertices=found.vertices,
+                faces=found.faces,
+                normals=found.normals,
+                uv=uv,
+                colours=colours,
+                material=surface.name,
+            )
+        except SceneError as error:
+            raise self.reading.error(f"{where}: {error}") from None
+        if surface.tilt is not None and made.uv is not None:
+            self.tilts[surface.name] = surface.tilt
+            if _is_mirrored(made.uv[made.faces]):
+                self.mirrored.add(surface.tilt)
+        return made
+
+
+def _is_whole(mesh: RawMesh) -> bool:
+    """Whether all corners are vertices; otherwise the mesh is an error, which its checks say."""
+    faces = mesh.faces
+    return len(faces) > 0 and bool((faces >= 0).all() and (faces < len(mesh.vertices)).all())
 
 
 def _is_mirrored(uv: FloatArray) -> bool:

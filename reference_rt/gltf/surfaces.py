@@ -15,6 +15,7 @@ import platformdirs
 
 from reference_rt.core.image_files import open_image
 from reference_rt.gltf.document import Document, Image, Material, TextureInfo, TextureTransform
+from reference_rt.gltf.uv_sets import MOST_PIECES, Map, Maps
 from reference_rt.materials import (
     AnyMaterial,
     Diffuse,
@@ -72,13 +73,11 @@ class Reading:
 
 
 class Surface(NamedTuple):
-    """name: of our material;  uv_set: the number of the texture coordinates that it uses, None for
-    none;  emits: whether it is a lamp;  is_bright: one of more than 1, which is meant to light
-    others;  is_clear: whether opacity is less than 1 anywhere;  tilt: the name of its normal map,
-    None for none."""
+    """name: of our material;  emits: whether it is a lamp;  is_bright: one of more than 1, which is
+    meant to light others;  is_clear: whether opacity is less than 1 anywhere;  tilt: the name of
+    its normal map, None for none."""
 
     name: str
-    uv_set: int | None
     emits: bool
     is_bright: bool
     is_clear: bool
@@ -92,34 +91,45 @@ class Surfaces:
         self.reading = reading
         self.textures: dict[str, AnyTexture] = {}
         self.materials: dict[str, AnyMaterial] = {}
-        self._made: dict[tuple[int | None, bool], Surface] = {}
+        self._made: dict[tuple[int | None, bool, Maps], Surface] = {}
         self._named: dict[str, str] = {}
         self._files: dict[int, str] = {}
 
-    def surface(self, index: int | None, coloured: bool) -> Surface:
-        """A material, None for the default one;  coloured: for a primitive with vertex colours."""
-        key = index, coloured
+    def uv_sets(self, index: int | None) -> list[int]:
+        """The numbers of the texture coordinates that a material uses, the mesh's own first."""
+        found = _infos(self._material(index))
+        return [*dict.fromkeys(info.uv_set for info in found)]
+
+    def _material(self, index: int | None) -> Material:
+        if index is None:
+            return Material(name="default")
+        found: Material = self.reading.one("materials", index)
+        return found
+
+    def surface(self, index: int | None, coloured: bool, maps: Maps = ()) -> Surface:
+        """A material, None for the default one;  coloured: for a primitive with vertex colours;
+        maps: for a piece of one, of other sets of texture coordinates."""
+        key = index, coloured, maps
         if key not in self._made:
-            self._made[key] = self._make(index, coloured)
+            self._made[key] = self._make(index, coloured, dict(maps))
         return self._made[key]
 
-    def _make(self, index: int | None, coloured: bool) -> Surface:
-        material: Material = (
-            Material(name="default") if index is None else self.reading.one("materials", index)
-        )
+    def _make(self, index: int | None, coloured: bool, maps: dict[int, Map]) -> Surface:
+        material = self._material(index)
         where = f"materials[{index}]"
-        uv_set = next((info.uv_set for info in _infos(material)), None)
+        uv_set = next(iter(self.uv_sets(index)), None)
 
         def image(info: TextureInfo | None, **fields: Any) -> str | None:
             if info is None:
                 return None
-            if info.uv_set != uv_set:
+            if info.uv_set != uv_set and info.uv_set not in maps:
                 self.reading.lack(
                     f"{where} has textures by TEXCOORD_{uv_set} and TEXCOORD_{info.uv_set}; "
-                    "expected one set of texture coordinates"
+                    f"expected one set of texture coordinates, or at most {MOST_PIECES} affine "
+                    "maps between them"
                 )
                 return None
-            return self.bitmap(info, **fields)
+            return self.bitmap(info, by=maps.get(info.uv_set), **fields)
 
         def number(info: TextureInfo | None, factor: float, channel: Channel) -> float | str:
             name = image(info, channel=channel, scale=factor) if factor > 0.0 else None
@@ -154,7 +164,7 @@ class Surfaces:
             )
         if material.occlusion_texture is not None:
             self.reading.note("occlusion textures are ignored: the shapes themselves occlude light")
-        return self._nested(material, index, leaf, opacity, (parts, factor), uv_set, image)
+        return self._nested(material, index, leaf, opacity, (parts, factor), image)
 
     def _nested(
         self,
@@ -163,7 +173,6 @@ class Surfaces:
         leaf: AnyMaterial,
         opacity: float | str,
         emission: tuple[list[str | None], Sequence[float]],
-        uv_set: int | None,
         image: Callable[..., str | None],
     ) -> Surface:
         """The material around a leaf: both sides, then the tilted normal, which FACE_VIEWER turns
@@ -200,7 +209,7 @@ class Surfaces:
             made = wrap(inner)
         self.materials[name] = made
         tilted = name if isinstance(made, NormalMap) else tilted
-        return Surface(name, uv_set, emits, max(factor) > 1.0, opacity != 1.0, tilted)
+        return Surface(name, emits, max(factor) > 1.0, opacity != 1.0, tilted)
 
     def follow_v(self, names: Iterable[str]) -> None:
         """Let only these normal maps follow v: without mirrored coordinates it makes no difference,
@@ -242,6 +251,7 @@ class Surfaces:
         encoding: Encoding = "raw",
         scale: float = 1.0,
         cutoff: float | None = None,
+        by: Map | None = None,
     ) -> str | None:
         """The name of an image as a texture; None for none: without a source, or for the opacity of
         an opaque image."""
@@ -265,8 +275,8 @@ class Surfaces:
             along_u, along_v = _WRAPS[sampler.wrap_s], _WRAPS[sampler.wrap_t]
             fields["wrap"] = along_u if along_u == along_v else (along_u, along_v)
             fields["filter"] = _FILTERS[sampler.mag_filter]
-        if info.extensions.transform is not None:
-            fields["uv"] = _uv_map(info.extensions.transform)
+        if info.extensions.transform is not None or by is not None:
+            fields["uv"] = _uv_map(info.extensions.transform or TextureTransform(), by)
         return self._texture(
             name if channel == "all" else f"{name}, {channel}",
             Bitmap(
@@ -307,12 +317,13 @@ def _cached(data: bytes) -> Path:
 
 
 def _infos(material: Material) -> Iterable[TextureInfo]:
-    """The textures of a material that are used; the first one's coordinates are its own."""
+    """The textures of a material that are used.  The first one's coordinates are the mesh's: of a
+    normal map, whose tangents they are."""
     pbr, specular = material.pbr_metallic_roughness, material.extensions.specular
     found = [pbr.base_color_texture]
     if material.extensions.unlit is None:
-        found += [pbr.metallic_roughness_texture, material.normal_texture]
-        found += [material.emissive_texture]
+        found = [material.normal_texture, *found]
+        found += [pbr.metallic_roughness_texture, material.emissive_texture]
         found += [specular.specular_texture, specular.specular_color_texture]
     return (info for info in found if info is not None)
 
@@ -335,8 +346,9 @@ def _opacity(
     return 1.0 if name is None else name
 
 
-def _uv_map(transform: TextureTransform) -> UvMap:
-    """KHR_texture_transform, whose v counts from the top, for ours, which counts from the bottom.
+def _uv_map(transform: TextureTransform, by: Map | None) -> UvMap:
+    """KHR_texture_transform, whose v counts from the top, for ours, which counts from the bottom,
+    after a map of ours.
 
     It turns uv counter-clockwise as an image shows them, v down, as the extension's text and its
     model TextureTransformTest say; its GLSL, read by columns, turns them the other way.
@@ -346,6 +358,8 @@ def _uv_map(transform: TextureTransform) -> UvMap:
     theirs = np.array([[a * c, b * s, du], [-a * s, b * c, dv], [0.0, 0.0, 1.0]])
     flip = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
     ours = flip @ theirs @ flip
+    if by is not None:
+        ours = ours @ np.array([*by, (0.0, 0.0, 1.0)])
     if np.array_equal(ours, np.eye(3)):
         return UvMap()
     return UvMap(matrix=ours[:2].tolist())

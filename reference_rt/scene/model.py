@@ -35,7 +35,7 @@ from reference_rt.util.errors import (
     meant_by,
     printable,
 )
-from reference_rt.util.files import read_text
+from reference_rt.util.files import not_utf8, read_text
 from reference_rt.util.yaml_text import line_of
 
 MOST_NESTED = 100
@@ -306,8 +306,8 @@ class SceneModel(Description):
                 near = f"; did you mean '{scenes[stem]}'?" if stem else ""
             message = f"cannot be read: {error.strerror}; expected a scene file{near}"
             raise SceneError(message, file=str(path)) from None
-        except UnicodeDecodeError:
-            raise SceneError("is not text; expected UTF-8", file=str(path)) from None
+        except UnicodeDecodeError as error:
+            raise SceneError(not_utf8(error), file=str(path)) from None
         return cls.parse(text, str(path), path.parent)
 
     @classmethod

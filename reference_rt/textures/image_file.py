@@ -1,6 +1,7 @@
 """Reading image files as linear sRGB."""
 
 import math
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import chain
@@ -12,6 +13,7 @@ import numpy.typing as npt
 
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.image_files.image_file import Curve, ImageFile, StoredStrip
+from reference_rt.util.errors import SceneWarning
 from reference_rt.util.memory import check_memory
 
 Encoding = Literal["auto", "srgb", "raw", "radiance"]
@@ -39,7 +41,14 @@ def read_image(path: Path, encoding: Encoding, scale: float = 1.0, layer: str = 
                 np.multiply(values, scale, out=colours[rows])
             if not np.isfinite(colours[rows]).all():
                 raise ValueError("a colour times the scale overflows; expected a smaller scale")
+        _say(image)
     return colours
+
+
+def _say(image: ImageFile) -> None:
+    """Issue a warning of what was left out."""
+    if image.note:
+        warnings.warn(SceneWarning(f"{image.path} {image.note}"), stacklevel=3)
 
 
 @contextmanager
@@ -186,6 +195,7 @@ def read_texels(
             greatest = max(greatest, float(most))
         if not np.isfinite(greatest):
             raise ValueError("a colour times the scale overflows; expected a smaller scale")
+        _say(image)
     return Texels(data, texels, decoded, 1.0 if len(decoded) else scale, greatest)
 
 

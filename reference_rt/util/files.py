@@ -1,5 +1,6 @@
 """Reading regular files within limits, and writing files atomically: whole or not at all."""
 
+import codecs
 import errno
 import glob
 import hashlib
@@ -104,6 +105,36 @@ def read_input(path: Path, most: int = MOST_BYTES) -> bytes:
 def read_text(path: Path) -> str:
     """The text of a regular file.  Raises OSError; UnicodeDecodeError where it is not UTF-8."""
     return read_input(path, MOST_TEXT).decode("utf-8")
+
+
+_MARKS = (
+    (codecs.BOM_UTF32_LE, "UTF-32"),  # before that of UTF-16, which begins it
+    (codecs.BOM_UTF32_BE, "UTF-32"),
+    (codecs.BOM_UTF16_LE, "UTF-16"),
+    (codecs.BOM_UTF16_BE, "UTF-16"),
+)
+"""The marks of byte order with which texts begin."""
+
+
+def wide_encoding(content: bytes) -> str | None:
+    """The encoding of a text whose characters take two or four bytes, by its mark of byte order, or
+    by the zeros beside its ASCII characters; None for anything else."""
+    for mark, name in _MARKS:
+        if content.startswith(mark):
+            return name
+    start = content[:64]
+    for step, name in ((4, "UTF-32"), (2, "UTF-16")):
+        columns = [start[k::step] for k in range(step)]
+        letters = [column for column in columns if column and all(9 <= c < 127 for c in column)]
+        zeros = [column for column in columns if column and not any(column)]
+        if len(start) >= 8 and len(letters) == 1 and len(zeros) == step - 1:
+            return name
+    return None
+
+
+def not_utf8(error: UnicodeDecodeError) -> str:
+    """What is said of a text that `read_text` cannot decode."""
+    return f"is {wide_encoding(error.object) or 'not text'}; expected UTF-8"
 
 
 @contextmanager

@@ -166,15 +166,29 @@ def changed(change, form="gltf"):
     return getattr(file, form)()
 
 
-def model_3mf(folder, vertices, faces):
-    space = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+def model_3mf(folder, vertices, faces, unit="millimeter"):
+    of = "http://schemas.microsoft.com/3dmanufacturing"
+    package = "http://schemas.openxmlformats.org/package/2006"
+    space = f"{of}/core/2015/02"
     points = "".join('<vertex x="{}" y="{}" z="{}"/>'.format(*v) for v in vertices)
     corners_ = "".join('<triangle v1="{}" v2="{}" v3="{}"/>'.format(*f) for f in faces)
     with zipfile.ZipFile(folder / "a.3mf", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(
+            "[Content_Types].xml",
+            f'<Types xmlns="{package}/content-types"><Default Extension="rels" ContentType='
+            '"application/vnd.openxmlformats-package.relationships+xml"/><Default Extension="model"'
+            ' ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>',
+        )
+        archive.writestr(
+            "_rels/.rels",
+            f'<Relationships xmlns="{package}/relationships"><Relationship Id="a" '
+            f'Type="{of}/2013/01/3dmodel" Target="/3D/3dmodel.model"/></Relationships>',
+        )
+        archive.writestr(
             "3D/3dmodel.model",
-            f'<?xml version="1.0"?><model xmlns="{space}"><resources><object id="1"><mesh>'
-            f"<vertices>{points}</vertices><triangles>{corners_}</triangles></mesh></object>"
+            f'<?xml version="1.0"?><model unit="{unit}" xmlns="{space}"><resources>'
+            f'<object id="1"><mesh><vertices>{points}</vertices>'
+            f"<triangles>{corners_}</triangles></mesh></object>"
             '</resources><build><item objectid="1" transform="1 0 0 0 1 0 0 0 1 9 0 0"/></build>'
             "</model>",
         )

@@ -12,7 +12,16 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 FOREIGN = {"mitsuba", "drjit", "comparisons"}
 ALLOWED = {
     *("numpy", "numba", "llvmlite", "lazy_loader", "pydantic", "yaml", "OpenEXR", "Imath", "PIL"),
-    *("trimesh", "mapbox_earcut", "typer", "rich", "platformdirs", "reference_rt"),
+    *(
+        "trimesh",
+        "DracoPy",
+        "meshopt",
+        "mapbox_earcut",
+        "typer",
+        "rich",
+        "platformdirs",
+        "reference_rt",
+    ),
     *sys.stdlib_module_names,
 }
 

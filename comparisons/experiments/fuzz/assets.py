@@ -4,7 +4,8 @@ import base64
 import io
 import json
 import shutil
-from collections.abc import Iterator
+import zipfile
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,10 @@ from reference_rt.util.files import replacing, temporary_folder
 
 MESHES = ("ball.obj", "ball.ply", "ball_ascii.ply", "ball.stl", "ball.off", "ball.glb")
 COPIES = "copies.npy"
-SOUND_IMAGES = ("tiles.png", "sky.exr", "sky.hdr", "sky.pfm", "sky.npy", "grey.tif", "photo.jpg")
+SOUND_IMAGES = (
+    *("tiles.png", "sky.exr", "sky.hdr", "sky.pfm", "sky.npy", "grey.tif", "photo.jpg"),
+    *("chroma.exr", "deep.exr"),
+)
 
 
 IMAGES = ("square.png", "wide.png", "grey.png")
@@ -110,7 +114,23 @@ def files() -> dict[str, bytes]:
         options = {"encoding": "ascii"} if "ascii" in name else {}
         content = ball.export(file_type=kind, **options)
         found[name] = content.encode() if isinstance(content, str) else bytes(content)
-    return found | _images() | {"ball.gltf": _gltf(ball), COPIES: _copies()}
+    more = {"ball.gltf": _gltf(ball), "ball.3mf": _3mf(ball), COPIES: _copies()}
+    return found | _images() | more
+
+
+def _3mf(ball: Any) -> bytes:
+    """An archive of one part; not one of `MESHES`, which random scenes for Mitsuba name."""
+    points = "".join('<vertex x="{}" y="{}" z="{}"/>'.format(*p) for p in ball.vertices.tolist())
+    faces = "".join('<triangle v1="{}" v2="{}" v3="{}"/>'.format(*f) for f in ball.faces.tolist())
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(
+            "3D/3dmodel.model",
+            '<model xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>'
+            f'<object id="1"><mesh><vertices>{points}</vertices><triangles>{faces}</triangles>'
+            '</mesh></object></resources><build><item objectid="1"/></build></model>',
+        )
+    return stream.getvalue()
 
 
 def _copies() -> bytes:
@@ -142,19 +162,38 @@ def _images() -> dict[str, bytes]:
     runs = b"".join(b"\2\2\0\x08" + b"".join(b"\x08" + bytes(c) for c in row) for row in rows)
     return found | {
         "sky.exr": _exr(pixels / 255.0),
+        "chroma.exr": _exr(
+            np.stack([pixels[..., 0] / 255.0, *np.full((2, 4, 8), 0.1)], axis=-1), _CHROMA
+        ),
+        "deep.exr": _deep(pixels / 255.0),
         "sky.hdr": b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n" + runs,
         "sky.pfm": b"PF\n8 4\n-1\n" + (pixels / 255.0).astype("<f4").tobytes(),
         "sky.npy": stream.getvalue(),
     }
 
 
-def _exr(pixels: Any) -> bytes:
+_CHROMA = ("Y", "RY", "BY")
 
-    from reference_rt.core.exr import write_exr
 
+def _exr(pixels: Any, names: Sequence[str] = "RGB") -> bytes:
     with temporary_folder() as folder:
         path = folder / "sky.exr"
-        write_exr(path, {name: pixels[..., k] for k, name in enumerate("RGB")}, {})
+        write_exr(path, {name: pixels[..., k] for k, name in enumerate(names)}, {})
+        return path.read_bytes()
+
+
+def _deep(pixels: Any) -> bytes:
+    """One to three samples of each pixel."""
+    import OpenEXR
+
+    planes = {name: np.empty(pixels.shape[:2], object) for name in "RGB"}
+    for y, x in np.ndindex(pixels.shape[:2]):
+        for k, name in enumerate("RGB"):
+            planes[name][y, x] = np.full(1 + (x + y) % 3, pixels[y, x, k], np.float32)
+    settings = {"type": OpenEXR.deepscanline, "compression": OpenEXR.NO_COMPRESSION}
+    with temporary_folder() as folder:
+        path = folder / "deep.exr"
+        OpenEXR.File(settings, planes).write(str(path))
         return path.read_bytes()
 
 

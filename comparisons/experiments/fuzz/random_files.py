@@ -5,8 +5,10 @@ library writes would show one of them.
 """
 
 import base64
+import io
 import json
 import struct
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -228,8 +230,58 @@ def _glb(rng: Random) -> bytes:
     )  # fmt: skip
 
 
+_OF = "http://schemas.microsoft.com/3dmanufacturing"
+_PACKAGE = "http://schemas.openxmlformats.org/package/2006"
+_UNITS = ("micron", "millimeter", "centimeter", "inch", "foot", "meter")
+
+
+def _3mf(rng: Random) -> bytes:
+    """A mesh in some unit, an object that has it once or twice, and one to three items of either,
+    some of them moved."""
+    points, faces = _surface(rng, 3)
+
+    def place() -> str:
+        if rng.random() < 0.3:
+            return ""
+        numbers = (np.vstack([np.eye(3), np.zeros(3)]) + rng.normal(size=(4, 3)) / 4.0).ravel()
+        return f' transform="{" ".join(_number(rng, x) for x in numbers.tolist())}"'
+
+    def row(name: str, keys: str, values: list[str]) -> str:
+        texts = (f'{k}="{v}"' for k, v in zip(keys.split(), values, strict=True))
+        return f"<{name} {' '.join(texts)}/>"
+
+    vertices = "".join(
+        row("vertex", "x y z", [_number(rng, x) for x in p]) for p in points.tolist()
+    )
+    triangles = "".join(row("triangle", "v1 v2 v3", [str(k) for k in f]) for f in faces)
+    parts = "".join(f'<component objectid="4"{place()}/>' for _ in range(rng.integers(1, 3)))
+    items = "".join(
+        f'<item objectid="{rng.choice([4, 7])}"{place()}/>' for _ in range(rng.integers(1, 4))
+    )
+    unit = f' unit="{rng.choice(_UNITS)}"' if rng.random() < 0.8 else ""
+    texts = {
+        "[Content_Types].xml": f'<Types xmlns="{_PACKAGE}/content-types">'
+        '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.'
+        'relationships+xml"/><Default Extension="model" ContentType="application/vnd.ms-package.'
+        '3dmanufacturing-3dmodel+xml"/></Types>',
+        "_rels/.rels": f'<Relationships xmlns="{_PACKAGE}/relationships"><Relationship Id="r" '
+        f'Type="{_OF}/2013/01/3dmodel" Target="/3D/thing.model"/></Relationships>',
+        "3D/thing.model": f'<model xmlns="{_OF}/core/2015/02"{unit}><resources>'
+        f'<object id="4"><mesh><vertices>{vertices}</vertices>'
+        f"<triangles>{triangles}</triangles></mesh></object>"
+        f'<object id="7"><components>{parts}</components></object></resources>'
+        f"<build>{items}</build></model>",
+    }
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, text in texts.items():
+            archive.writestr(name, text)
+    return stream.getvalue()
+
+
 MESHES: dict[str, Callable[[Random], bytes]] = {
     ".obj": _obj, ".ply": _ply, ".stl": _stl, ".off": _off, ".gltf": _gltf, ".glb": _glb,
+    ".3mf": _3mf,
 }  # fmt: skip
 
 

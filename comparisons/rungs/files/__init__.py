@@ -4,8 +4,8 @@ The other rungs compare two renderers that are fed from our readers and our tabl
 read 5 % too large is too large in both.  Here each shape and image is held against sources that
 share nothing with them:
 
-- files of meshes (`meshes`): Mitsuba's own loader (.obj, .ply), or trimesh (.stl, .off, .gltf,
-  .glb), for corners, faces, normals and uv; smooth normals by their formula;
+- files of meshes (`meshes`): Mitsuba's own loader (.obj, .ply), trimesh (.stl, .off, .gltf,
+  .glb) or lib3mf (.3mf), for corners, faces, normals and uv; smooth normals by their formula;
 - images (`images`): Mitsuba's own loader, and its conversion to linear values; between texels, at
   the seams of repeated images and skies and beyond borders, that loader's texels by the formula in
   NumPy;

@@ -1,8 +1,10 @@
-"""OpenEXR images: half, float or integer channels R, G, B, or one channel of grey.
+"""OpenEXR images: half, float or integer channels R, G, B, one channel of grey, or luminance and
+chroma; of deep pixels the first sample.
 
 A renderer writes several pictures into one file, as layers, whose channels have a prefix
 (`diffuse.R`), and as parts.  Read are, of the first part that has it: the layer that is asked for;
-else R, G, B, or Y without a prefix; else the only layer that has these; else the only channel."""
+else R, G, B, or Y, RY, BY, or Y without a prefix; else the only layer that has these; else the only
+channel."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -11,26 +13,40 @@ from typing import Any
 import numpy as np
 
 from reference_rt.core.exr import read_headers, read_planes
+from reference_rt.core.image_files.deep_exr import first_samples
 from reference_rt.core.image_files.image_file import Beginning, ImageFile, StoredStrip
+from reference_rt.core.image_files.luminance_chroma import REC709, colours, luminance_weights
 
 
 @dataclass(frozen=True)
 class ExrFile(ImageFile):
     """part: the number of the file's part;  names: the channels for red, green, blue, or for grey,
     and for opacity if there is one;  channels: the number of all channels in the part;  windows:
-    corners (x0, y0, x1, y1) of the data window and of the display window."""
+    corners (x0, y0, x1, y1) of the data window and of the display window;  chromaticities: of the
+    primaries of luminance and chroma, () for other channels;  is_deep: whether pixels have several
+    samples."""
 
     part: int = 0
     names: tuple[str, ...] = ()
     channels: int = 0
     windows: tuple[tuple[int, ...], tuple[int, ...]] = ((), ())
+    chromaticities: tuple[float, ...] = ()
+    is_deep: bool = False
 
     def stored(self, with_opacity: bool = False) -> Iterator[StoredStrip]:
-        planes = read_planes(self.path, self.part)
         names = self.names if with_opacity else self.names[: 1 if self.is_grey else 3]
-        wanted = {name: planes[name] for name in names}
-        del planes
-        if {plane.shape for plane in wanted.values()} != {(self.height, self.width)}:
+        if self.is_deep:
+            header = read_headers(self.path)[self.part]
+            wanted = first_samples(self.path, header, (self.width, self.height), names)
+        else:
+            planes = read_planes(self.path, self.part)
+            wanted = {name: planes[name] for name in names}
+            del planes
+        whole = self.height, self.width
+        if self.chromaticities:
+            yield from self._from_chroma(wanted, names)
+            return
+        if {plane.shape for plane in wanted.values()} != {whole}:
             raise ValueError("cannot be read as EXR: expected channels of one size")
         if any(plane.dtype.kind not in "fu" for plane in wanted.values()):
             raise ValueError("cannot be read as EXR: it has deep pixels; expected flat ones")
@@ -49,6 +65,24 @@ class ExrFile(ImageFile):
                 if plane.flags.owndata:
                     plane.resize((rows.start, self.width), refcheck=False)
 
+    def _from_chroma(self, planes: dict[str, Any], names: Sequence[str]) -> Iterator[StoredStrip]:
+        weights = luminance_weights(self.chromaticities)
+        luminance, red, blue, *opacity = (planes[name] for name in names)
+        sizes = {n: {n, n // 2} if n % 2 == 0 else {n} for n in (self.height, self.width)}
+        if (
+            any(plane.shape != (self.height, self.width) for plane in (luminance, *opacity))
+            or red.shape != blue.shape
+            or red.shape[0] not in sizes[self.height]
+            or red.shape[1] not in sizes[self.width]
+            or any(plane.dtype.kind != "f" for plane in planes.values())
+        ):
+            raise ValueError("cannot be read as EXR: expected chroma of every second pixel")
+        for rows in self.row_ranges():
+            with np.errstate(invalid="ignore", over="ignore"):
+                found = colours(luminance, red, blue, rows, weights)
+                covered = opacity[0][rows].astype(np.float32) if opacity else None
+            yield StoredStrip(rows, found, covered)
+
 
 def open_exr(file: Beginning, layer: str = "") -> ImageFile:
     """layer: the prefix of the channels' names, such as "diffuse" for diffuse.R; "" for the file's
@@ -59,6 +93,11 @@ def open_exr(file: Beginning, layer: str = "") -> ImageFile:
     header, kinds = headers[part], parts[part]
     opacity = names[0][:-1] + ("a" if names[0].endswith("r") else "A")
     has_opacity = opacity in kinds and opacity not in names
+    is_deep = "deep" in str(header.get("type", ""))
+    in_chroma = names[1:2] and names[1].endswith("RY")
+    chromaticities = tuple(float(x) for x in header.get("chromaticities", REC709))
+    if in_chroma and len(chromaticities) != 8:
+        raise ValueError("cannot be read as EXR: it is damaged; expected eight chromaticities")
     (x0, y0, x1, y1), display = (_corners(header[n]) for n in ("dataWindow", "displayWindow"))
     return ExrFile(
         file.path,
@@ -72,6 +111,9 @@ def open_exr(file: Beginning, layer: str = "") -> ImageFile:
         names=(*names, *([opacity] if has_opacity else [])),
         channels=len(kinds),
         windows=((x0, y0, x1, y1), display),
+        chromaticities=chromaticities if in_chroma else (),
+        is_deep=is_deep,
+        note="has deep pixels, of which the first samples are read" if is_deep else "",
     )
 
 
@@ -88,7 +130,9 @@ def _chosen(parts: Sequence[Sequence[str]], layer: str) -> tuple[int, list[str]]
                 continue
             if last in "Rr" and all(prefix + name in kinds for name in _after(last)):
                 pictures.setdefault(prefix, (number, [kind, *(prefix + n for n in _after(last))]))
-            elif last in "Yy" and prefix + "RY" not in kinds:  # with which it is in colour
+            elif last == "Y" and {prefix + "RY", prefix + "BY"} <= {*kinds}:
+                pictures.setdefault(prefix, (number, [kind, prefix + "RY", prefix + "BY"]))
+            elif last in "Yy" and prefix + "RY" not in kinds:
                 pictures.setdefault(prefix, (number, [kind]))
     alone = [(number, list(kinds)) for number, kinds in enumerate(parts) if len(kinds) == 1]
     every = sorted({kind for kinds in parts for kind in kinds})

@@ -63,7 +63,7 @@ class ImageFile:
     display's transfer function, where the largest means 1, else float16, float32 or float64 for
     linear values, of which strips may have a narrower one;  is_grey: whether there is one value per
     pixel;  bits: per channel in the file;  has_opacity: according to the header;  text: the
-    header's text entries, by name.
+    header's text entries, by name;  note: what of the file is read, where that is not all.
     """
 
     path: Path
@@ -74,6 +74,7 @@ class ImageFile:
     bits: int = 32
     has_opacity: bool = False
     text: dict[str, str] = field(default_factory=dict)
+    note: str = ""
 
     @property
     def is_integer(self) -> bool:

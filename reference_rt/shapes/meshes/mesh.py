@@ -55,8 +55,8 @@ class Mesh(Shape):
 
     type: Literal["mesh"] = "mesh"
     file: str | None = None
-    """The file, relative to the scene file: .obj, .ply, .stl, .off, .gltf, .glb and other formats
-    that trimesh reads.  Without one: `vertices` and `faces`."""
+    """The file, relative to the scene file: .obj, .ply, .stl, .off, .gltf, .glb, .3mf and other
+    formats that trimesh reads.  Without one: `vertices` and `faces`."""
     vertices: Floats3 | None = None
     """Positions (n, 3), before the transform, in scene units."""
     faces: Integers3 | None = None

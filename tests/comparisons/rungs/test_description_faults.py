@@ -73,7 +73,7 @@ VALIDATORS: dict[str, tuple[str, str, Callable[[], Planted]]] = {
         "lights: [{type: point, position: [1e-3, 0, 0], intensity: 2}]",
         "lights[0].position: the description says 0.001 0 0, the rendered scene has 1000 0 0",
         lambda: code(
-            "scene/yaml_text.py",
+            "util/yaml_text.py",
             'digits.replace(".", "", 1) if digits[-1] in "fF" else digits)',
             'digits.replace("e-", "e"))',
         ),

@@ -4,14 +4,27 @@ no other rung can see, since Mitsuba is fed from the same."""
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import pytest
 from builders import SCENES
 from faulty_sources import SOURCE_FAULTS, plant
-from mesh_writers import FACES, POINTS, SQUARE, TRIANGLES, XYZ, Gltf, binary_stl, ply
+from mesh_writers import (
+    FACES,
+    FORMS,
+    POINTS,
+    SQUARE,
+    TRIANGLES,
+    XYZ,
+    Gltf,
+    binary_stl,
+    model_3mf,
+    ply,
+)
 
 from comparisons.experiments.fuzz import random_files
 from comparisons.rungs import files
@@ -83,6 +96,22 @@ def test_an_hdr_half_a_mantissa_brighter(tmp_path: Path, monkeypatch: Patch) -> 
     assert "the pixel at" in files(parsed(tmp_path, lights=[sky])).reason
 
 
+def _gltf_of_zeros() -> bytes:
+    """With texture coordinates that no view has."""
+    file = Gltf()
+    accessor = {"componentType": 5126, "type": "VEC2", "count": len(POINTS)}
+    file.accessors.append(accessor)
+    file.primitive["attributes"]["TEXCOORD_0"] = len(file.accessors) - 1
+    file.primitive["material"], file.root["materials"] = 0, [{}]
+    return file.gltf()
+
+
+def _archive() -> bytes:
+    with TemporaryDirectory() as folder:
+        faces = [[0, 1, 4], [0, 1, 2], [4, 2, 1]]
+        return model_3mf(Path(folder), POINTS.tolist(), faces, unit="inch").read_bytes()
+
+
 FORMATS: dict[str, bytes] = {
     "a.stl": binary_stl(TRIANGLES),
     "a.off": b"OFF\n5 3 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n2 2 2\n3 0 1 4\n4 0 1 2 3\n3 4 2 1\n",
@@ -90,12 +119,16 @@ FORMATS: dict[str, bytes] = {
     "a.glb": Gltf().glb(),
     "a.obj": b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv -1 .5 0\nf 1 2 3 4 5\nf 1 2 3\n",
     "a.ply": ply("ascii", ("vertex", XYZ, SQUARE.tolist()), ("face", FACES, [[[0, 1, 2, 3]]])),
+    "zeros.gltf": _gltf_of_zeros(),
+    "a.3mf": _archive(),
 }
 """A file of each format that has a second reader, those with polygons of four and five corners."""
 
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_format_with_a_second_reader(name: str, tmp_path: Path, monkeypatch: Patch) -> None:
+    if name.endswith(".3mf"):
+        pytest.importorskip("lib3mf")
     (tmp_path / name).write_bytes(FORMATS[name])
     turn = [{"rotate": {"axis": [1, 2, 3], "degrees": 40}}, {"scale": [1, -2, 3]}]
     scene = parsed(tmp_path, shapes=[{"type": "mesh", "file": name, "transform": turn}])
@@ -127,7 +160,8 @@ def test_random_files(number: int, tmp_path: Path, monkeypatch: Patch) -> None:
     right = files(scene)
     assert right.status == "agree", right.reason
     assert right.numbers["checked"]["images"] == len(random_files.IMAGES)
-    assert right.numbers["checked"]["meshes"] >= len(random_files.MESHES) - 1  # some .ply
+    least = len(random_files.MESHES) - 1 - (find_spec("lib3mf") is None)  # without some .ply
+    assert right.numbers["checked"]["meshes"] >= least
     fault = ("meshes 5 % too large", "faces wound in reverse", "sRGB decoded twice")[number % 3]
     plant(monkeypatch, SOURCE_FAULTS[fault])
     assert files(scene).status == "differ"
@@ -151,6 +185,21 @@ def test_normals_and_uv_of_gltf(what: str, tmp_path: Path, monkeypatch: Patch) -
     assert right.status == "agree", right.reason
     _data(lambda d: {what: getattr(d, what)[::-1]})(monkeypatch)
     assert f"has the {what.removesuffix('s')}" in files(scene).reason
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_uv_of_corners(form: str, tmp_path: Path, monkeypatch: Patch) -> None:
+    """Of the faces of a .ply file, which Mitsuba does not read."""
+    corners = [[[0, 1, 2], [0, 0, 0.5, 0, 0.5, 1]], [[0, 2, 3], [0.25, 0.25, 0.75, 0, 1, 1]]]
+    properties = [*FACES, "list uchar float texcoord"]
+    content = ply(form, ("vertex", XYZ, SQUARE.tolist()), ("face", properties, corners))
+    (tmp_path / "a.ply").write_bytes(content)
+    scene = parsed(tmp_path, shapes=[{"type": "mesh", "file": "a.ply"}])
+    right = files(scene)
+    assert right.status == "agree", right.reason
+    assert right.numbers["checked"] == {"meshes": 1}
+    _data(lambda d: {"uv": d.uv[::-1]})(monkeypatch)
+    assert "has the uv" in files(scene).reason
 
 
 def test_smooth_normals(tmp_path: Path, monkeypatch: Patch) -> None:

@@ -4,10 +4,14 @@ memory and in scene files.  Defaults of what is read are Mitsuba's own."""
 import re
 import warnings
 from collections.abc import Iterable
+from itertools import product
 from pathlib import Path
 from typing import Any, get_args
 
+import numpy as np
+import OpenEXR
 import pytest
+from exr_writer import exr
 from PIL import Image
 
 import reference_rt as rt
@@ -28,6 +32,7 @@ from reference_rt.integrators import AnyIntegrator
 from reference_rt.lights import AnyLight
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Sphere
+from reference_rt.textures.image_file import read_image
 from reference_rt.util.errors import SceneWarning
 
 PLACED = {"origin": (1.0, 2.0, 3.0), "target": (0.3, 0.5, 0.1)}
@@ -98,6 +103,43 @@ def through_file(folder: Path, **parts: Any) -> Scene:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SceneWarning)  # where nothing is hit Mitsuba has distance 0
         return Scene.load(folder / "scene.xml")
+
+
+@pytest.mark.parametrize("kind", ["chroma", "deep", "layer", "npy"])
+@pytest.mark.filterwarnings("ignore:.*has deep pixels")
+def test_images_that_mitsuba_reads_otherwise(kind: str, tmp_path: Path) -> None:
+    """They are written as plain ones: Mitsuba shows what we do."""
+    rng, name = np.random.default_rng(3), f"a.{'npy' if kind == 'npy' else 'exr'}"
+    planes = rng.uniform(0.1, 0.5, (3, 4, 6)).astype(np.float32)
+    if kind == "npy":
+        np.save(tmp_path / name, planes.transpose(1, 2, 0))
+    elif kind == "deep":
+        deep = {c: np.empty((4, 6), object) for c in "RGB"}
+        settings = {"type": OpenEXR.deepscanline, "compression": OpenEXR.NO_COMPRESSION}
+        for c, at in product("RGB", np.ndindex(4, 6)):
+            deep[c][at] = np.array([planes["RGB".index(c)][at], 9.0], np.float32)
+        OpenEXR.File(settings, deep).write(str(tmp_path / name))
+    elif kind == "chroma":
+        half = {c: planes[k, ::2, ::2].copy() for k, c in ((1, "RY"), (2, "BY"))}
+        (tmp_path / name).write_bytes(exr({"Y": planes[0], **half}, {"RY": 2, "BY": 2}))
+    else:
+        layers = {f"{p}.{c}": planes[k] * (p == "b") for p in "ab" for k, c in enumerate("RGB")}
+        (tmp_path / name).write_bytes(exr({n: p.astype("<f4") for n, p in layers.items()}))
+    layer = "b" if kind == "layer" else ""
+    expected = read_image(tmp_path / name, "auto", layer=layer)
+    scene = Scene(
+        textures={"t": rt.Bitmap(file=name, layer=layer)},
+        materials={"m": rt.Diffuse(reflectance="t")},
+        shapes=(Sphere(material="m"),),
+        lights=(rt.EnvironmentMap(file=name, layer=layer),),
+    )
+    scene._folder = tmp_path
+    write_xml(scene, tmp_path / "scene.xml")
+    files = re.findall(r'name="filename" value="([^"]*)"', (tmp_path / "scene.xml").read_text())
+    assert len(files) == 2
+    for file in files:
+        found = np.array(mitsuba().Bitmap(str(tmp_path / file)))
+        assert np.abs(found - expected).max() < 1e-6
 
 
 def without_names(light: Any) -> dict[str, Any]:

@@ -205,13 +205,109 @@ def test_the_second_set_of_texture_coordinates(tmp_path):
     file.material["pbrMetallicRoughness"] = {"baseColorTexture": info}
     scene, _ = load(tmp_path, file)
     assert np.array_equal(scene.shapes[0].uv, second.astype(float) * (1, -1) + (0, 1))
-    file.material["emissiveTexture"] = {"index": index}
-    (line,) = refused(tmp_path, file)
-    assert "materials[0] has textures by TEXCOORD_1 and TEXCOORD_0; expected one set" in line
-    del file.primitive["attributes"]["TEXCOORD_1"], file.material["emissiveTexture"]
+    del file.primitive["attributes"]["TEXCOORD_1"]
     scene, said = load(tmp_path, file)
     assert "has no TEXCOORD_1: its textures show one point" in said
     assert not scene.shapes[0].uv.any()
+
+
+def shown(scene, shape, kind):
+    """(m, 3, 2): where the corners of triangles are in the base colour's or emission's image."""
+    material = scene.materials[shape.material]
+    if kind == "emission":
+        texture = material.radiance
+    else:
+        inner = scene.materials[material.base] if material.type == "emissive" else material
+        texture = inner.base_color
+    texture = scene.textures[texture]
+    texture = scene.textures[texture.of[0]] if texture.type == "product" else texture
+    corners = np.asarray(shape.uv)[np.asarray(shape.faces)]
+    if texture.uv.matrix is None:
+        return corners
+    m = np.array(texture.uv.matrix)
+    return corners @ m[:, :2].T + m[:, 2]
+
+
+def two_sets(points, first, second, faces, **base):
+    file = GltfScene(emissiveFactor=[1, 1, 1])
+    texture = file.texture()
+    file.primitive["indices"] = file.add(np.asarray(faces, np.uint16).reshape(-1, 1))
+    for name, rows in (("POSITION", points), ("TEXCOORD_0", first), ("TEXCOORD_1", second)):
+        file.primitive["attributes"][name] = file.add(np.asarray(rows, np.float32))
+    file.material["pbrMetallicRoughness"] = {"baseColorTexture": {"index": texture}, **base}
+    file.material["emissiveTexture"] = {"index": texture, "texCoord": 1}
+    return file
+
+
+def ours(uv):
+    """(n, 2) coordinates of glTF, whose v counts from the top."""
+    return np.float32(uv).astype(float) * (1, -1) + (0, 1)
+
+
+def test_two_sets_that_are_maps_of_each_other(tmp_path):
+    """Textures by either set show what they do; with a transform of their own, too."""
+    rng = np.random.default_rng(5)
+    points, first = rng.normal(size=(9, 3)), rng.random((9, 2))
+    faces = np.array([[0, 1, 2], [3, 4, 5], [6, 7, 8], [0, 4, 8]])
+    second = first @ rng.normal(size=(2, 2)) + rng.normal(size=2)
+    for other, matrix in ((first, True), (second, False)):
+        file = two_sets(points, first, other, faces)
+        scene, _ = load(tmp_path, file)
+        (shape,) = scene.shapes
+        assert np.abs(shown(scene, shape, "base") - ours(first)[faces]).max() < 1e-15
+        assert np.abs(shown(scene, shape, "emission") - ours(other)[faces]).max() < 2.0**-19
+        if matrix:  # of a copy, exactly
+            assert np.array_equal(shown(scene, shape, "emission"), ours(first)[faces])
+    moved = {"offset": [0.25, 0.5], "scale": [2.0, 3.0]}
+    file.material["emissiveTexture"]["extensions"] = {"KHR_texture_transform": moved}
+    scene, _ = load(tmp_path, file)
+    expected = ours(np.float32(second) * (2.0, 3.0) + (0.25, 0.5))
+    found = shown(scene, scene.shapes[0], "emission")
+    assert np.abs(found - expected[faces]).max() < 1e-5
+
+
+def test_two_sets_of_charts(tmp_path):
+    """Charts that were moved and turned are pieces, and each triangle is in one."""
+    rng = np.random.default_rng(6)
+    charts, points, first, second, faces = 7, [], [], [], []
+    for k in range(charts):
+        grid = np.array([[x, y] for x in range(4) for y in range(4)]) / 4.0 + 5.0 * k
+        turn = rng.uniform(0.0, 6.0)
+        c, s = np.cos(turn), np.sin(turn)
+        points += np.column_stack([grid, rng.normal(size=16)]).tolist()
+        first += (grid / 40.0).tolist()
+        second += (grid @ [[c, -s], [s, c]] / 9.0 + rng.normal(size=2)).tolist()
+        for i in (0, 1, 2, 4, 5, 6, 8, 9, 10):
+            faces += [[16 * k + i + n for n in t] for t in ([0, 4, 5], [0, 5, 1])]
+    file = two_sets(points, first, second, faces)
+    scene, _ = load(tmp_path, file)
+    assert len(scene.shapes) == charts
+    found = np.concatenate([np.asarray(shape.faces) for shape in scene.shapes])
+    assert sorted(found.tolist()) == sorted(faces)
+    for shape in scene.shapes:
+        corners = np.asarray(shape.faces)
+        assert np.abs(shown(scene, shape, "base") - ours(first)[corners]).max() < 1e-15
+        assert np.abs(shown(scene, shape, "emission") - ours(second)[corners]).max() < 1e-5
+
+
+def test_two_sets_that_are_no_maps(tmp_path):
+    rng = np.random.default_rng(7)
+    faces = np.arange(600).reshape(-1, 3)
+    file = two_sets(*(rng.random((600, n)) for n in (3, 2, 2)), faces)
+    (line,) = refused(tmp_path, file)
+    assert "materials[0] has textures by TEXCOORD_0 and TEXCOORD_1; expected one set of" in line
+    scene, _ = load(tmp_path, file, allow_missing=True)
+    assert len(scene.shapes) == 1
+
+
+def test_the_set_of_a_normal_map_is_the_meshs(tmp_path):
+    """Its tangents are those of the mesh's coordinates."""
+    rng = np.random.default_rng(8)
+    first = rng.random((3, 2))
+    file = two_sets(rng.normal(size=(3, 3)), first, first[:, ::-1] * 2.0, [[0, 1, 2]])
+    file.material["normalTexture"] = {"index": 0, "texCoord": 1}
+    scene, _ = load(tmp_path, file)
+    assert np.abs(np.asarray(scene.shapes[0].uv) - ours(first[:, ::-1] * 2.0)).max() < 1e-15
 
 
 # ---- images --------------------------------------------------------------------------------------

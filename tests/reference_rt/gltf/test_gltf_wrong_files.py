@@ -34,6 +34,30 @@ def test_every_missing_part_has_a_line(tmp_path):
     assert 'requires the extension "KHR_materials_clearcoat", which is unknown; expected' in line
 
 
+def test_extensions_of_vendors_are_left_out(tmp_path):
+    """Those that are not required, with one line for all; wherever they are."""
+    file = GltfScene()
+    expected, before = load(tmp_path, file)
+    file.material["extensions"] = {"XYZ_materials_of_ours": {"strength": 3}}
+    file.primitive["extensions"] = {"ABC_geometry": {}, "EXT_mesh_shading": {"x": [1]}}
+    file.root["extensions"] = {f"XYZ_{k:02d}": {} for k in range(20)}
+    file.root["extensionsUsed"] = ["XYZ_materials_of_ours", "ABC_geometry"]
+    scene, said = load(tmp_path, file)
+    assert scene.materials == expected.materials
+    assert scene.shapes == expected.shapes
+    lines = [line for line in said.splitlines() if line not in before]
+    (line,) = lines
+    assert line.startswith(
+        f"{tmp_path / 'model.glb'}: extensions of vendors that the file does not"
+    )
+    assert '"ABC_geometry", "EXT_mesh_shading", "XYZ_00"' in line
+    assert line.endswith(" and 11 more")
+    for name in ("ABC_geometry", "XYZ_unused"):
+        file.root["extensionsRequired"] = [name]
+        (line,) = refused(tmp_path, file, allow_missing=True)
+        assert f'requires the extension "{name}", which is unknown; expected' in line
+
+
 @pytest.mark.parametrize(
     ("path", "value", "message"),
     [

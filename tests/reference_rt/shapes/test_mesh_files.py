@@ -307,8 +307,6 @@ def test_other_formats_are_those_of_trimesh(tmp_path, monkeypatch):
 
 
 def test_3mf(tmp_path):
-    pytest.importorskip("lxml")
-    pytest.importorskip("networkx")
     vertices, faces = cube(2)
     path = model_3mf(tmp_path, vertices, faces)
     mesh = read_mesh(path)
@@ -332,3 +330,22 @@ def test_what_unpacks_to_much_is_refused_before(tmp_path, monkeypatch):
     monkeypatch.setattr(memory, "machine_memory", lambda: 1000)
     with pytest.raises(ValueError, match=r"memory; expected at most the 0.0 GiB"):
         read_mesh(path)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_ply_uv_of_corners(tmp_path, form):
+    """A vertex whose texture coordinates differ between faces is several; mixed polygons."""
+    faces = [[[0, 1, 2], [0, 0, 1, 0, 1, 1]], [[0, 1, 2, 3], [0, 0, 0.5, 0.25, 1, 1, 0, 1]]]
+    properties = [*FACES, "list uchar float texcoord", "int texnumber"]
+    rows = [[*face, 0] for face in faces]
+    vertices = ("vertex", [*XYZ, "float s", "float t"], [[*p, 7, 7] for p in SQUARE.tolist()])
+    mesh = read(tmp_path, ply(form, vertices, ("face", properties, rows)), "mesh.ply")
+    assert np.array_equal(corners(mesh), SQUARE[[[0, 1, 2], [0, 1, 2], [0, 2, 3]]])
+    uv = [[[0, 0], [1, 0], [1, 1]], [[0, 0], [0.5, 0.25], [1, 1]], [[0, 0], [1, 1], [0, 1]]]
+    assert mesh.uv[mesh.faces].tolist() == uv
+    assert len(mesh.vertices) == 5  # of which two are where the uv differ
+    assert mesh.ignored == ("face texnumber",)
+    rows[0][1] = []  # a face without
+    mesh = read(tmp_path, ply(form, vertices, ("face", properties, rows)), "mesh.ply")
+    assert mesh.uv.tolist() == [[7, 7]] * 4
+    assert mesh.ignored == ("face texcoord", "face texnumber")

@@ -236,13 +236,13 @@ def _damaged(draw: Draw, x: float, names: Sequence[str], scene: Callable[[str], 
 
 @series(Sweep("damages of a mesh file", _COUNTS, (2.0,), 60, 600))
 def meshes(draw: Draw, x: float) -> Outcomes:
-    """Files of .obj, .ply (text and bytes), .stl, .off, .glb and .gltf with bytes flipped, cut out
-    or off, repeated, or replaced by hostile numbers."""
-    return _damaged(draw, x, [*MESHES, "ball.gltf"], _mesh_scene)
+    """Files of .obj, .ply (text and bytes), .stl, .off, .glb, .gltf and .3mf with bytes flipped,
+    cut out or off, repeated, or replaced by hostile numbers."""
+    return _damaged(draw, x, [*MESHES, "ball.gltf", "ball.3mf"], _mesh_scene)
 
 
 @series(Sweep("damages of an image file", _COUNTS, (2.0,), 20, 150))
 def images(draw: Draw, x: float) -> Outcomes:
-    """The same of .png, .exr, .hdr, .pfm, .npy, .tif and .jpg, as a texture and as the light
-    around."""
+    """The same of .png, .exr (also of chroma, and deep), .hdr, .pfm, .npy, .tif and .jpg, as a
+    texture and as the light around."""
     return _damaged(draw, x, SOUND_IMAGES, _image_scene)

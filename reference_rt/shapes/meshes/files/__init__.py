@@ -7,8 +7,9 @@ alike, in `data.checked`.
 
 Readers of our own where trimesh would silently change a file's content: it takes cut .stl and .off
 files for whole or empty ones, gives a vertex of an .obj one normal for all of its faces and leaves
-out faces that do not exist, refuses binary .ply files of mixed polygons, and fills missing data of
-a .gltf file with zeros, however much that is.  It reads every other format.
+out faces that do not exist, refuses binary .ply files of mixed polygons, fills missing data of a
+.gltf file with zeros, however much that is, and mixes objects of the same number in different parts
+of a .3mf file.  It reads every other format.
 
 Reading a file runs no code, and opens no file that it names, except buffers of a .gltf file in its
 folder.
@@ -22,9 +23,9 @@ from pathlib import Path
 
 import numpy as np
 
-from reference_rt.shapes.meshes.files import gltf, obj, other, ply
-from reference_rt.shapes.meshes.files.data import MeshData, RawMesh, checked
-from reference_rt.util.files import read_input
+from reference_rt.shapes.meshes.files import gltf, obj, other, ply, threemf
+from reference_rt.shapes.meshes.files.data import MeshData, NotReadError, RawMesh, checked
+from reference_rt.util.files import read_input, wide_encoding
 
 __all__ = ["MeshData", "read_mesh"]
 
@@ -38,7 +39,11 @@ _READERS: dict[str, Reader] = {
     ".off": lambda content, folder: other.read_off(content),
     ".glb": gltf.read_glb,
     ".gltf": gltf.read_gltf,
+    ".3mf": lambda content, folder: threemf.read(content),
 }
+
+_TEXTS = {".obj", ".ply", ".stl", ".off"}
+"""Formats that are, or may be, text in ASCII."""
 
 
 def read_mesh(path: Path) -> MeshData:
@@ -46,17 +51,26 @@ def read_mesh(path: Path) -> MeshData:
     suffix = path.suffix.lower()
     reader = _READERS.get(suffix)
     content = _content(path)
-    if suffix in (".obj", ".off", ".ply"):  # some editors begin texts with a byte-order mark
+    if suffix in _TEXTS - {".stl"}:  # some editors begin texts with a byte-order mark
         content = content.removeprefix(codecs.BOM_UTF8)
     if reader is None and (reader := other.reader(suffix)) is None:
         known = ", ".join([*_READERS, *other.suffixes()])
         raise ValueError(f"mesh {path}: '{suffix}' is not supported; expected one of {known}")
-    with np.errstate(all="ignore"):  # the checks find overflow and NaN
-        raw = _parsed(path, reader, content)
-        try:
-            return checked(raw)
-        except ValueError as error:
-            raise ValueError(f"mesh {path}{error}") from None
+    if not content.strip():
+        raise ValueError(f"mesh {path} is empty; expected vertices and faces")
+    try:
+        with np.errstate(all="ignore"):  # the checks find overflow and NaN
+            raw = _parsed(path, reader, content)
+            try:
+                return checked(raw)
+            except ValueError as error:
+                raise ValueError(f"mesh {path}{error}") from None
+    except ValueError:
+        # What a file is said to lack is there, but in an encoding that its format has not.
+        if suffix in _TEXTS and (encoding := wide_encoding(content)):
+            message = f"is a text in {encoding}; expected ASCII or UTF-8"
+            raise ValueError(f"mesh {path} {message}") from None
+        raise
 
 
 def _parsed(path: Path, reader: Reader, content: bytes) -> RawMesh:
@@ -64,6 +78,8 @@ def _parsed(path: Path, reader: Reader, content: bytes) -> RawMesh:
         return reader(content, path.parent)
     except MemoryError:
         raise ValueError(f"mesh {path}: it does not fit into memory") from None
+    except NotReadError as error:
+        raise ValueError(f"mesh {path} cannot be read: {error}") from None
     except Exception as error:
         # Any error of parsing, also one raised inside a library, means a malformed file.
         detail = (str(error).splitlines() or [""])[0][:200]

@@ -14,6 +14,10 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.diagnosis import FieldError
 
 
+class NotReadError(ValueError):
+    """A file may be sound, but is not read; the text says why, and what was expected."""
+
+
 @dataclass(frozen=True, eq=False)
 class MeshData:
     """A checked mesh.  A property that the file does not have for every vertex is None.

@@ -19,7 +19,9 @@ import numpy as np
 import numpy.typing as npt
 
 from reference_rt.core import transform
-from reference_rt.shapes.meshes.files.data import RawMesh, joined
+from reference_rt.core.arrays import IntArray
+from reference_rt.shapes.meshes.files import gltf_compression as compression
+from reference_rt.shapes.meshes.files.data import NotReadError, RawMesh, joined
 from reference_rt.shapes.meshes.files.polygons import fans
 from reference_rt.util.files import read_input
 from reference_rt.util.memory import check_unpacked
@@ -37,6 +39,8 @@ _HARMLESS = (
     "KHR_lights_",
     "EXT_texture_",
     "KHR_mesh_quantization",
+    compression.DRACO,
+    *compression.MESHOPT,
 )
 
 Rows = npt.NDArray[Any]
@@ -75,9 +79,15 @@ def open_glb(content: bytes, folder: Path) -> "GltfFile":
 
 
 def _joined(file: "GltfFile") -> RawMesh:
+    version = str(file.root.get("asset", {}).get("version", "2.0"))[:20]
+    if version.partition(".")[0] != "2":
+        raise NotReadError(f"it has version {version!r} of glTF; expected 2.0")
     for name in file.root.get("extensionsRequired", []):
         if not str(name).startswith(_HARMLESS):
-            raise ValueError(f"it requires the extension {str(name)[:60]!r}, which is unknown")
+            raise NotReadError(
+                f"it requires the extension {str(name)[:60]!r}, which is unknown; expected one "
+                "that does not change the shape"
+            )
     found = joined(file.parts())
     return found._replace(ignored=(*found.ignored, *file.ignored()))
 
@@ -93,6 +103,9 @@ class GltfFile:
         self.root, self.binary, self.folder = json.loads(text), binary, folder
         self.buffers: dict[int, bytes] = {}
         self.files: dict[Path, bytes] = {}
+        self.unpacked: dict[int, bytes] = {}  # views that meshopt compressed
+        self.draco: dict[int, compression.DracoMesh] = {}  # by the view of their data
+        self.zeros = 0  # bytes of all accessors without data
         self.has_lines = False
         if not isinstance(self.root, dict):
             raise ValueError("its JSON is no object")
@@ -145,10 +158,13 @@ class GltfFile:
 
     def primitive(self, primitive: dict[str, Any], uv_set: int = 0) -> RawMesh:
         """The triangles of a primitive.  uv_set: the number of its texture coordinates."""
-        attributes = primitive["attributes"]
-        points = self.accessor(attributes.get("POSITION"), (3,))
+        attributes, packed = primitive["attributes"], self.packed(primitive)
+        of_draco = {} if packed is None else packed[1]
+        points = self.accessor(attributes.get("POSITION"), (3,), packed=of_draco.get("POSITION"))
         normals, uv, colours = (
-            self.accessor(attributes[name], widths, fraction) if name in attributes else None
+            self.accessor(attributes[name], widths, fraction, of_draco.get(name))
+            if name in attributes
+            else None
             for name, widths, fraction in (
                 ("NORMAL", (3,), False),
                 (f"TEXCOORD_{uv_set}", (2,), True),
@@ -159,10 +175,13 @@ class GltfFile:
             raise ValueError("the attributes of a primitive have different lengths")
         if uv is not None:
             uv = np.column_stack([uv[:, 0], 1.0 - uv[:, 1].astype(np.float64)])  # from the top
-        corners = np.arange(len(points))
-        if "indices" in primitive:
-            corners = self.accessor(primitive["indices"], (1,))[:, 0].astype(np.int64)
-        faces = _faces(corners, primitive.get("mode", _TRIANGLES))
+        if packed is None:
+            corners = np.arange(len(points))
+            if "indices" in primitive:
+                corners = self.accessor(primitive["indices"], (1,))[:, 0].astype(np.int64)
+            faces = _faces(corners, primitive.get("mode", _TRIANGLES))
+        else:
+            faces = packed[0]
         ignored = [name for name in attributes if name not in _READ]
         if primitive.get("targets"):
             ignored.append("targets")
@@ -171,9 +190,34 @@ class GltfFile:
         rgb = None if colours is None else colours[:, :3]
         return RawMesh(points, faces, normals, uv, rgb, tuple(map(str, ignored)))
 
-    def accessor(self, index: Any, widths: tuple[int, ...], fraction: bool = False) -> Rows:
+    def packed(self, primitive: dict[str, Any]) -> tuple[IntArray, dict[str, Rows]] | None:
+        """Triangles and attributes that Draco compressed; None where there are none, or where the
+        file has the plain ones beside them, which need no library and no rounding."""
+        extension = primitive.get("extensions", {}).get(compression.DRACO)
+        if extension is None:
+            return None
+        numbers, attributes = extension["attributes"], primitive["attributes"]
+        used = [attributes[name] for name in numbers if name in attributes]
+        used += [primitive["indices"]] if "indices" in primitive else []
+        if all({"bufferView", "sparse"} & self.item("accessors", k).keys() for k in used):
+            return None
+        view = extension.get("bufferView")
+        if view not in self.draco:
+            self.draco[view] = compression.draco(self.view(view))
+        mesh = self.draco[view]
+        if missing := [name for name, number in numbers.items() if number not in mesh.attributes]:
+            raise ValueError(f"its data of {compression.DRACO} have no {str(missing[0])[:40]!r}")
+        return mesh.faces, {name: mesh.attributes[number] for name, number in numbers.items()}
+
+    def accessor(
+        self,
+        index: Any,
+        widths: tuple[int, ...],
+        fraction: bool = False,
+        packed: Rows | None = None,
+    ) -> Rows:
         """Rows (count, one of `widths`); fraction: integers stand for numbers of [0, 1] or [-1,
-        1]."""
+        1];  packed: the rows that Draco has for it."""
         accessor = self.item("accessors", index)
         width = _WIDTHS.get(str(accessor.get("type")))
         component = _COMPONENTS.get(accessor.get("componentType", 0))
@@ -181,12 +225,17 @@ class GltfFile:
             raise ValueError(f"accessors[{index}] has the wrong type")
         dtype, count, name = np.dtype(component), _natural(accessor, "count"), f"accessors[{index}]"
         sparse = accessor.get("sparse")
-        if "bufferView" in accessor:
+        if packed is not None:
+            if packed.shape != (count, width):
+                raise ValueError(f"{name} has {count} rows; its data have shape {packed.shape}")
+            rows = packed.astype(dtype)
+        elif "bufferView" in accessor:
             rows = self.rows(accessor, name, count, width, dtype)
-        elif sparse is None:
-            raise ValueError(f"{name} has no data; expected 'bufferView' or 'sparse'")
-        else:  # zeros, but for some
-            check_unpacked(len(self.binary or b""), count * width * dtype.itemsize, name)
+        else:  # zeros, says the specification (3.6.2)
+            if count < 1:
+                raise ValueError(f"{name} is empty")
+            self.zeros += count * width * dtype.itemsize
+            check_unpacked(len(self.binary or b""), self.zeros, name)
             rows = np.zeros((count, width), dtype)
         if sparse is not None:
             rows = self.replaced(rows, sparse, name)
@@ -198,15 +247,41 @@ class GltfFile:
         self, part: dict[str, Any], name: str, count: int, width: int, dtype: np.dtype[Any]
     ) -> Rows:
         """Rows (count, width) of a view.  part: names the view and the offset in it."""
-        view = self.item("bufferViews", part.get("bufferView"))
-        data, row = self.buffer(view.get("buffer")), width * dtype.itemsize
+        view, data, begin = self.stored(part.get("bufferView"))
+        row = width * dtype.itemsize
         stride, size = _natural(view, "byteStride", row), _natural(view, "byteLength")
-        begin, within = _natural(view, "byteOffset", 0), _natural(part, "byteOffset", 0)
+        within = _natural(part, "byteOffset", 0)
         if begin + size > len(data):
             raise ValueError(f"the view of {name} reaches beyond its buffer")
         if count < 1 or stride < row or within + (count - 1) * stride + row > size:
             raise ValueError(f"{name} reaches beyond its view, or is empty")
         return np.ndarray((count, width), dtype, data, begin + within, (stride, dtype.itemsize))
+
+    def stored(self, index: Any) -> tuple[dict[str, Any], bytes, int]:
+        """A view, the bytes in which it is, and where it begins in them."""
+        view = self.item("bufferViews", index)
+        found = view.get("extensions", {})
+        extension = next((name for name in compression.MESHOPT if name in found), None)
+        if extension is not None and self.is_placeholder(view.get("buffer")):
+            if index not in self.unpacked:
+                part, name = found[extension], f"bufferViews[{index}]"
+                data = self.buffer(part.get("buffer"))
+                begin, size = _natural(part, "byteOffset", 0), _natural(part, "byteLength")
+                if begin + size > len(data):
+                    raise ValueError(f"the data of {name} reach beyond their buffer")
+                data = data[begin : begin + size]
+                self.unpacked[index] = compression.meshopt(data, part, extension, name)
+            return view, self.unpacked[index], 0
+        return view, self.buffer(view.get("buffer")), _natural(view, "byteOffset", 0)
+
+    def is_placeholder(self, index: Any) -> bool:
+        """Whether a buffer is there for views that meshopt compressed, without data of its own."""
+        buffer = self.item("buffers", index)
+        is_marked = any(
+            buffer.get("extensions", {}).get(name, {}).get("fallback", False)
+            for name in compression.MESHOPT
+        )
+        return is_marked or ("uri" not in buffer and not (index == 0 and self.binary is not None))
 
     def replaced(self, rows: Rows, sparse: dict[str, Any], name: str) -> Rows:
         """The rows with those that a sparse accessor lists in place of others."""

@@ -1,5 +1,5 @@
 """Formats of positions alone: .stl, .off, and what trimesh reads, if the packages that it needs are
-installed (.3mf: lxml, networkx).
+installed.
 
 Stereolithography files, .stl (3D Systems 1989), are separate triangles, binary or ascii.
 Normals are not read, since they are those of the winding; nor are the attributes of binary files,
@@ -11,6 +11,7 @@ Of trimesh's formats the positions and triangles are read, in the scene that the
 without normals, uv and colours (the last two are named as ignored).
 """
 
+import codecs
 import io
 import re
 import struct
@@ -52,8 +53,8 @@ def read_stl(content: bytes) -> RawMesh:
         vertices = triangles["vertices"].reshape(-1, 3)
         if triangles["attribute"].any():
             ignored = ("attributes of triangles",)
-    elif _SOLID.match(content):
-        vertices = _ascii(content)
+    elif _SOLID.match(text := content.removeprefix(codecs.BOM_UTF8)):
+        vertices = _ascii(text)
     elif count < 0:
         raise ValueError("it is too short; expected 'solid' or a header of 84 bytes")
     else:
@@ -92,10 +93,13 @@ def _after(expected: re.Pattern[bytes], text: bytes, position: int, what: str) -
 def read_off(content: bytes) -> RawMesh:
     lines = _lines(content)
     number, words = next(lines, (1, [b""]))
-    # Not 4OFF and nOFF, whose coordinates are not x y z.
-    if not re.fullmatch(rb"(ST)?C?N?OFF", words[0]):
+    # Not 4OFF and nOFF, whose coordinates are not x y z.  Some write the first number without a
+    # blank before it.
+    first = re.fullmatch(rb"((?:ST)?C?N?OFF)(\d*)", words[0])
+    if first is None:
         raise ValueError("expected 'OFF' as its first word")
-    kind = _kind(words[0])
+    kind = _kind(first[1])
+    words = [word for word in (*first.groups(), *words[1:]) if word]
     if not words[1:]:
         number, words = next(lines, (number, words))
         words = [b"OFF", *words]
@@ -156,11 +160,11 @@ def _lines(content: bytes) -> Iterator[tuple[int, list[bytes]]]:
 
 
 # Formats with readers of our own, or without surfaces.
-_LEFT_OUT = {"obj", "ply", "stl", "stl_ascii", "off", "gltf", "glb", "xyz"}
+_LEFT_OUT = {"obj", "ply", "stl", "stl_ascii", "off", "gltf", "glb", "3mf", "xyz"}
 
 PARSED = 40
-"""The most bytes of memory that trimesh takes per byte of an unpacked .3mf file: 33 (measured with
-one million of the shortest triangles, 2026-11-25)."""
+"""The most bytes of memory that trimesh takes per byte of an unpacked archive of XML: 33 (measured
+with one million of the shortest triangles, 2026-11-25)."""
 
 
 def suffixes() -> list[str]:

@@ -2,12 +2,14 @@
 
 It reads the element `vertex` with x y z, nx ny nz, uv (u v, s t or texture_u texture_v) and a
 colour, and the element `face`, or `tristrips`, with its list vertex_indices or vertex_index;
-everything else is ignored, and named.  A colour is red green blue, or r g b; or diffuse_red and so
-on; or as Mitsuba writes it, color_0 color_1 color_2, and in the other forms that it reads, color_r
-and vertex_color_x among them; the first of these that the file has.  Colours of integers are sRGB-
+everything else is ignored, and named.  Texture coordinates of a face's corners, its list texcoord,
+come before those of vertices.  A colour is red green blue, or r g b; or diffuse_red and so on; or
+as Mitsuba writes it, color_0 color_1 color_2, and in the other forms that it reads, color_r and
+vertex_color_x among them; the first of these that the file has.  Colours of integers are sRGB-
 encoded, 255 or 65535 being 1: as displayed, which is what scanners and modellers write.  Colours of
 floats are linear: as computed."""
 
+import re
 import struct
 from array import array
 from collections.abc import Sequence
@@ -108,6 +110,8 @@ def _strided(
     body: memoryview, start: int, shape: tuple[int, ...], item: np.dtype[Any], row: int
 ) -> Array:
     """The number at the same offset of every row, (rows,), or n from there on, (rows, n)."""
+    if shape[0] == 0:  # its place may be the end of the file
+        return np.zeros(shape, item)
     return np.ndarray(shape, item, body, start, (row, item.itemsize)[: len(shape)])
 
 
@@ -193,6 +197,7 @@ _RGB = (
 )
 _NORMAL = ("nx", "ny", "nz")
 _INDICES = ("vertex_indices", "vertex_index")
+_TEXCOORD = "texcoord"  # of the corners of a face, as MeshLab writes them
 
 
 class Header(NamedTuple):
@@ -212,7 +217,7 @@ def read(content: bytes) -> RawMesh:
         body = memoryview(numbers(bytes(body)).tobytes())
     mesh, position = RawMesh(np.zeros((0, 3)), np.zeros((0, 3), np.int64)), 0
     ignored: list[str] = []
-    polygons = strips = None
+    polygons = strips = of_corners = None
     for element in header.elements:
         if element.name == "vertex":
             table, position = columns(body, position, element)
@@ -233,12 +238,19 @@ def read(content: bytes) -> RawMesh:
                 _colours(table, rgb, element),
             )
         elif element.name == "face" and element.rows > 0:
+            start = position
             corners, counts, position = lists(body, position, element, _indices(element))
             if not np.all(np.isfinite(corners) & (corners == np.trunc(corners))):
                 raise ValueError("it has an index that is no integer")
             polygons = corners.astype(np.int64), counts
-            used = _indices(element).name
-            ignored += [f"face {p.name}" for p in element.properties if p.name != used]
+            used = [_indices(element).name]
+            for p in element.properties:
+                if p.name == _TEXCOORD and p.length is not None:
+                    numbers_, sizes, _ = lists(body, start, element, p)
+                    if np.array_equal(sizes, 2 * counts):
+                        of_corners = numbers_.astype(np.float64).reshape(-1, 2)
+                        used.append(_TEXCOORD)
+            ignored += [f"face {p.name}" for p in element.properties if p.name not in used]
         elif element.name == "tristrips" and element.rows > 0:
             corners, counts, position = lists(body, position, element, _indices(element))
             if not np.all(np.isfinite(corners) & (corners == np.trunc(corners))):
@@ -257,9 +269,31 @@ def read(content: bytes) -> RawMesh:
     if polygons is not None:
         if strips is not None:
             raise ValueError("it has faces and tristrips; expected one of them")
+        if of_corners is not None:
+            mesh, polygons = _parted(mesh, polygons, of_corners)
         faces, concave = triangulated(mesh.vertices, *polygons)
         mesh = mesh._replace(faces=faces, doubtful=doubt(concave))
     return mesh._replace(ignored=tuple(ignored))
+
+
+def _parted(
+    mesh: RawMesh, polygons: tuple[IntArray, IntArray], uv: FloatArray
+) -> tuple[RawMesh, tuple[IntArray, IntArray]]:
+    """The mesh, and its polygons, with texture coordinates of their corners (n, 2): a vertex whose
+    coordinates differ between faces becomes several."""
+    corners, counts = polygons
+    if np.any((corners < 0) | (corners >= len(mesh.vertices))):
+        return mesh, polygons  # which is an error
+    keys = np.column_stack([corners, uv.view(np.int64)])
+    _, first, vertex = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    which = corners[first]
+    parted = mesh._replace(
+        vertices=mesh.vertices[which],
+        normals=None if mesh.normals is None else mesh.normals[which],
+        uv=uv[first],
+        colours=None if mesh.colours is None else mesh.colours[which],
+    )
+    return parted, (vertex.reshape(-1), counts)
 
 
 def _of_strips(corners: IntArray, counts: IntArray) -> IntArray:
@@ -318,12 +352,14 @@ def _header(content: bytes) -> Header:
     newline = first[3:].lstrip(b" \t")
     if not first.startswith(b"ply") or newline not in (b"\n", b"\r\n", b"\r"):
         raise ValueError("Not a ply file! Expected 'ply' as its first line")
-    last = newline + b"end_header" + newline
-    end = content.find(last)
-    if end < 0:
+    # Some programs end this line otherwise than those before it.
+    ends = rb"\r" if newline == b"\r" else rb"\r?\n"
+    last = re.search(rb"[\r\n][ \t]*end_header[ \t]*" + ends, content)
+    if last is None:
         raise ValueError("its header has no line 'end_header'")
+    end = last.start()
     order, elements = "", list[Element]()
-    for number, line in enumerate(content[:end].split(newline), start=1):
+    for number, line in enumerate(content[:end].splitlines(), start=1):
         try:
             match line.decode("latin-1").split():
                 case ["format", name, "1.0"] if name in _ORDERS and not elements:
@@ -344,7 +380,7 @@ def _header(content: bytes) -> Header:
     for names in ([e.name for e in elements], *([p.name for p in e.properties] for e in elements)):
         if len(names) != len(set(names)):
             raise ValueError("its header has a name twice; expected different ones")
-    return Header(elements, order, end + len(last))
+    return Header(elements, order, last.end())
 
 
 def _property(words: list[str], order: str) -> Property:
