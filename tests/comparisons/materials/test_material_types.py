@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from comparisons.materials import MATERIALS, READERS
+from comparisons.materials import MATERIALS, READERS, MaterialType
+from comparisons.materials.both_sides import both_sides, directions
 from comparisons.mitsuba.backend import mitsuba, scalar
+from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.plugin_table import PluginTable, Row
 from comparisons.translator.writing import write_xml
 from reference_rt.core.model import types_of
@@ -25,7 +27,7 @@ from reference_rt.materials import (
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.examples import NAMED, examples, write_files
 from reference_rt.shapes import Sphere
-from reference_rt.textures import Bitmap
+from reference_rt.textures import Bitmap, texture_names
 from reference_rt.util.errors import SceneError
 
 
@@ -150,3 +152,27 @@ def test_what_is_written_is_read_again(material: Material, tmp_path: Path) -> No
         read = Scene.load(tmp_path / "out.xml")
     (shape,) = read.shapes
     assert whole(read, shape.material) == whole(scene, "it")
+
+
+# ---- parameters that are not read ----------------------------------------------------------------
+
+IGNORED = [
+    pytest.param(one, name, id=f"{one.table.plugin}-{name}")
+    for one in MATERIALS
+    if one.table is not None
+    for name in one.table.ignored
+]
+
+
+@pytest.mark.parametrize(("one", "name"), IGNORED)
+def test_what_is_not_read_changes_no_value(one: MaterialType, name: str) -> None:
+    """Of Mitsuba's own plugin, by all examples of our type."""
+    assert one.table is not None
+    wo, wi = directions(20, seed=3, both=True)
+    values = (False, True) if name == "sample_visible" else (0.25, 4.0)
+    for material in examples(one.description):
+        if not texture_names(material):
+            plugin = one.table.write(material, TranslationContext({}, {}, Path()))
+            a, b = (both_sides(material, wo, wi, {**plugin, name: x})[1] for x in values)
+            assert a.any()
+            np.testing.assert_array_equal(a, b)
