@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from comparisons import rungs as ladder
-from comparisons.compare import looks, pictures, ray_starts
+from comparisons.compare import looks, pictures, precision, ray_starts
 from comparisons.compare.budget import LEAST, Budget
 from comparisons.compare.control import control
 from comparisons.compare.judge import Evidence, Rendered, at_look, check, judge
@@ -190,6 +190,7 @@ def _gather(
         ray_starts=None
         if budget.seconds is None or not ray_starts.may_matter(scene, shown)
         else partial(ray_starts.explained, scene, shown, budget.limit, budget.seconds, say),
+        rest_of=partial(precision.rest_of, scene, tables, counterpart, budget.limit),
     )
 
 

@@ -14,8 +14,9 @@ from comparisons.rungs.rays.coincidence import is_doubled, on_two_surfaces
 from comparisons.rungs.rays.lamp_images import is_beside, magnified, slopes_of_image
 from comparisons.rungs.rays.light_context import POINT_LIKE, LightContext, kind_of
 from comparisons.rungs.rays.light_error import bounds, slopes_of
-from comparisons.rungs.rays.mitsuba_light import _lamp, is_dark, mitsuba_direct
+from comparisons.rungs.rays.mitsuba_light import _lamp, is_blocked, is_dark, mitsuba_direct
 from comparisons.rungs.rays.rays import described, mixed_rays
+from comparisons.rungs.rays.resolution import elsewhere
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.lights import AREA
@@ -41,13 +42,16 @@ FEWEST = 20
 class Outcome(NamedTuple):
     """The comparison at one point of one light.
 
-    rays: how many were compared;  unexplained: indices of those that differ;  ours, theirs (m, 3):
-    their values in W/sr/m²;  explained: how many the arbiter explains;  max_error, max_ratio: the
-    largest error, and error over bound, of the rest;  ratio, cosine (m,): of rays that differ and
+    rays: how many were compared;  lit: how many of these on either side, and `right` of them alike;
+    unexplained: indices of those that differ;  ours, theirs (m, 3): their values in W/sr/m²;
+    explained: how many the arbiter explains;  max_error, max_ratio: the largest error, and error
+    over bound, of the rest;  ratio, cosine (m,): of rays that differ and
     are lit on both sides, our value over Mitsuba's, and the cosine at the surface.
     """
 
     rays: int
+    lit: int
+    right: int
     unexplained: IntArray
     ours: FloatArray
     theirs: FloatArray
@@ -101,10 +105,15 @@ def direct(
         "lights_tested": len(tested),
         "explained": explained,
         "unexplained": unexplained,
+        "lit": sum(o.lit for o in outcomes.values()),
+        "lit_right": sum(o.right for o in outcomes.values()),
         "max_error": max(o.max_error for o in outcomes.values()),
         "max_error_over_bound": max(o.max_ratio for o in outcomes.values()),
     }
     numbers |= _ratios(list(outcomes.values()))
+    if unexplained:
+        left = np.unique(np.concatenate([o.unexplained for o in outcomes.values()]))
+        numbers["elsewhere"] = elsewhere(scene, tables, counterpart, rays.rows(left))
     for (light, u), outcome in outcomes.items():
         if len(outcome.unexplained):
             k = int(outcome.unexplained[0])
@@ -119,7 +128,8 @@ def direct(
         "shadow epsilon"
     )
     if arbiter.too_many(explained, total):
-        return RungResult("direct", "reference-limited", shadows, numbers)
+        found = arbiter.limited(shadows, numbers["lit_right"], numbers["lit"])
+        return RungResult("direct", *found, numbers)
     reason = (
         f"{len(tested)} of {count} lights compared; the largest error is "
         f"{numbers['max_error_over_bound']:.2g} times float32's bound; {shadows}"
@@ -159,7 +169,7 @@ def _compare(
     known = np.flatnonzero(is_known)
     if len(known) == 0:
         none = np.zeros((0, 3))
-        return Outcome(0, known, none, none, 0, 0.0, 0.0, np.zeros(0), np.zeros(0))
+        return Outcome(0, 0, 0, known, none, none, 0, 0.0, 0.0, np.zeros(0), np.zeros(0))
     context, target = context.of(known), target[known]
     rays, hits = context.rays, context.hits
     value = ours.contribution[known]
@@ -168,12 +178,16 @@ def _compare(
     bound += slopes_of(context, light, u, value)
     scale = magnified(context, light, target, ours.pdf[known])
     bound += slopes_of_image(context, light, u, value, scale)
-    # Where a light does not shine, no shadow ray explains that Mitsuba's does.
-    kind = kind_of(context, light)
-    is_bounded = kind in POINT_LIKE and POINT_LIKE[kind].is_bounded
-    of_shadow = (ours.pdf[known] > 0.0) | (not is_bounded)
     error = np.abs(theirs - value).max(axis=1)
     wrong = np.flatnonzero(~(error <= bound))
+    # Mitsuba's shadow ray explains its light only where ours is dark because of a shadow: not where
+    # the light shines elsewhere, or from behind the surface.
+    is_lit = value.any(axis=1)
+    kind = kind_of(context, light)
+    is_bounded = kind in POINT_LIKE and POINT_LIKE[kind].is_bounded
+    in_shadow = ~is_lit & ((ours.pdf[known] > 0.0) | (not is_bounded))
+    dark = wrong[in_shadow[wrong]]
+    in_shadow[dark] = is_blocked(context.of(dark), light, target[dark])
 
     def like_theirs(numbers: IntArray, offsets: FloatArray) -> arbiter.BoolArray:
         there = query.direct_light(
@@ -182,7 +196,7 @@ def _compare(
         # The move itself shifts the value by as much as the bound: twice is allowed.
         error = np.abs(there - theirs[numbers]).max(axis=1)
         dark = ~theirs[numbers].any(axis=1)
-        lit_differs = (value[numbers].any(axis=1) == dark) & of_shadow[numbers]
+        lit_differs = np.where(dark, is_lit[numbers], in_shadow[numbers])
         now_dark = is_dark(context.of(numbers), light, target[numbers], offsets, lamp[numbers])
         return np.asarray((error <= 2.0 * bound[numbers]) | (lit_differs & (now_dark == dark)))
 
@@ -195,13 +209,15 @@ def _compare(
     settled |= is_beside(some, light, u, theirs[wrong], allowed, scale[wrong])
     if kind_of(context, light) == AREA:
         settled |= is_doubled(context.sizes, tables, some.hits.p, target[wrong])
-    right = error <= bound
+    right, shines = error <= bound, is_lit | theirs.any(axis=1)
     left = wrong[~settled]
     lit = left[value[left].any(axis=1) & theirs[left].any(axis=1)]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.nan_to_num(error[right] / bound[right])
     return Outcome(
         rays=len(known),
+        lit=int(np.count_nonzero(shines)),
+        right=int(np.count_nonzero(shines & right)),
         unexplained=known[left],
         ours=value[left],
         theirs=theirs[left],

@@ -189,7 +189,7 @@ def _outcome(
         )
     many_aimed = arbiter.too_many(numbers["aimed_mismatches"], total - count)
     if arbiter.too_many(numbers["explained"], count) or unaimed or many_aimed:
-        return "reference-limited", text
+        return arbiter.limited(text, count - numbers["explained"] - unaimed, count)
     worst = max(v for k, v in numbers.items() if k.endswith("error_over_bound"))
     return "agree", f"{total} rays agree, within {worst:.2g} of float32's bound; {text}"
 

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
+from comparisons.results.case import Status
 from reference_rt.core.arrays import FloatArray, IntArray
 
 BoolArray = npt.NDArray[np.bool_]
@@ -35,6 +36,10 @@ take 1e-4 of a picture or less; beyond 1 % the comparison measures Mitsuba's pre
 SURE = 1e-4
 """Chance of reporting, falsely, that a fraction of rays exceeds its limit."""
 
+REST = 0.1
+"""Least share of what is lit that must be resolved and agree.  With less, agreement would rest on
+values that say nothing, and a fault could hide in the others."""
+
 AT_ONCE = 2000
 """Moved rays that are traced in one call, when fewer rays than these are left."""
 
@@ -43,6 +48,20 @@ def too_many(count: int, total: int, limit: float = LIMIT) -> bool:
     """Whether `count` of `total` rays prove a fraction above `limit` (binomial test): of few rays
     one may be too many by chance."""
     return bool(special.bdtrc(count - 1, total, limit) < SURE)
+
+
+def most_of(count: int, total: int) -> float:
+    """The upper end of the confidence interval of a fraction of which `count` of `total` were
+    found (Clopper and Pearson 1934)."""
+    return float(special.betaincinv(count + 1, total - count, 1.0 - SURE)) if count < total else 1.0
+
+
+def limited(reason: str, right: int, total: int) -> tuple[Status, str]:
+    """The status and the reason of a rung that does not differ, but in which too many values are
+    not resolved.  right, total: how many agree, and of how many, without those that are dark."""
+    if right >= REST * total:
+        return "reference-limited", reason
+    return "inconclusive", f"{reason}; only {right} of {total} others agree, too few to judge by"
 
 
 def directions(n: int) -> FloatArray:
