@@ -12,7 +12,8 @@ from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.coincidence import is_doubled, on_two_surfaces
 from comparisons.rungs.rays.lamp_images import is_beside, magnified, slopes_of_image
-from comparisons.rungs.rays.light_context import POINT_LIKE, LightContext, kind_of
+from comparisons.rungs.rays.light_context import DISTANT, POINT_LIKE, LightContext, kind_of
+from comparisons.rungs.rays.light_context import described as described_light
 from comparisons.rungs.rays.light_error import bounds, slopes_of
 from comparisons.rungs.rays.mitsuba_light import _lamp, is_blocked, is_dark, mitsuba_direct
 from comparisons.rungs.rays.rays import described, mixed_rays
@@ -42,7 +43,8 @@ FEWEST = 20
 class Outcome(NamedTuple):
     """The comparison at one point of one light.
 
-    rays: how many were compared;  lit: how many of these on either side, and `right` of them alike;
+    rays: how many were compared;  lit: how many of these on either side, and `right` of them alike
+    (`arbiter.tells`);
     unexplained: indices of those that differ;  ours, theirs (m, 3): their values in W/sr/m²;
     explained: how many the arbiter explains;  max_error, max_ratio: the largest error, and error
     over bound, of the rest;  ratio, cosine (m,): of rays that differ and
@@ -110,6 +112,7 @@ def direct(
         "max_error": max(o.max_error for o in outcomes.values()),
         "max_error_over_bound": max(o.max_ratio for o in outcomes.values()),
     }
+    numbers["tells"] = arbiter.is_enough(numbers["lit_right"], numbers["lit"])
     numbers |= _ratios(list(outcomes.values()))
     if unexplained:
         left = np.unique(np.concatenate([o.unexplained for o in outcomes.values()]))
@@ -127,9 +130,13 @@ def direct(
         f"{explained} of {total} values are not resolved by Mitsuba: at edges, or within its "
         "shadow epsilon"
     )
-    if arbiter.too_many(explained, total):
-        found = arbiter.limited(shadows, numbers["lit_right"], numbers["lit"])
-        return RungResult("direct", *found, numbers)
+    if total == 0:
+        reason = "no point of a light is known for any ray"
+        return RungResult("direct", "not-applicable", reason, numbers)
+    if arbiter.too_many(explained, total) or not numbers["tells"]:
+        if not numbers["tells"]:
+            shadows += f"; only {numbers['lit_right']} of {numbers['lit']} lit values say anything"
+        return RungResult("direct", "reference-limited", shadows, numbers)
     reason = (
         f"{len(tested)} of {count} lights compared; the largest error is "
         f"{numbers['max_error_over_bound']:.2g} times float32's bound; {shadows}"
@@ -162,7 +169,7 @@ def _compare(
 ) -> Outcome:
     """One point of one light at all hits;  brightest: the largest value of all lights' points."""
     rays, hits, tables = context.rays, context.hits, context.tables
-    target = _targets(ours)
+    target = _targets(context, light, ours)
     is_known = (hits.shape >= 0) & np.isfinite(target).all(axis=1)
     if kind_of(context, light) == AREA:  # the target is a point
         is_known &= ~_in_plane(context, target)
@@ -217,7 +224,7 @@ def _compare(
     return Outcome(
         rays=len(known),
         lit=int(np.count_nonzero(shines)),
-        right=int(np.count_nonzero(shines & right)),
+        right=int(np.count_nonzero(shines & right & arbiter.tells(bound, value, theirs))),
         unexplained=known[left],
         ours=value[left],
         theirs=theirs[left],
@@ -237,13 +244,20 @@ def _in_plane(context: LightContext, target: FloatArray) -> arbiter.BoolArray:
     return np.asarray(height <= sizes.frame.delta(rays.o, hits.p, sizes.reach_of(hits.shape)))
 
 
-def _targets(ours: DirectLight) -> FloatArray:
+def _targets(context: LightContext, light: int, ours: DirectLight) -> FloatArray:
     """(n, 3): the point on the light for each ray; NaN where it is not known.
 
-    Our query returns no point where no light can arrive.  If a light has the same point for all
-    rays, that point is used there too, to check that Mitsuba is dark as well.
+    Our query returns no point where no light can arrive.  A light without extent has the point of
+    its description there, to check that Mitsuba is dark as well; and if a lamp has the same point
+    for all rays, so has it.
     """
     seen = ours.pdf > 0.0
+    kind = kind_of(context, light)
+    if kind in POINT_LIKE:
+        p = context.hits.p
+        towards = POINT_LIKE[kind].towards(described_light(context, light), p)
+        there = towards if kind in DISTANT else p + towards
+        return np.where(seen[:, None], ours.target, there)
     target = np.full_like(ours.target, np.nan)
     target[seen] = ours.target[seen]
     if seen.any() and np.ptp(ours.target[seen], axis=0).max() == 0.0:

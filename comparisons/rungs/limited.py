@@ -39,7 +39,8 @@ RestOf = Callable[[float], Rest]
 
 def limited(rungs: Sequence[RungResult], rest_of: RestOf | None = None) -> list[RungResult]:
     """The results, with `differ` of a rung of light changed to `reference-limited` where Mitsuba
-    does not resolve the scene, and this explains what differs.
+    does not resolve the scene, and this explains what differs.  Above a rung that differs even so
+    nothing is excused.
 
     Mitsuba does not resolve a scene if geometry agrees but, by prediction and by measurement, too
     many secondary rays hit the wrong surface (see `rays.resolution`), nor above a rung in which the
@@ -50,16 +51,32 @@ def limited(rungs: Sequence[RungResult], rest_of: RestOf | None = None) -> list[
     results: list[RungResult] = []
     limit: Limit | None = None
     pictures: Rest | None = None
+    is_broken = False
     for result in sorted(rungs, key=lambda result: RUNGS.index(result.name)):
-        if limit and result.name in OF_LIGHT and result.status == "differ":
+        if limit and not is_broken and result.name in OF_LIGHT and result.status == "differ":
             if result.name in OF_RAYS:
                 result = _judged(result, limit, _of_rays(result))
             elif rest_of is not None:
                 pictures = pictures or rest_of(limit.share)
                 result = _judged(result, limit, pictures)
         limit = limit or _limit(result)
+        is_broken |= result.status == "differ"
         results.append(result)
-    return results
+    return results if any(_says(result) for result in results) else [_open(r) for r in results]
+
+
+def _says(result: RungResult) -> bool:
+    """Whether a rung of light has found that enough agrees."""
+    found = result.status in ("agree", "reference-limited")
+    return result.name in OF_LIGHT and found and result.numbers.get("tells", True)
+
+
+def _open(result: RungResult) -> RungResult:
+    """A result in which too little agrees to rest on, where no other rung has more."""
+    if result.status != "reference-limited" or result.numbers.get("tells", True):
+        return result
+    reason = f"too little is within Mitsuba's precision to judge by: {result.reason}"
+    return replace(result, status="inconclusive", reason=reason)
 
 
 OF_RAYS = ("direct", "whitted")
@@ -80,10 +97,7 @@ def _of_rays(result: RungResult) -> Rest:
     others = numbers.get("elsewhere", numbers["unexplained"])
     if others:
         return Rest("differ", f"{others} of them are not beyond Mitsuba's precision")
-    status, reason = arbiter.limited(
-        "each of these rays is beyond it", numbers["lit_right"], numbers["lit"]
-    )
-    return Rest("agree" if status == "reference-limited" else status, reason)
+    return Rest("agree", "each of these rays is beyond it")
 
 
 def _limit(result: RungResult) -> Limit | None:

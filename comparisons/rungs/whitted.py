@@ -79,6 +79,7 @@ def whitted(
     settled = trees.explained(rays, compared)
     unexplained = outliers[~settled]
     right, lit = error <= bound, ours.any(axis=1) | theirs.any(axis=1)
+    told = lit & right & arbiter.tells(bound, ours, theirs)
     ratio = np.divide(error, bound, out=np.zeros_like(error), where=bound > 0.0)[right]
     numbers: dict[str, Any] = {
         "pixels": len(rays.o),
@@ -88,8 +89,9 @@ def whitted(
         "explained": int(np.count_nonzero(settled)),
         "unexplained": len(unexplained),
         "lit": int(np.count_nonzero(lit)),
-        "lit_right": int(np.count_nonzero(lit & right)),
+        "lit_right": int(np.count_nonzero(told)),
     }
+    numbers["tells"] = arbiter.is_enough(numbers["lit_right"], numbers["lit"])
     if len(unexplained):
         numbers["elsewhere"] = elsewhere(scene, tables, counterpart, rays.rows(unexplained))
         k = int(unexplained[np.argmax(np.nan_to_num(error[unexplained], nan=np.inf))])
@@ -103,9 +105,10 @@ def whitted(
         f"{numbers['explained']} of {len(rays.o)} pixels lie at edges that Mitsuba does not "
         "resolve (float32, its ray epsilon)"
     )
-    if arbiter.too_many(numbers["explained"], len(rays.o)):
-        found = arbiter.limited(edges, numbers["lit_right"], numbers["lit"])
-        return RungResult("whitted", *found, numbers)
+    if arbiter.too_many(numbers["explained"], len(rays.o)) or not numbers["tells"]:
+        if not numbers["tells"]:
+            edges += f"; only {numbers['lit_right']} of {numbers['lit']} lit pixels say anything"
+        return RungResult("whitted", "reference-limited", edges, numbers)
     reason = f"pixels agree within {numbers['max_error']:.2g} W/sr/m²; {edges}"
     return RungResult("whitted", "agree", reason, numbers)
 

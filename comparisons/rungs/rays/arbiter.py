@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
-from comparisons.results.case import Status
 from reference_rt.core.arrays import FloatArray, IntArray
 
 BoolArray = npt.NDArray[np.bool_]
@@ -56,12 +55,16 @@ def most_of(count: int, total: int) -> float:
     return float(special.betaincinv(count + 1, total - count, 1.0 - SURE)) if count < total else 1.0
 
 
-def limited(reason: str, right: int, total: int) -> tuple[Status, str]:
-    """The status and the reason of a rung that does not differ, but in which too many values are
-    not resolved.  right, total: how many agree, and of how many, without those that are dark."""
-    if right >= REST * total:
-        return "reference-limited", reason
-    return "inconclusive", f"{reason}; only {right} of {total} others agree, too few to judge by"
+def tells(bound: FloatArray, *sides: FloatArray) -> BoolArray:
+    """(n,): whether an error bound (n,) leaves values (n, 3) of two sides anything to say: it is at
+    most half of them."""
+    return np.asarray(bound <= 0.5 * np.maximum(*(np.abs(side).max(axis=1) for side in sides)))
+
+
+def is_enough(right: int, total: int) -> bool:
+    """Whether values that agree are a share of all on which a rung may rest;  total: without those
+    that are dark."""
+    return right >= REST * total
 
 
 def directions(n: int) -> FloatArray:
