@@ -120,7 +120,8 @@ def geometry(
         **camera.numbers,
     }
     if resolved and not isinstance(scene.integrator, RayCast):
-        numbers["resolution"] = resolution(scene, tables, counterpart, seed)._asdict()
+        found = resolution(scene, tables, counterpart, seed)
+        numbers |= {"resolution": found._asdict(), "is_limited": found.is_limited}
     if camera.problem:
         return RungResult("geometry", "differ", camera.problem, numbers)
     status, reason = _outcome(traced, verdict, is_aimed, numbers, say)

@@ -240,7 +240,7 @@ FAULTS = (
     GrossFault("ten times as rough", "a rough material",
                _each("materials", ALL, lambda x: _fields(x, ("alpha",), _times(10.0)))),
     GrossFault("textures half as much again", "a texture", _textures),
-    GrossFault("paths of two edges", "a path tracer", _short),
+    GrossFault("paths of two edges", "a path tracer of longer paths", _short),
     GrossFault("a fifth more field of view", "a field of view",
                _camera(fov=lambda scene: 1.2 * scene.camera.fov)),
     GrossFault("eye aside", "a camera that looks at a point", _camera(eye=_aside)),
