@@ -19,6 +19,7 @@ from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.results.case import Case, RungResult
 from comparisons.rungs.layers.rung import applies
+from comparisons.rungs.limited import Rest
 from comparisons.rungs.witness import witness_of
 from comparisons.translator import MOST_INSTANCES, UntranslatableError, load
 from comparisons.translator.moved import with_float32_vertices
@@ -107,7 +108,14 @@ def gather(
         "Mitsuba renders in its scalar variant: its fast ones compile code for each of the many "
         "instances"
     )
-    return replace(evidence, lights=None, notes=(note, *evidence.notes))
+
+    def rest_of(rendered: Rendered, share: float) -> Rest:
+        assert evidence.rest_of is not None
+        with scalar():
+            return evidence.rest_of(rendered, share)
+
+    left = None if evidence.rest_of is None else rest_of
+    return replace(evidence, lights=None, rest_of=left, notes=(note, *evidence.notes))
 
 
 def _has_many_instances(scene: Scene) -> bool:

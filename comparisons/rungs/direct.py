@@ -133,9 +133,9 @@ def direct(
     if total == 0:
         reason = "no point of a light is known for any ray"
         return RungResult("direct", "not-applicable", reason, numbers)
-    if arbiter.too_many(explained, total) or not numbers["tells"]:
-        if not numbers["tells"]:
-            shadows += f"; only {numbers['lit_right']} of {numbers['lit']} lit values say anything"
+    if not numbers["tells"]:
+        shadows += f"; only {numbers['lit_right']} of {numbers['lit']} lit values say anything"
+    if arbiter.too_many(explained, total):
         return RungResult("direct", "reference-limited", shadows, numbers)
     reason = (
         f"{len(tested)} of {count} lights compared; the largest error is "

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from comparisons.results.case import RungResult, Status
+from comparisons.results.case import PASSING, RungResult, Status
 from comparisons.results.rungs import OF_LIGHT, RUNGS
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.resolution import Resolution
@@ -67,13 +67,13 @@ def limited(rungs: Sequence[RungResult], rest_of: RestOf | None = None) -> list[
 
 def _says(result: RungResult) -> bool:
     """Whether a rung of light has found that enough agrees."""
-    found = result.status in ("agree", "reference-limited")
-    return result.name in OF_LIGHT and found and result.numbers.get("tells", True)
+    says = result.name in OF_LIGHT and result.numbers.get("tells", True)
+    return says and result.status in PASSING
 
 
 def _open(result: RungResult) -> RungResult:
     """A result in which too little agrees to rest on, where no other rung has more."""
-    if result.status != "reference-limited" or result.numbers.get("tells", True):
+    if result.status not in PASSING or result.numbers.get("tells", True):
         return result
     reason = f"too little is within Mitsuba's precision to judge by: {result.reason}"
     return replace(result, status="inconclusive", reason=reason)

@@ -105,9 +105,9 @@ def whitted(
         f"{numbers['explained']} of {len(rays.o)} pixels lie at edges that Mitsuba does not "
         "resolve (float32, its ray epsilon)"
     )
-    if arbiter.too_many(numbers["explained"], len(rays.o)) or not numbers["tells"]:
-        if not numbers["tells"]:
-            edges += f"; only {numbers['lit_right']} of {numbers['lit']} lit pixels say anything"
+    if not numbers["tells"]:
+        edges += f"; only {numbers['lit_right']} of {numbers['lit']} lit pixels say anything"
+    if arbiter.too_many(numbers["explained"], len(rays.o)):
         return RungResult("whitted", "reference-limited", edges, numbers)
     reason = f"pixels agree within {numbers['max_error']:.2g} W/sr/m²; {edges}"
     return RungResult("whitted", "agree", reason, numbers)
