@@ -17,7 +17,7 @@ from comparisons.rungs.rays.light_context import described as described_light
 from comparisons.rungs.rays.light_error import bounds, slopes_of
 from comparisons.rungs.rays.mitsuba_light import _lamp, is_blocked, is_dark, mitsuba_direct
 from comparisons.rungs.rays.rays import described, mixed_rays
-from comparisons.rungs.rays.resolution import elsewhere
+from comparisons.rungs.rays.resolution import NOT_BEYOND, elsewhere, too_many_elsewhere
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.lights import AREA
@@ -46,8 +46,8 @@ class Outcome(NamedTuple):
     rays: how many were compared;  lit: how many of these on either side, and `right` of them alike
     (`arbiter.tells`);
     unexplained: indices of those that differ;  ours, theirs (m, 3): their values in W/sr/m²;
-    explained: how many the arbiter explains;  max_error, max_ratio: the largest error, and error
-    over bound, of the rest;  ratio, cosine (m,): of rays that differ and
+    explained: indices of those that the arbiter explains;  max_error, max_ratio: the largest
+    error, and error over bound, of the rest;  ratio, cosine (m,): of rays that differ and
     are lit on both sides, our value over Mitsuba's, and the cosine at the surface.
     """
 
@@ -57,7 +57,7 @@ class Outcome(NamedTuple):
     unexplained: IntArray
     ours: FloatArray
     theirs: FloatArray
-    explained: int
+    explained: IntArray
     max_error: float
     max_ratio: float
     ratio: FloatArray
@@ -99,7 +99,7 @@ def direct(
         for (light, u), ours in answers.items()
     }
     total = sum(o.rays for o in outcomes.values())
-    explained = sum(o.explained for o in outcomes.values())
+    explained = sum(len(o.explained) for o in outcomes.values())
     unexplained = sum(len(o.unexplained) for o in outcomes.values())
     numbers: dict[str, Any] = {
         "rays": total,
@@ -114,6 +114,10 @@ def direct(
     }
     numbers["tells"] = arbiter.is_enough(numbers["lit_right"], numbers["lit"])
     numbers |= _ratios(list(outcomes.values()))
+    settled = np.concatenate([o.explained for o in outcomes.values()])
+    numbers["explained_elsewhere"] = too_many_elsewhere(
+        scene, tables, counterpart, rays.rows(settled), total
+    )
     if unexplained:
         left = np.unique(np.concatenate([o.unexplained for o in outcomes.values()]))
         numbers["elsewhere"] = elsewhere(scene, tables, counterpart, rays.rows(left))
@@ -135,6 +139,8 @@ def direct(
         return RungResult("direct", "not-applicable", reason, numbers)
     if not numbers["tells"]:
         shadows += f"; only {numbers['lit_right']} of {numbers['lit']} lit values say anything"
+    if numbers["explained_elsewhere"]:
+        return RungResult("direct", "differ", f"{shadows}, but {NOT_BEYOND}", numbers)
     if arbiter.too_many(explained, total):
         return RungResult("direct", "reference-limited", shadows, numbers)
     reason = (
@@ -176,7 +182,7 @@ def _compare(
     known = np.flatnonzero(is_known)
     if len(known) == 0:
         none = np.zeros((0, 3))
-        return Outcome(0, 0, 0, known, none, none, 0, 0.0, 0.0, np.zeros(0), np.zeros(0))
+        return Outcome(0, 0, 0, known, none, none, known, 0.0, 0.0, np.zeros(0), np.zeros(0))
     context, target = context.of(known), target[known]
     rays, hits = context.rays, context.hits
     value = ours.contribution[known]
@@ -187,14 +193,15 @@ def _compare(
     bound += slopes_of_image(context, light, u, value, scale)
     error = np.abs(theirs - value).max(axis=1)
     wrong = np.flatnonzero(~(error <= bound))
-    # Mitsuba's shadow ray explains its light only where ours is dark because of a shadow: not where
-    # the light shines elsewhere, or from behind the surface.
+    # Mitsuba's shadow ray explains that only one side is lit where ours is as our own shadow ray
+    # says: not where our light shines elsewhere or from behind the surface, or where it passes
+    # through surfaces.
     is_lit = value.any(axis=1)
     kind = kind_of(context, light)
     is_bounded = kind in POINT_LIKE and POINT_LIKE[kind].is_bounded
-    in_shadow = ~is_lit & ((ours.pdf[known] > 0.0) | (not is_bounded))
-    dark = wrong[in_shadow[wrong]]
-    in_shadow[dark] = is_blocked(context.of(dark), light, target[dark])
+    may_flip = is_lit | (ours.pdf[known] > 0.0) | (not is_bounded)
+    some = wrong[may_flip[wrong]]
+    may_flip[some] = is_lit[some] != is_blocked(context.of(some), light, target[some])
 
     def like_theirs(numbers: IntArray, offsets: FloatArray) -> arbiter.BoolArray:
         there = query.direct_light(
@@ -203,7 +210,7 @@ def _compare(
         # The move itself shifts the value by as much as the bound: twice is allowed.
         error = np.abs(there - theirs[numbers]).max(axis=1)
         dark = ~theirs[numbers].any(axis=1)
-        lit_differs = np.where(dark, is_lit[numbers], in_shadow[numbers])
+        lit_differs = (is_lit[numbers] == dark) & may_flip[numbers]
         now_dark = is_dark(context.of(numbers), light, target[numbers], offsets, lamp[numbers])
         return np.asarray((error <= 2.0 * bound[numbers]) | (lit_differs & (now_dark == dark)))
 
@@ -228,7 +235,7 @@ def _compare(
         unexplained=known[left],
         ours=value[left],
         theirs=theirs[left],
-        explained=int(np.count_nonzero(settled)),
+        explained=known[wrong[settled]],
         max_error=float(error[right].max(initial=0.0)),
         max_ratio=float(ratio.max(initial=0.0)),
         ratio=value[lit].sum(axis=1) / theirs[lit].sum(axis=1),

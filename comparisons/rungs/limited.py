@@ -46,7 +46,8 @@ def limited(rungs: Sequence[RungResult], rest_of: RestOf | None = None) -> list[
     many secondary rays hit the wrong surface (see `rays.resolution`), nor above a rung in which the
     arbiter finds too many rays that float32 cannot resolve.  That explains values of single rays
     only if each of these rays is beyond precision by its own geometry: `numbers["elsewhere"]`
-    counts the others.  It explains pictures only if they agree without it: `rest_of`.
+    counts the others, `numbers["explained_elsewhere"]` those that the arbiter explains, if they are
+    too many.  It explains pictures only if they agree without it: `rest_of`.
     """
     results: list[RungResult] = []
     limit: Limit | None = None
@@ -95,6 +96,7 @@ def _of_rays(result: RungResult) -> Rest:
     """What is left of the values of single rays."""
     numbers = result.numbers
     others = numbers.get("elsewhere", numbers["unexplained"])
+    others += numbers.get("explained_elsewhere", 0)
     if others:
         return Rest("differ", f"{others} of them are not beyond Mitsuba's precision")
     return Rest("agree", "each of these rays is beyond it")

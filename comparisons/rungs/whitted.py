@@ -23,7 +23,7 @@ from comparisons.rungs.rays.light_context import LightContext
 from comparisons.rungs.rays.light_error import cut_off, of_direct_light
 from comparisons.rungs.rays.neighbours import NeighbourContext, explained_by_neighbours, rounding_of
 from comparisons.rungs.rays.rays import Rays, described, pixel_rays
-from comparisons.rungs.rays.resolution import elsewhere
+from comparisons.rungs.rays.resolution import NOT_BEYOND, elsewhere, too_many_elsewhere
 from comparisons.rungs.rays.slopes import is_steep, moved, slopes
 from comparisons.shapes import type_of
 from comparisons.translator.accuracy import accuracy, coat_error
@@ -92,6 +92,9 @@ def whitted(
         "lit_right": int(np.count_nonzero(told)),
     }
     numbers["tells"] = arbiter.is_enough(numbers["lit_right"], numbers["lit"])
+    numbers["explained_elsewhere"] = too_many_elsewhere(
+        scene, tables, counterpart, rays.rows(outliers[settled]), len(rays.o)
+    )
     if len(unexplained):
         numbers["elsewhere"] = elsewhere(scene, tables, counterpart, rays.rows(unexplained))
         k = int(unexplained[np.argmax(np.nan_to_num(error[unexplained], nan=np.inf))])
@@ -107,6 +110,8 @@ def whitted(
     )
     if not numbers["tells"]:
         edges += f"; only {numbers['lit_right']} of {numbers['lit']} lit pixels say anything"
+    if numbers["explained_elsewhere"]:
+        return RungResult("whitted", "differ", f"{edges}, but {NOT_BEYOND}", numbers)
     if arbiter.too_many(numbers["explained"], len(rays.o)):
         return RungResult("whitted", "reference-limited", edges, numbers)
     reason = f"pixels agree within {numbers['max_error']:.2g} W/sr/m²; {edges}"

@@ -164,6 +164,22 @@ def beyond_precision(
     return beyond
 
 
+def too_many_elsewhere(
+    scene: Scene, tables: SceneTables, counterpart: Counterpart, rays: Rays, total: int
+) -> int:
+    """Of rays that the arbiter explains, among `total`: how many Mitsuba's precision does not
+    concern, if that is more than such rays may be; else 0."""
+    if not arbiter.too_many(len(rays.o), total):
+        return 0
+    count = elsewhere(scene, tables, counterpart, rays)
+    return count if arbiter.too_many(count, min(total, MOST_ASKED)) else 0
+
+
+NOT_BEYOND = "too many of their rays are not beyond Mitsuba's precision by their own geometry"
+"""Why values that the arbiter explains differ even so: rays next to them show Mitsuba's values, but
+not because of an edge or of a surface that a ray may miss."""
+
+
 def elsewhere(scene: Scene, tables: SceneTables, counterpart: Counterpart, rays: Rays) -> int:
     """How many of the rays, of at most MOST_ASKED, Mitsuba's precision does not concern."""
     step = -(-len(rays.o) // MOST_ASKED)
