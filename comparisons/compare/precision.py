@@ -135,8 +135,11 @@ def _noisy(
     candidate, reference = rendered.replicates
     more, usual = OFTEN * share, Margins()
     margins = Margins(image=usual.image + more, tile=usual.tile + more, pixel=usual.pixel + more)
-    known = isinstance(reference, Known)
-    kept = Known(reference.mean * keep, reference.variance * keep) if known else reference * keep
+    kept: FloatArray | Known
+    if isinstance(reference, Known):
+        kept = Known(reference.mean * keep, reference.variance * keep)
+    else:
+        kept = reference * keep
     again = statistics.compare(candidate * keep, kept, limit=limit + more, margins=margins)
     left = 100.0 * float(keep.mean())
     text = (

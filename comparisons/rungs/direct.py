@@ -199,9 +199,9 @@ def _compare(
     is_lit = value.any(axis=1)
     kind = kind_of(context, light)
     is_bounded = kind in POINT_LIKE and POINT_LIKE[kind].is_bounded
-    may_flip = is_lit | (ours.pdf[known] > 0.0) | (not is_bounded)
-    some = wrong[may_flip[wrong]]
-    may_flip[some] = is_lit[some] != is_blocked(context.of(some), light, target[some])
+    may_flip = np.asarray(is_lit | (ours.pdf[known] > 0.0) | (not is_bounded), dtype=np.bool_)
+    asked = wrong[may_flip[wrong]]
+    may_flip[asked] = is_lit[asked] != is_blocked(context.of(asked), light, target[asked])
 
     def like_theirs(numbers: IntArray, offsets: FloatArray) -> arbiter.BoolArray:
         there = query.direct_light(

@@ -1,5 +1,6 @@
 """A limit excuses single rays by their own geometry, pictures by what is left of them."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +15,8 @@ from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.rays.resolution import Resolution, beyond_precision, elsewhere
 from comparisons.translator import load
+from reference_rt.rendering import query
+from reference_rt.rendering.query import DirectLight
 from reference_rt.rendering.scene import Scene
 
 COARSE = RungResult(
@@ -198,6 +201,56 @@ def test_light_from_elsewhere_is_not_unresolved(kind: str) -> None:
     assert found.status == "differ"
     assert found.numbers["explained"] <= 0.01 * found.numbers["rays"]
     assert found.numbers["elsewhere"] > 0.3 * found.numbers["unexplained"]
+
+
+def decorated(
+    monkeypatch: pytest.MonkeyPatch, change: Callable[[Rays, DirectLight], DirectLight]
+) -> RungResult:
+    """The rung of a scene in which our direct light is changed."""
+    right = query.direct_light
+
+    def faulty(tables: Any, o: Any, d: Any, *which: Any) -> DirectLight:
+        return change(Rays(o, d), right(tables, o, d, *which))
+
+    scene = Scene.parse(LIT.format(light=LIGHTS["point"][0]))
+    counterpart = load(scene)
+    monkeypatch.setattr(query, "direct_light", faulty)
+    return direct(scene, scene.tables, counterpart, 200)
+
+
+def test_a_renderer_without_shadows_does_not_explain_itself(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its light passes through the ball, by which our own shadow ray is blocked."""
+    scene = Scene.parse(LIT.format(light=LIGHTS["point"][0]))
+    away = scene.shapes[1].model_copy(update={"center": (0.0, 0.0, 1e3)})
+    alone = scene.changed(shapes=(scene.shapes[0], away)).tables
+    right = query.direct_light
+
+    def without_shadows(rays: Rays, light: DirectLight) -> DirectLight:
+        on_floor = scene.intersect(*rays).shape == 0
+        lit = right(alone, *rays, 0, (0.5, 0.5)).contribution
+        value = np.where(on_floor[:, None], lit, light.contribution)
+        return replace(light, contribution=value)
+
+    found = decorated(monkeypatch, without_shadows)
+    assert found.status == "differ"
+    assert found.numbers["unexplained"] > 5
+    assert found.numbers["explained"] <= 0.01 * found.numbers["rays"]
+
+
+def test_what_the_arbiter_explains_everywhere_is_no_edge(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every third ray of a call is black, whichever it is: rays next to them are right."""
+
+    def black(rays: Rays, light: DirectLight) -> DirectLight:
+        some = np.arange(len(rays.o))[:, None] % 3 == 0
+        return replace(light, contribution=np.where(some, 0.0, light.contribution))
+
+    found = decorated(monkeypatch, black)
+    assert found.numbers["unexplained"] == 0
+    assert found.status == "differ"
+    assert "not beyond Mitsuba's precision" in found.reason
+    assert limited([COARSE, found])[1].status == "differ"
 
 
 PLANE = """
