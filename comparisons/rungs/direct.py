@@ -196,10 +196,10 @@ def _compare(
     # Mitsuba's shadow ray explains that only one side is lit where ours is as our own shadow ray
     # says: not where our light shines elsewhere or from behind the surface, or where it passes
     # through surfaces.
-    is_lit = value.any(axis=1)
+    is_lit = np.asarray(value.any(axis=1), dtype=np.bool_)
     kind = kind_of(context, light)
     is_bounded = kind in POINT_LIKE and POINT_LIKE[kind].is_bounded
-    may_flip = np.asarray(is_lit | (ours.pdf[known] > 0.0) | (not is_bounded), dtype=np.bool_)
+    may_flip = is_lit | (ours.pdf[known] > 0.0) | (not is_bounded)
     asked = wrong[may_flip[wrong]]
     may_flip[asked] = is_lit[asked] != is_blocked(context.of(asked), light, target[asked])
 

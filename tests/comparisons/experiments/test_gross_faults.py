@@ -96,8 +96,10 @@ def test_changes_of_pictures_are_gross() -> None:
 SAMPLE = {
     "grazing": ("directional light reversed", "picture twice as bright"),
     "planet": ("half of the reflectance", "picture mirrored"),
+    "light_directional": ("directional light reversed",),
 }
-"""Two scenes that are `reference-limited`, and a fault of the scene and of the picture in each."""
+"""Two scenes that are `reference-limited`, with a fault of the scene and of the picture in each, and
+one in which the fault once seemed to be an unresolved shadow."""
 
 
 def planted(name: str, faults: list[of_limits.GrossFault]) -> list[Answer]:
