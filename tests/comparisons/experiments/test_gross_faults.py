@@ -98,8 +98,8 @@ SAMPLE = {
     "planet": ("half of the reflectance", "picture mirrored"),
     "light_directional": ("directional light reversed",),
 }
-"""Two scenes that are `reference-limited`, with a fault of the scene and of the picture in each, and
-one in which the fault once seemed to be an unresolved shadow."""
+"""Two scenes that are `reference-limited`, with a fault of the scene and of the picture in each,
+and one in which the fault once seemed to be an unresolved shadow."""
 
 
 def planted(name: str, faults: list[of_limits.GrossFault]) -> list[Answer]:
