@@ -15,6 +15,7 @@ from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.results.case import FloatArray, Images
 from comparisons.rungs.limited import Rest
 from comparisons.translator import load
+from reference_rt.materials import Diffuse
 from reference_rt.rendering.scene import Scene
 
 PANE = """
@@ -139,6 +140,20 @@ def test_light_that_is_scattered_may_differ_as_often_as_rays_go_wrong(paths: Cas
     """By twice the share: 0.3 with a share of 0.2, not with one of 0.1."""
     assert paths.rest(_right_half(1.3), 0.2).status == "agree"
     assert paths.rest(_right_half(1.3), 0.1).status == "differ"
+
+
+@pytest.mark.parametrize("kind", [TREES, PATHS])
+def test_a_fault_of_our_light_is_not_explained(kind: tuple[str, str, float]) -> None:
+    """A darker ball: each of our pixels is the mean of our trees, which Mitsuba's are not."""
+    right = pane(kind)
+    darker = Diffuse(reflectance=(0.3, 0.2, 0.15))
+    ball = right.shapes[2].model_copy(update={"material": "ball"})
+    shapes = (*right.shapes[:2], ball)
+    wrong = right.changed(shapes=shapes, materials={**right.materials, "ball": darker})
+    counterpart = load(right)
+    rendered = _rendered(wrong, counterpart)
+    found = rest_of(wrong, wrong.tables, counterpart, 0.02, rendered, 0.02)
+    assert found.status == "differ", found.reason
 
 
 @pytest.mark.parametrize("kind", [TREES, PATHS])
