@@ -11,8 +11,8 @@ pictures of both sides (`pictures`), and hands the `Evidence` to `judge`, which 
 pictures and returns a `comparisons.results.case.Case`.  `looks` adds replicates until the question
 is decided, if the budget has a time limit.  `diagnosis`, with `single_lights` and `path_length`,
 names the likeliest cause of a difference; `ray_starts` measures whether it is Mitsuba's ray
-epsilon in glass.  `control` compares Mitsuba with itself: a difference
-there is a fault of the harness.
+epsilon in glass, and `precision` whether a limit explains what differs.  `control` compares Mitsuba
+with itself: a difference there is a fault of the harness.
 
 A `Budget` says how much work a comparison may take and which relative bias it must detect; None
 means the scene's own value.  Pictures are (height, width, 3) float64 linear radiance, replicates

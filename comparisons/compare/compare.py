@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from comparisons import rungs as ladder
-from comparisons.compare import looks, pictures, ray_starts
+from comparisons.compare import looks, pictures, precision, ray_starts
 from comparisons.compare.budget import LEAST, Budget
 from comparisons.compare.control import control
 from comparisons.compare.darkness import why_dark
@@ -20,6 +20,7 @@ from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.results.case import Case, RungResult
 from comparisons.rungs.layers.rung import applies
+from comparisons.rungs.limited import Rest
 from comparisons.rungs.witness import witness_of
 from comparisons.translator import MOST_INSTANCES, UntranslatableError, load
 from comparisons.translator.moved import with_float32_vertices
@@ -108,7 +109,14 @@ def gather(
         "Mitsuba renders in its scalar variant: its fast ones compile code for each of the many "
         "instances"
     )
-    return replace(evidence, lights=None, notes=(note, *evidence.notes))
+
+    def rest_of(rendered: Rendered, share: float) -> Rest:
+        assert evidence.rest_of is not None
+        with scalar():
+            return evidence.rest_of(rendered, share)
+
+    left = None if evidence.rest_of is None else rest_of
+    return replace(evidence, lights=None, rest_of=left, notes=(note, *evidence.notes))
 
 
 def _has_many_instances(scene: Scene) -> bool:
@@ -191,6 +199,7 @@ def _gather(
         ray_starts=None
         if budget.seconds is None or not ray_starts.may_matter(scene, shown)
         else partial(ray_starts.explained, scene, shown, budget.limit, budget.seconds, say),
+        rest_of=partial(precision.rest_of, scene, tables, counterpart, budget.limit),
         darkness=partial(why_dark, scene),
     )
 

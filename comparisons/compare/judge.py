@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from comparisons.results.case import (
 )
 from comparisons.rungs.images import images_rung
 from comparisons.rungs.input import input_rung
-from comparisons.rungs.limited import limited
+from comparisons.rungs.limited import Rest, limited
 from comparisons.rungs.witness import Witness
 from comparisons.statistics.metrics import image_metrics, nonfinite_pixels
 
@@ -32,9 +33,12 @@ Lights = Callable[[], Mapping[str, FloatArray]]
 """Returns the reference's pictures of single lights (height, width, 3) by name; renders them."""
 
 
-RayStarts = Callable[[RungResult, tuple[FloatArray, FloatArray]], RungResult]
-"""Returns the result of the statistics of both sides' replicates, in which they differ, or one that
-explains it; renders pictures."""
+Pair = tuple[FloatArray, FloatArray]
+"""Replicates of both sides, two or more of each."""
+
+RayStarts = Callable[[RungResult, Pair], tuple[RungResult, Pair | None]]
+"""Returns the result of the statistics of replicates, in which they differ, or one that explains
+it, and the replicates without what explains it; renders pictures."""
 
 
 Replicates = tuple[FloatArray, FloatArray | statistics.Known]
@@ -63,7 +67,7 @@ class Rendered:
     fixed_reference: bool = False
 
     @property
-    def resampled(self) -> tuple[FloatArray, FloatArray] | None:
+    def resampled(self) -> Pair | None:
         """The replicates that show the noise of each side's mean; None if they do not.  A reference
         whose variance is known is two replicates that have exactly its mean and its variance."""
         if self.replicates is None or len(self.replicates[0]) < 2:
@@ -94,9 +98,9 @@ class Evidence:
     """The input of a verdict.  name: the case's;  rungs: the deterministic ones;  rendered: the
     pictures of both sides, if any;  lights, lengths: for the diagnosis;  looks: those at a growing
     number of replicates, the last of which gives the statistics;  ray_starts: see
-    `comparisons.compare.ray_starts`, None where they cannot matter;  witness: a third renderer;
-    darkness: why pictures may be black, None where nothing is known of the scene;  the rest as in
-    `Case`."""
+    `comparisons.compare.ray_starts`, None where they cannot matter;  rest_of: see
+    `comparisons.compare.precision`;  witness: a third renderer;  darkness: why pictures may be
+    black, None where nothing is known of the scene;  the rest as in `Case`."""
 
     name: str
     rungs: tuple[RungResult, ...]
@@ -109,6 +113,7 @@ class Evidence:
     lengths: Lengths | None = None
     looks: Looks | None = None
     ray_starts: RayStarts | None = None
+    rest_of: Callable[[Rendered, float], Rest] | None = None
     witness: Witness | None = None
     darkness: Darkness | None = None
 
@@ -119,7 +124,7 @@ def judge(evidence: Evidence, limit: float) -> Case:
     limit: the smallest relative bias of the image mean that must be detectable.
     """
     rungs, rendered = list(evidence.rungs), evidence.rendered
-    metrics, images, notes = None, None, evidence.notes
+    metrics, images, without, notes = None, None, None, evidence.notes
     if rendered is not None:
         checked, *tested = picture_rungs(rendered, limit, evidence.looks)
         checked = lit(checked, rendered.images, evidence.darkness)
@@ -127,17 +132,21 @@ def judge(evidence: Evidence, limit: float) -> Case:
         decided = any(rung.status in ("differ", "invalid") for rung in [*rungs, checked])
         if evidence.ray_starts and not decided and tested[0].status == "differ":
             assert rendered.resampled is not None
-            tested = [evidence.ray_starts(tested[0], rendered.resampled)]
+            found, without = evidence.ray_starts(tested[0], rendered.resampled)
+            tested = [found]
         rungs += [checked, *tested]
         images = rendered.images
         if checked.status != "invalid":
             metrics = image_metrics(images)
-            rungs.append(_whole(rendered, metrics, tested[0]))
+            rungs.append(_whole(rendered, metrics, tested[0], without))
             if evidence.witness is not None and rendered.resampled is not None:
                 heard, picture = evidence.witness(rendered.resampled, evidence.sides)
                 rungs.append(heard)
                 images = replace(images, witness=picture)
-    rungs = limited(rungs)
+    rest_of = None
+    if rendered is not None and evidence.rest_of is not None:
+        rest_of = partial(evidence.rest_of, rendered)
+    rungs = limited(rungs, rest_of)
     verdict, reason = decide(rungs, metrics)
     cause: Cause | None = None
     worst: tuple[ImageRegion, ...] = ()
@@ -205,15 +214,27 @@ def _tested(rendered: Rendered, limit: float, level: float = 1.0) -> RungResult:
     return statistics.compare(*rendered.replicates, limit=limit, level=level, fixed_reference=fixed)
 
 
-def _whole(rendered: Rendered, metrics: Metrics, tested: RungResult) -> RungResult:
-    """The rung `images`;  tested: the rung `statistics`."""
+def _whole(
+    rendered: Rendered, metrics: Metrics, tested: RungResult, without: Pair | None
+) -> RungResult:
+    """The rung `images`;  tested: the rung `statistics`;  without: the replicates without what
+    explains their difference there."""
     if tested.status == "agree" and "edge" in tested.numbers:
         return RungResult("images", "not-applicable", _EACH_PIXEL)
     if rendered.replicates is not None and rendered.resampled is None:
         return RungResult("images", "not-applicable", _UNKNOWN_NOISE)
-    return images_rung(rendered.images, metrics, rendered.resampled)
+    found = images_rung(rendered.images, metrics, rendered.resampled)
+    if without is None or found.status != "differ":
+        return found
+    images = Images(*(side.mean(axis=0) for side in without))
+    rest = images_rung(images, image_metrics(images), without)
+    if rest.status == "differ":
+        return replace(rest, reason=f"{found.reason}; {_WITHOUT}: {rest.reason}")
+    reason = f"{tested.reason}; {_WITHOUT} the pictures agree; {found.reason}"
+    return replace(found, status="reference-limited", reason=reason)
 
 
+_WITHOUT = "without what explains the difference of the statistics"
 _EACH_PIXEL = "each pixel is judged: metrics of the whole do not forgive edges"
 _UNKNOWN_NOISE = "the noise of a single picture is unknown"
 

@@ -76,9 +76,10 @@ def explained(
     say: Say,
     result: RungResult,
     replicates: tuple[FloatArray, FloatArray],
-) -> RungResult:
+) -> tuple[RungResult, tuple[FloatArray, FloatArray] | None]:
     """The result of the rung of statistics, changed to `reference-limited` if Mitsuba's ray epsilon
-    explains the difference, to `inconclusive` if it may.
+    explains the difference, to `inconclusive` if it may; and then the replicates of both sides
+    without that effect.
 
     limit: as in `statistics.compare`;  seconds: the time for pairs;  replicates: of both sides.
     """
@@ -96,7 +97,7 @@ def explained(
             break
         if time.perf_counter() - start > seconds:
             if not effect.is_certain:
-                return result
+                return result, None
             break
     off = (ours.mean(axis=0) - theirs.mean(axis=0)).mean(axis=(0, 1))
     change, noise, off = (
@@ -106,7 +107,7 @@ def explained(
     text = f"{change[k]:+.2g} ± {noise[k]:.1g} % in {'RGB'[k]}"
     if again.status == "differ":
         reason = f"{result.reason}; Mitsuba's ray epsilon, without which its picture changes by "
-        return replace(result, reason=f"{reason}{text}, does not explain it")
+        return replace(result, reason=f"{reason}{text}, does not explain it"), None
     reason = (
         f"beyond Mitsuba's precision: its own picture changes by {text} if rays start at float32's "
         "error off surfaces, not at its ray epsilon"
@@ -118,11 +119,13 @@ def explained(
         reason=f"{reason}; {rest}",
         numbers={**result.numbers, "ray_epsilon": float(change[k]) / 100.0},
     )
+    without = ours, theirs + effect.pictures
     left = abs(off[k] - change[k]) / max(abs(off[k]), abs(change[k]))
     if again.status == "inconclusive" or left > 1.0 - SHARE:
-        return found
+        return found, without
     reason += ", and ours does not differ from the picture with that change"
-    return replace(found, status="reference-limited", reason=f"{reason}; {result.reason}")
+    found = replace(found, status="reference-limited", reason=f"{reason}; {result.reason}")
+    return found, without
 
 
 def _grouped(pictures: FloatArray) -> FloatArray:

@@ -116,15 +116,19 @@ class Counterpart:
         """Whether finite meshes stand in for infinite planes."""
         return any(mi_shape.plugin.extent for mi_shape in self.all_mi_shapes())
 
-    def beyond_planes(self, ours: Intersections) -> BoolArray:
+    def beyond_planes(self, ours: Intersections, theirs: Intersections) -> BoolArray:
         """(n,): whether our hit is on a shape with an infinite plane, beyond the finite mesh that
-        stands in for it."""
-        beyond = np.zeros(len(ours.t), bool)
+        stands in for it.  Not where Mitsuba's ray hits that mesh."""
+        beyond, apart = np.zeros(len(ours.t), bool), ours.shape != theirs.shape
         for mi_shape in self.all_mi_shapes():
             extent = mi_shape.plugin.extent
             if extent is not None:
                 away = np.linalg.norm(ours.p - self.frame.out(extent.middle), axis=1)
-                beyond |= (ours.shape == mi_shape.shape) & (away > extent.radius / self.frame.scale)
+                beyond |= (
+                    apart
+                    & (ours.shape == mi_shape.shape)
+                    & (away > extent.radius / self.frame.scale)
+                )
         return beyond
 
     def stand_ins(self) -> dict[int, list[StandIn]]:

@@ -111,7 +111,7 @@ def _limited(case: Case) -> str:
     numbers = rungs["geometry"].numbers if "geometry" in rungs else {}
     resolution, wrong = numbers.get("resolution"), numbers.get("decided_mitsuba")
     proof = ""
-    if isinstance(resolution, Mapping) and resolution.get("found"):
+    if isinstance(resolution, Mapping) and numbers.get("is_limited"):
         proof = (
             f": from {resolution['found']:,} of {resolution['hits']:,} points of surfaces, the "
             "rays that it starts hit a wrong surface"

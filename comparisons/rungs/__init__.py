@@ -6,7 +6,8 @@ and `whitted` compare without noise, ray by ray; `sampling` holds our samples of
 materials against their densities, and counts Russian roulette; `layers` compares what is written
 beside the colour; `input` checks the pictures themselves, `images` compares them by metrics,
 `comparisons.statistics` their means; `witness` asks a third renderer.  `limited` changes `differ`
-to `reference-limited` above a rung that shows that Mitsuba's precision is too low.
+to `reference-limited` above a rung that shows that Mitsuba's precision is too low, where that
+explains what differs.
 
 Contract: a rung takes the scene, our tables and Mitsuba's counterpart (or pictures, or nothing else
 but the scene), and returns a

@@ -12,10 +12,12 @@ from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.coincidence import is_doubled, on_two_surfaces
 from comparisons.rungs.rays.lamp_images import is_beside, magnified, slopes_of_image
-from comparisons.rungs.rays.light_context import POINT_LIKE, LightContext, kind_of
+from comparisons.rungs.rays.light_context import DISTANT, POINT_LIKE, LightContext, kind_of
+from comparisons.rungs.rays.light_context import described as described_light
 from comparisons.rungs.rays.light_error import bounds, slopes_of
-from comparisons.rungs.rays.mitsuba_light import _lamp, is_dark, mitsuba_direct
+from comparisons.rungs.rays.mitsuba_light import _lamp, is_blocked, is_dark, mitsuba_direct
 from comparisons.rungs.rays.rays import described, mixed_rays
+from comparisons.rungs.rays.resolution import NOT_BEYOND, elsewhere, too_many_elsewhere
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.lights import AREA
@@ -41,17 +43,21 @@ FEWEST = 20
 class Outcome(NamedTuple):
     """The comparison at one point of one light.
 
-    rays: how many were compared;  unexplained: indices of those that differ;  ours, theirs (m, 3):
-    their values in W/sr/m²;  explained: how many the arbiter explains;  max_error, max_ratio: the
-    largest error, and error over bound, of the rest;  ratio, cosine (m,): of rays that differ and
+    rays: how many were compared;  lit: how many of these on either side, and `right` of them alike
+    (`arbiter.tells`);
+    unexplained: indices of those that differ;  ours, theirs (m, 3): their values in W/sr/m²;
+    explained: indices of those that the arbiter explains;  max_error, max_ratio: the largest
+    error, and error over bound, of the rest;  ratio, cosine (m,): of rays that differ and
     are lit on both sides, our value over Mitsuba's, and the cosine at the surface.
     """
 
     rays: int
+    lit: int
+    right: int
     unexplained: IntArray
     ours: FloatArray
     theirs: FloatArray
-    explained: int
+    explained: IntArray
     max_error: float
     max_ratio: float
     ratio: FloatArray
@@ -93,7 +99,7 @@ def direct(
         for (light, u), ours in answers.items()
     }
     total = sum(o.rays for o in outcomes.values())
-    explained = sum(o.explained for o in outcomes.values())
+    explained = sum(len(o.explained) for o in outcomes.values())
     unexplained = sum(len(o.unexplained) for o in outcomes.values())
     numbers: dict[str, Any] = {
         "rays": total,
@@ -101,10 +107,20 @@ def direct(
         "lights_tested": len(tested),
         "explained": explained,
         "unexplained": unexplained,
+        "lit": sum(o.lit for o in outcomes.values()),
+        "lit_right": sum(o.right for o in outcomes.values()),
         "max_error": max(o.max_error for o in outcomes.values()),
         "max_error_over_bound": max(o.max_ratio for o in outcomes.values()),
     }
+    numbers["tells"] = arbiter.is_enough(numbers["lit_right"], numbers["lit"])
     numbers |= _ratios(list(outcomes.values()))
+    settled = np.concatenate([o.explained for o in outcomes.values()])
+    numbers["explained_elsewhere"] = too_many_elsewhere(
+        scene, tables, counterpart, rays.rows(settled), total
+    )
+    if unexplained:
+        left = np.unique(np.concatenate([o.unexplained for o in outcomes.values()]))
+        numbers["elsewhere"] = elsewhere(scene, tables, counterpart, rays.rows(left))
     for (light, u), outcome in outcomes.items():
         if len(outcome.unexplained):
             k = int(outcome.unexplained[0])
@@ -118,6 +134,13 @@ def direct(
         f"{explained} of {total} values are not resolved by Mitsuba: at edges, or within its "
         "shadow epsilon"
     )
+    if total == 0:
+        reason = "no point of a light is known for any ray"
+        return RungResult("direct", "not-applicable", reason, numbers)
+    if not numbers["tells"]:
+        shadows += f"; only {numbers['lit_right']} of {numbers['lit']} lit values say anything"
+    if numbers["explained_elsewhere"]:
+        return RungResult("direct", "differ", f"{shadows}, but {NOT_BEYOND}", numbers)
     if arbiter.too_many(explained, total):
         return RungResult("direct", "reference-limited", shadows, numbers)
     reason = (
@@ -152,14 +175,14 @@ def _compare(
 ) -> Outcome:
     """One point of one light at all hits;  brightest: the largest value of all lights' points."""
     rays, hits, tables = context.rays, context.hits, context.tables
-    target = _targets(ours)
+    target = _targets(context, light, ours)
     is_known = (hits.shape >= 0) & np.isfinite(target).all(axis=1)
     if kind_of(context, light) == AREA:  # the target is a point
         is_known &= ~_in_plane(context, target)
     known = np.flatnonzero(is_known)
     if len(known) == 0:
         none = np.zeros((0, 3))
-        return Outcome(0, known, none, none, 0, 0.0, 0.0, np.zeros(0), np.zeros(0))
+        return Outcome(0, 0, 0, known, none, none, known, 0.0, 0.0, np.zeros(0), np.zeros(0))
     context, target = context.of(known), target[known]
     rays, hits = context.rays, context.hits
     value = ours.contribution[known]
@@ -168,12 +191,17 @@ def _compare(
     bound += slopes_of(context, light, u, value)
     scale = magnified(context, light, target, ours.pdf[known])
     bound += slopes_of_image(context, light, u, value, scale)
-    # Where a light does not shine, no shadow ray explains that Mitsuba's does.
-    kind = kind_of(context, light)
-    is_bounded = kind in POINT_LIKE and POINT_LIKE[kind].is_bounded
-    of_shadow = (ours.pdf[known] > 0.0) | (not is_bounded)
     error = np.abs(theirs - value).max(axis=1)
     wrong = np.flatnonzero(~(error <= bound))
+    # Mitsuba's shadow ray explains that only one side is lit where ours is as our own shadow ray
+    # says: not where our light shines elsewhere or from behind the surface, or where it passes
+    # through surfaces.
+    is_lit = np.asarray(value.any(axis=1), dtype=np.bool_)
+    kind = kind_of(context, light)
+    is_bounded = kind in POINT_LIKE and POINT_LIKE[kind].is_bounded
+    may_flip = is_lit | (ours.pdf[known] > 0.0) | (not is_bounded)
+    asked = wrong[may_flip[wrong]]
+    may_flip[asked] = is_lit[asked] != is_blocked(context.of(asked), light, target[asked])
 
     def like_theirs(numbers: IntArray, offsets: FloatArray) -> arbiter.BoolArray:
         there = query.direct_light(
@@ -182,7 +210,7 @@ def _compare(
         # The move itself shifts the value by as much as the bound: twice is allowed.
         error = np.abs(there - theirs[numbers]).max(axis=1)
         dark = ~theirs[numbers].any(axis=1)
-        lit_differs = (value[numbers].any(axis=1) == dark) & of_shadow[numbers]
+        lit_differs = (is_lit[numbers] == dark) & may_flip[numbers]
         now_dark = is_dark(context.of(numbers), light, target[numbers], offsets, lamp[numbers])
         return np.asarray((error <= 2.0 * bound[numbers]) | (lit_differs & (now_dark == dark)))
 
@@ -195,17 +223,19 @@ def _compare(
     settled |= is_beside(some, light, u, theirs[wrong], allowed, scale[wrong])
     if kind_of(context, light) == AREA:
         settled |= is_doubled(context.sizes, tables, some.hits.p, target[wrong])
-    right = error <= bound
+    right, shines = error <= bound, is_lit | theirs.any(axis=1)
     left = wrong[~settled]
     lit = left[value[left].any(axis=1) & theirs[left].any(axis=1)]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.nan_to_num(error[right] / bound[right])
     return Outcome(
         rays=len(known),
+        lit=int(np.count_nonzero(shines)),
+        right=int(np.count_nonzero(shines & right & arbiter.tells(bound, value, theirs))),
         unexplained=known[left],
         ours=value[left],
         theirs=theirs[left],
-        explained=int(np.count_nonzero(settled)),
+        explained=known[wrong[settled]],
         max_error=float(error[right].max(initial=0.0)),
         max_ratio=float(ratio.max(initial=0.0)),
         ratio=value[lit].sum(axis=1) / theirs[lit].sum(axis=1),
@@ -221,13 +251,20 @@ def _in_plane(context: LightContext, target: FloatArray) -> arbiter.BoolArray:
     return np.asarray(height <= sizes.frame.delta(rays.o, hits.p, sizes.reach_of(hits.shape)))
 
 
-def _targets(ours: DirectLight) -> FloatArray:
+def _targets(context: LightContext, light: int, ours: DirectLight) -> FloatArray:
     """(n, 3): the point on the light for each ray; NaN where it is not known.
 
-    Our query returns no point where no light can arrive.  If a light has the same point for all
-    rays, that point is used there too, to check that Mitsuba is dark as well.
+    Our query returns no point where no light can arrive.  A light without extent has the point of
+    its description there, to check that Mitsuba is dark as well; and if a lamp has the same point
+    for all rays, so has it.
     """
     seen = ours.pdf > 0.0
+    kind = kind_of(context, light)
+    if kind in POINT_LIKE:
+        p = context.hits.p
+        towards = POINT_LIKE[kind].towards(described_light(context, light), p)
+        there = towards if kind in DISTANT else p + towards
+        return np.where(seen[:, None], ours.target, there)
     target = np.full_like(ours.target, np.nan)
     target[seen] = ours.target[seen]
     if seen.any() and np.ptp(ours.target[seen], axis=0).max() == 0.0:

@@ -120,7 +120,8 @@ def geometry(
         **camera.numbers,
     }
     if resolved and not isinstance(scene.integrator, RayCast):
-        numbers["resolution"] = resolution(scene, tables, counterpart, seed)._asdict()
+        found = resolution(scene, tables, counterpart, seed)
+        numbers |= {"resolution": found._asdict(), "is_limited": found.is_limited}
     if camera.problem:
         return RungResult("geometry", "differ", camera.problem, numbers)
     status, reason = _outcome(traced, verdict, is_aimed, numbers, say)
@@ -189,6 +190,7 @@ def _outcome(
         )
     many_aimed = arbiter.too_many(numbers["aimed_mismatches"], total - count)
     if arbiter.too_many(numbers["explained"], count) or unaimed or many_aimed:
+        numbers["tells"] = arbiter.is_enough(count - numbers["explained"] - unaimed, count)
         return "reference-limited", text
     worst = max(v for k, v in numbers.items() if k.endswith("error_over_bound"))
     return "agree", f"{total} rays agree, within {worst:.2g} of float32's bound; {text}"
@@ -212,7 +214,7 @@ def _traced(
     beyond the finite mesh that stands in for it."""
     ours, theirs = query.intersect(tables, rays.o, rays.d), trace(counterpart, rays.o, rays.d)
     ratios = comparer.ratios(rays, ours, theirs)
-    beyond = counterpart.beyond_planes(ours)
+    beyond = counterpart.beyond_planes(ours, theirs)
     ratios[beyond | theirs.at_origin] = 0.0
     sizes = comparer.sizes
     reach = np.maximum(sizes.reach_of(ours.shape), sizes.reach_of(theirs.shape))

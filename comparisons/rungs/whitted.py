@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,10 +23,11 @@ from comparisons.rungs.rays.light_context import LightContext
 from comparisons.rungs.rays.light_error import cut_off, of_direct_light
 from comparisons.rungs.rays.neighbours import NeighbourContext, explained_by_neighbours, rounding_of
 from comparisons.rungs.rays.rays import Rays, described, pixel_rays
+from comparisons.rungs.rays.resolution import NOT_BEYOND, elsewhere, too_many_elsewhere
 from comparisons.rungs.rays.slopes import is_steep, moved, slopes
 from comparisons.shapes import type_of
 from comparisons.translator.accuracy import accuracy, coat_error
-from reference_rt.core.arrays import FloatArray
+from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators import Whitted
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.lights import ENVIRONMENT
@@ -72,58 +73,13 @@ def whitted(
         return RungResult("whitted", "not-comparable", counterpart.no_light_reason)
     integrator = scene.integrator if isinstance(scene.integrator, Whitted) else Whitted()
     rays = pixel_rays(scene, counterpart.frame, pixels)
-    setup = integrator.setup()
-    ours = query.radiance_without_noise(tables, setup, rays.o, rays.d)
-    theirs_at = plugin_radiance(scene, tables, counterpart, integrator)
-    theirs = theirs_at(rays)
-    size = np.maximum(np.abs(ours), np.abs(theirs)).max(axis=1)
-    lit = size[np.isfinite(size) & (size > 0.0)]
-    bright = np.percentile(lit, 99.0) if len(lit) else 0.0
-    bound = TOLERANCE * np.maximum(size, bright)
-    bound += bright * max((coat_error(scene, name) for name in scene.materials), default=0.0)
-    tables_off = max((accuracy(scene, name) for name in scene.materials), default=0.0)
-    bound += tables_off * size
-    bound += cut_off(scene)
-    error = np.abs(theirs - ours).max(axis=1)
-    ours_hits, their_hits = query.intersect(tables, *rays), trace(counterpart, *rays)
-    sizes = ShapeSizes(scene, counterpart.frame)
-    error[np.isfinite(error) & on_two_surfaces(sizes, tables, rays, ours_hits, their_hits)] = 0.0
-    if is_steep(scene):
-        over = np.flatnonzero(~(error <= bound))
-        few = rays.rows(over)
-        others = [
-            partial(query.radiance_without_noise, tables, setup, other.o, other.d)
-            for other in moved(few, rounding_of(tables, sizes, few))
-        ]
-        bound[over] += slopes(ours[over], others, float(lit.max(initial=0.0)))
-    outliers = np.flatnonzero(~(error <= bound))
-
-    def ours_along(o: FloatArray, d: FloatArray, tables: SceneTables = tables) -> FloatArray:
-        return query.radiance_without_noise(tables, setup, o, d)
-
-    def theirs_along(o: FloatArray, d: FloatArray) -> FloatArray:
-        return theirs_at(Rays(counterpart.frame.rounded(o), round32(d)))
-
-    some = rays.rows(outliers)
-    settled = explained_by_neighbours(
-        NeighbourContext(scene, tables, counterpart, sizes, integrator.max_depth),
-        some,
-        ((ours[outliers], ours_along), (theirs[outliers], theirs_along)),
-        bound[outliers],
-    )
-    for factor in (1.0 - AT_LEAST, 1.0 + AT_LEAST):  # a ray with just the least contribution
-        least = factor * integrator.min_contribution
-        other = integrator.model_copy(update={"min_contribution": least}).setup()
-        again = query.radiance_without_noise(tables, other, some.o, some.d)
-        settled |= np.abs(again - theirs[outliers]).max(axis=1) <= bound[outliers]
-    context = LightContext(scene, tables, counterpart, rays, ours_hits, their_hits, sizes)
-    context = context.of(outliers)
-    low, high = changes_of_lamps(context, setup)
-    off = theirs[outliers] - ours[outliers]
-    allowed = (bound[outliers] + of_direct_light(context))[:, None]
-    settled |= ((off >= low - allowed) & (off <= high + allowed)).all(axis=1)
+    trees = Trees(scene, tables, counterpart, integrator)
+    compared = trees.compare(rays)
+    ours, theirs, error, bound, outliers = compared
+    settled = trees.explained(rays, compared)
     unexplained = outliers[~settled]
-    right = error <= bound
+    right, lit = error <= bound, ours.any(axis=1) | theirs.any(axis=1)
+    told = lit & right & arbiter.tells(bound, ours, theirs)
     ratio = np.divide(error, bound, out=np.zeros_like(error), where=bound > 0.0)[right]
     numbers: dict[str, Any] = {
         "pixels": len(rays.o),
@@ -132,8 +88,15 @@ def whitted(
         "max_error_over_bound": float(ratio.max(initial=0.0)),
         "explained": int(np.count_nonzero(settled)),
         "unexplained": len(unexplained),
+        "lit": int(np.count_nonzero(lit)),
+        "lit_right": int(np.count_nonzero(told)),
     }
+    numbers["tells"] = arbiter.is_enough(numbers["lit_right"], numbers["lit"])
+    numbers["explained_elsewhere"] = too_many_elsewhere(
+        scene, tables, counterpart, rays.rows(outliers[settled]), len(rays.o)
+    )
     if len(unexplained):
+        numbers["elsewhere"] = elsewhere(scene, tables, counterpart, rays.rows(unexplained))
         k = int(unexplained[np.argmax(np.nan_to_num(error[unexplained], nan=np.inf))])
         reason = (
             f"{len(unexplained)} of {len(rays.o)} pixels differ by more than float32 explains; the "
@@ -145,10 +108,101 @@ def whitted(
         f"{numbers['explained']} of {len(rays.o)} pixels lie at edges that Mitsuba does not "
         "resolve (float32, its ray epsilon)"
     )
+    if not numbers["tells"]:
+        edges += f"; only {numbers['lit_right']} of {numbers['lit']} lit pixels say anything"
+    if numbers["explained_elsewhere"]:
+        return RungResult("whitted", "differ", f"{edges}, but {NOT_BEYOND}", numbers)
     if arbiter.too_many(numbers["explained"], len(rays.o)):
         return RungResult("whitted", "reference-limited", edges, numbers)
     reason = f"pixels agree within {numbers['max_error']:.2g} W/sr/m²; {edges}"
     return RungResult("whitted", "agree", reason, numbers)
+
+
+class Compared(NamedTuple):
+    """The radiance of n rays, (n, 3) on either side, how far they are apart and may be, (n,), and
+    the indices (m,) of those that are further apart."""
+
+    ours: FloatArray
+    theirs: FloatArray
+    error: FloatArray
+    bound: FloatArray
+    outliers: IntArray
+
+
+class Trees:
+    """Ray trees of a scene in both renderers."""
+
+    def __init__(
+        self, scene: Scene, tables: SceneTables, counterpart: Counterpart, integrator: Whitted
+    ) -> None:
+        self._scene, self._tables, self._counterpart = scene, tables, counterpart
+        self._integrator, self._setup = integrator, integrator.setup()
+        self._sizes = ShapeSizes(scene, counterpart.frame)
+        self._theirs_at = plugin_radiance(scene, tables, counterpart, integrator)
+
+    def of_ours(self, rays: Rays) -> FloatArray:
+        """Our radiance (n, 3)."""
+        return self._ours_along(rays.o, rays.d)
+
+    def compare(self, rays: Rays) -> Compared:
+        """Trace the trees of rays that are exact in float32."""
+        scene, tables, sizes = self._scene, self._tables, self._sizes
+        ours, theirs = self.of_ours(rays), self._theirs_at(rays)
+        size = np.maximum(np.abs(ours), np.abs(theirs)).max(axis=1)
+        lit = size[np.isfinite(size) & (size > 0.0)]
+        bright = np.percentile(lit, 99.0) if len(lit) else 0.0
+        bound = TOLERANCE * np.maximum(size, bright)
+        bound += bright * max((coat_error(scene, name) for name in scene.materials), default=0.0)
+        tables_off = max((accuracy(scene, name) for name in scene.materials), default=0.0)
+        bound += tables_off * size
+        bound += cut_off(scene)
+        error = np.abs(theirs - ours).max(axis=1)
+        hits = query.intersect(tables, *rays), trace(self._counterpart, *rays)
+        error[np.isfinite(error) & on_two_surfaces(sizes, tables, rays, *hits)] = 0.0
+        if is_steep(scene):
+            over = np.flatnonzero(~(error <= bound))
+            few = rays.rows(over)
+            others = [
+                partial(self._ours_along, other.o, other.d)
+                for other in moved(few, rounding_of(tables, sizes, few))
+            ]
+            bound[over] += slopes(ours[over], others, float(lit.max(initial=0.0)))
+        return Compared(ours, theirs, error, bound, np.flatnonzero(~(error <= bound)))
+
+    def explained(self, rays: Rays, compared: Compared) -> arbiter.BoolArray:
+        """(m,): which outliers of the rays the arbiter explains."""
+        ours, theirs, _, bound, outliers = compared
+        tables, setup = self._tables, self._setup
+        some, integrator = rays.rows(outliers), self._integrator
+        settled = explained_by_neighbours(
+            NeighbourContext(
+                self._scene, tables, self._counterpart, self._sizes, integrator.max_depth
+            ),
+            some,
+            ((ours[outliers], self._ours_along), (theirs[outliers], self._theirs_along)),
+            bound[outliers],
+        )
+        for factor in (1.0 - AT_LEAST, 1.0 + AT_LEAST):  # a ray with just the least contribution
+            least = factor * integrator.min_contribution
+            other = integrator.model_copy(update={"min_contribution": least}).setup()
+            again = query.radiance_without_noise(tables, other, some.o, some.d)
+            settled |= np.abs(again - theirs[outliers]).max(axis=1) <= bound[outliers]
+        hits = query.intersect(tables, *some), trace(self._counterpart, *some)
+        context = LightContext(self._scene, tables, self._counterpart, some, *hits, self._sizes)
+        low, high = changes_of_lamps(context, setup)
+        off = theirs[outliers] - ours[outliers]
+        allowed = (bound[outliers] + of_direct_light(context))[:, None]
+        return np.asarray(settled | ((off >= low - allowed) & (off <= high + allowed)).all(axis=1))
+
+    def _ours_along(
+        self, o: FloatArray, d: FloatArray, tables: SceneTables | None = None
+    ) -> FloatArray:
+        return query.radiance_without_noise(
+            self._tables if tables is None else tables, self._setup, o, d
+        )
+
+    def _theirs_along(self, o: FloatArray, d: FloatArray) -> FloatArray:
+        return np.asarray(self._theirs_at(Rays(self._counterpart.frame.rounded(o), round32(d))))
 
 
 def plugin_radiance(

@@ -8,6 +8,8 @@ states as detectable is detected.  `mutation`: random changes of the kernels (`m
 the rungs say to them.  `specificity`: right renderers of twelve kinds (`right`) are judged with
 many seeds, and false alarms are counted.
 
+`of_limits`: gross faults in stress scenes, of which no limit may excuse any (slow tests).
+
 To add a fault of pictures: a function with `planted`, or a row of `FAULTS`, in `of_pictures`.  Of
 scenes and sources: a row of their tables, which says what is planted, where, and if one rung must
 see it, which; a source fault's old text must occur exactly once.

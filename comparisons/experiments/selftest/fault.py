@@ -19,6 +19,7 @@ from comparisons.compare.compare import Subject, gather
 from comparisons.compare.judge import judge
 from comparisons.results.case import Case, FloatArray
 from comparisons.results.rungs import COMPARED, RUNGS
+from comparisons.rungs.limited import limited
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceRtError
 from reference_rt.util.files import temporary_folder
@@ -36,7 +37,8 @@ def compared(subject: Subject, budget: Budget, threads: int | None = None) -> Ca
     `compare_scene` does."""
     others = tuple(name for name in COMPARED if name not in OF_PICTURES)
     evidence = gather(subject, budget, _silent, threads, others)
-    if all(rung.status not in ("differ", "not-comparable") for rung in evidence.rungs):
+    judged = limited(evidence.rungs)
+    if all(rung.status not in ("differ", "not-comparable") for rung in judged):
         of_pictures = gather(subject, budget, _silent, threads, OF_PICTURES)
         evidence = replace(of_pictures, rungs=(*evidence.rungs, *of_pictures.rungs))
     return judge(evidence, budget.limit)

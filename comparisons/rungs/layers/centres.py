@@ -72,7 +72,7 @@ def centres(
     theirs = trace(counterpart, *rays, t_max=t_max)
     comparer = Comparer(sizes)
     resolved = (comparer.ratios(rays, ours, theirs) <= SLACK).all(axis=1)
-    resolved &= ~counterpart.beyond_planes(ours)
+    resolved &= ~counterpart.beyond_planes(ours, theirs)
     flat = {name: layer.reshape(len(x), -1) for name, layer in layers.items()}
     errors = {
         name: _errors(comparer, rays, ours, theirs, name, values)

@@ -35,6 +35,10 @@ take 1e-4 of a picture or less; beyond 1 % the comparison measures Mitsuba's pre
 SURE = 1e-4
 """Chance of reporting, falsely, that a fraction of rays exceeds its limit."""
 
+REST = 0.1
+"""Least share of what is lit that must be resolved and agree.  With less, agreement would rest on
+values that say nothing, and a fault could hide in the others."""
+
 AT_ONCE = 2000
 """Moved rays that are traced in one call, when fewer rays than these are left."""
 
@@ -43,6 +47,24 @@ def too_many(count: int, total: int, limit: float = LIMIT) -> bool:
     """Whether `count` of `total` rays prove a fraction above `limit` (binomial test): of few rays
     one may be too many by chance."""
     return bool(special.bdtrc(count - 1, total, limit) < SURE)
+
+
+def most_of(count: int, total: int) -> float:
+    """The upper end of the confidence interval of a fraction of which `count` of `total` were
+    found (Clopper and Pearson 1934)."""
+    return float(special.betaincinv(count + 1, total - count, 1.0 - SURE)) if count < total else 1.0
+
+
+def tells(bound: FloatArray, *sides: FloatArray) -> BoolArray:
+    """(n,): whether an error bound (n,) leaves values (n, 3) of two sides anything to say: it is at
+    most half of them."""
+    return np.asarray(bound <= 0.5 * np.maximum(*(np.abs(side).max(axis=1) for side in sides)))
+
+
+def is_enough(right: int, total: int) -> bool:
+    """Whether values that agree are a share of all on which a rung may rest;  total: without those
+    that are dark."""
+    return right >= REST * total
 
 
 def directions(n: int) -> FloatArray:

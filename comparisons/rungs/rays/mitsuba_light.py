@@ -17,6 +17,7 @@ from comparisons.rungs.rays.light_context import (
     number_of,
 )
 from comparisons.rungs.rays.rays import Rays
+from comparisons.rungs.rays.resolution import off_surface, own_error
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.lights import AREA
 from reference_rt.rendering import query
@@ -96,6 +97,18 @@ def is_dark(
     passed_by = met.t > 1.0 + SHADOW_EPSILON
     before = (lamp >= 0) & (met.shape != lamp)
     return np.asarray((met.t < 1.0 - SHADOW_EPSILON) | passed_by | ~facing | before)
+
+
+def is_blocked(context: LightContext, light: int, target: FloatArray) -> arbiter.BoolArray:
+    """(n,): whether our own shadow ray, as exact as float64 is, meets a surface."""
+    hits, sizes = context.hits, context.sizes
+    is_far = kind_of(context, light) in DISTANT
+    w = target if is_far else target - hits.p
+    o = off_surface(sizes, hits, w)
+    if is_far:
+        return np.asarray(query.occluded(context.tables, o, w))
+    end = 1.0 - own_error(sizes, hits) / np.linalg.norm(w, axis=1)
+    return np.asarray(query.occluded(context.tables, o, target - o, end))
 
 
 JUST_BEFORE = 1e-7

@@ -8,6 +8,7 @@ start behind its own surface and hit it again.  Prediction: our own tracer, star
 heights, hits another surface than from the exact point, or two that coincide.  Measurement:
 Mitsuba's tracer, started as Mitsuba does, hits another surface."""
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from comparisons.mitsuba.hits import BoolArray, rows_of
 from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.rays import Rays, mixed_rays
-from reference_rt.core.arrays import FloatArray
+from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import UNIT_ROUNDOFF
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.materials import Dielectric, RoughDielectric, ThinDielectric
@@ -34,6 +35,12 @@ STRAIGHT_ON = 4
 
 STEEPEST = 64.0
 """Cap of one over the cosine: how far the next hit may slide along its surface."""
+
+MOST_ASKED = 2000
+"""Most rays that differ of which it is asked whether they are beyond Mitsuba's precision."""
+
+AROUND = 12
+"""Rays next to each ray that show whether it passes an edge."""
 
 MOST_LIGHTS = 4
 """Most point, spot and directional lights that rays are sent towards from every hit."""
@@ -82,27 +89,102 @@ def resolution(
     # Only hits on which the tracers agree are starting points.
     slack = STEEPEST * counterpart.frame.delta(rays.o, ours.p, sizes.reach_of(ours.shape))
     same = np.flatnonzero((ours.shape >= 0) & ~_differs(ours, theirs, slack))
-    leavings = [_left_behind(tables, counterpart, sizes, rays.rows(same),
-                             rows_of(ours, same), rows_of(theirs, same), seed, scene)]  # fmt: skip
-    hits, d = rows_of(ours, same), d[same]
-    for _ in range(STRAIGHT_ON):
-        clear = np.flatnonzero(_is_clear(scene, sizes, hits))
-        hits, d = rows_of(hits, clear), d[clear]
-        o = _off(sizes, hits, d)
-        hits = query.intersect(tables, o, d)
-        met = np.flatnonzero(hits.shape >= 0)
-        o, d, hits = o[met], d[met], rows_of(hits, met)
-        if len(hits.t) == 0:
-            break
-        leavings.append(
-            _left_behind(tables, counterpart, sizes, Rays(o, d), hits, hits, seed, scene)
-        )
+    some, met = rays.rows(same), (rows_of(ours, same), rows_of(theirs, same))
+    leavings = [
+        _left_behind(tables, counterpart, sizes, level.rays, level.ours, level.theirs, seed, scene)
+        for level in _levels(scene, tables, sizes, some, *met)
+    ]
     columns = [np.concatenate(column) for column in zip(*leavings, strict=True)]
     foretold, found, missed, height, rounding = columns
     counts = (int(np.count_nonzero(some)) for some in (foretold, found, missed))
     few = foretold if foretold.any() else np.ones(len(foretold), bool)
     medians = (float(np.median(x[few])) if len(x) else 0.0 for x in (height, rounding))
     return Resolution(len(foretold), *counts, *medians)
+
+
+class _Level(NamedTuple):
+    """Hits from which rays leave.  rows: of the rays that came first;  rays: those that hit here;
+    theirs: Mitsuba's hits of the same rays; behind a transparent surface, ours."""
+
+    rows: IntArray
+    rays: Rays
+    ours: Intersections
+    theirs: Intersections
+
+
+def _levels(
+    scene: Scene,
+    tables: SceneTables,
+    sizes: ShapeSizes,
+    rays: Rays,
+    ours: Intersections,
+    theirs: Intersections,
+) -> Iterator[_Level]:
+    """The hits of rays, all of which hit, and those behind transparent surfaces, straight on."""
+    rows, d, hits = np.arange(len(rays.o)), rays.d, ours
+    yield _Level(rows, rays, ours, theirs)
+    for _ in range(STRAIGHT_ON):
+        clear = np.flatnonzero(_is_clear(scene, sizes, hits))
+        hits, d, rows = rows_of(hits, clear), d[clear], rows[clear]
+        o = off_surface(sizes, hits, d)
+        hits = query.intersect(tables, o, d)
+        met = np.flatnonzero(hits.shape >= 0)
+        o, d, hits, rows = o[met], d[met], rows_of(hits, met), rows[met]
+        if len(rows) == 0:
+            return
+        yield _Level(rows, Rays(o, d), hits, hits)
+
+
+def beyond_precision(
+    scene: Scene, tables: SceneTables, counterpart: Counterpart, rays: Rays, seed: int = 0
+) -> BoolArray:
+    """(n,): of which rays Mitsuba's precision may change what they show, by geometry alone.
+
+    Either float32 may move the ray over an edge: rays next to it hit another surface.  Or a ray
+    that leaves its hit, or one behind transparent surfaces, may hit a wrong one.  Both are foretold
+    by our tracer and by the reference's errors: no light is asked, so that a fault of light makes
+    no ray seem to be beyond them.
+    """
+    sizes = ShapeSizes(scene, counterpart.frame)
+    ours = query.intersect(tables, rays.o, rays.d)
+    reach = np.full(len(rays.o), sizes.reach.max(initial=0.0))
+    there = np.where(ours.shape[:, None] >= 0, ours.p, rays.o)
+    radius = sizes.frame.delta(rays.o, there, reach) + counterpart.off_by(ours.shape, "sag")
+    beyond = np.zeros(len(rays.o), bool)
+    for move in arbiter.directions(AROUND):
+        moved = query.intersect(tables, rays.o + radius[:, None] * move, rays.d)
+        beyond |= _differs(ours, moved, STEEPEST * radius)
+    hit = np.flatnonzero(ours.shape >= 0)
+    some, hits = rays.rows(hit), rows_of(ours, hit)
+    for level in _levels(scene, tables, sizes, some, hits, hits):
+        foretold, *_ = _left_behind(
+            tables, counterpart, sizes, level.rays, level.ours, level.theirs, seed, scene
+        )
+        beyond[hit[level.rows]] |= foretold
+    return beyond
+
+
+def too_many_elsewhere(
+    scene: Scene, tables: SceneTables, counterpart: Counterpart, rays: Rays, total: int
+) -> int:
+    """Of rays that the arbiter explains, among `total`: how many Mitsuba's precision does not
+    concern, if that is more than such rays may be; else 0."""
+    if not arbiter.too_many(len(rays.o), total):
+        return 0
+    count = elsewhere(scene, tables, counterpart, rays)
+    return count if arbiter.too_many(count, min(total, MOST_ASKED)) else 0
+
+
+NOT_BEYOND = "too many of their rays are not beyond Mitsuba's precision by their own geometry"
+"""Why values that the arbiter explains differ even so: rays next to them show Mitsuba's values, but
+not because of an edge or of a surface that a ray may miss."""
+
+
+def elsewhere(scene: Scene, tables: SceneTables, counterpart: Counterpart, rays: Rays) -> int:
+    """How many of the rays, of at most MOST_ASKED, Mitsuba's precision does not concern."""
+    step = -(-len(rays.o) // MOST_ASKED)
+    some = rays.rows(np.arange(0, len(rays.o), max(step, 1)))
+    return int(np.count_nonzero(~beyond_precision(scene, tables, counterpart, some)))
 
 
 def _left_behind(
@@ -126,7 +208,7 @@ def _left_behind(
         if len(leaves) == 0:
             continue
         w, hits, met = w[leaves], rows_of(ours, leaves), rows_of(theirs, leaves)
-        right = query.intersect(tables, _off(sizes, hits, w), w)
+        right = query.intersect(tables, off_surface(sizes, hits, w), w)
         e = frame.delta(hits.p, right.p, sizes.reach_of(right.shape))
         slack = STEEPEST * ((height + rounding)[leaves] + e)
         expected = _doubled(tables, sizes, right, w, e)
@@ -154,7 +236,7 @@ def _doubled(
     doubled = np.zeros(len(w), bool)
     if len(met):
         front, along = rows_of(right, met), w[met]
-        behind = query.intersect(tables, _off(sizes, front, along), along)
+        behind = query.intersect(tables, off_surface(sizes, front, along), along)
         doubled[met] = behind.t * np.abs(np.sum(front.n * along, axis=1)) <= 2.0 * e[met]
     return doubled
 
@@ -164,12 +246,12 @@ def _side(hits: Intersections, w: FloatArray) -> FloatArray:
     return np.asarray(hits.n * np.where(np.sum(w * hits.n, axis=1) < 0.0, -1.0, 1.0)[:, None])
 
 
-def _off(sizes: ShapeSizes, hits: Intersections, w: FloatArray) -> FloatArray:
+def off_surface(sizes: ShapeSizes, hits: Intersections, w: FloatArray) -> FloatArray:
     """(n, 3): origins on w's side of the hit surface, as near as float64 allows."""
-    return np.asarray(hits.p + _side(hits, w) * _own_error(sizes, hits)[:, None])
+    return np.asarray(hits.p + _side(hits, w) * own_error(sizes, hits)[:, None])
 
 
-def _own_error(sizes: ShapeSizes, hits: Intersections) -> FloatArray:
+def own_error(sizes: ShapeSizes, hits: Intersections) -> FloatArray:
     """(n,): `reference_rt.core.ray.surface_error` for the scene's largest coordinates."""
     reach = np.abs([sizes.lower, sizes.upper]).max()
     return np.asarray(16.0 * 3.0**0.5 * UNIT_ROUNDOFF * (np.abs(hits.p).max(axis=1) + 2.0 * reach))

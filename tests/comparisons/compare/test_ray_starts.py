@@ -109,11 +109,14 @@ def test_a_small_effect_does_not_hide_a_fault_in_its_noise(
         (10.0, "inconclusive"),
         (-1.0, "inconclusive"),
     ):
-        found = ray_starts.explained(
-            *(scene, counterpart, 0.005, 60.0, print, differ),
-            (theirs + times * effect.mean, theirs),
+        ours = theirs + times * effect.mean
+        found, without = ray_starts.explained(
+            *(scene, counterpart, 0.005, 60.0, print, differ), (ours, theirs)
         )
         assert found.status == status
+        assert without is not None
+        np.testing.assert_array_equal(without[0], ours)
+        assert np.abs((without[1] - theirs).mean(axis=0)).max() > 0.0
 
 
 def test_starts_matter_at_long_paths_in_glass_alone(wide: None) -> None:
@@ -169,7 +172,7 @@ def test_they_are_not_measured_where_another_rung_differs(status):
 
     def explained(rung, replicates):
         asked.append(replicates)
-        return rung
+        return rung, None
 
     geometry = RungResult("geometry", status, "rays", {})
     rendered = of_replicates(a, b, {})

@@ -9,7 +9,7 @@ from stiff_scenes import scene
 
 from comparisons.results.case import RungResult
 from comparisons.rungs import direct
-from comparisons.rungs.limited import limited
+from comparisons.rungs.limited import Rest, limited
 from comparisons.rungs.rays.camera import camera_rays
 from comparisons.rungs.rays.resolution import Resolution, resolution
 from comparisons.translator import load
@@ -138,15 +138,6 @@ def test_what_is_foretold_is_what_is_found(name: str) -> None:
     assert 0.4 * found.foretold <= found.found <= 1.02 * found.foretold
 
 
-def test_pictures_that_differ_beyond_a_limit_are_limited_by_the_reference() -> None:
-    resolved = Resolution(1000, 50, 48, 0, 1e-3, 1e-6)
-    below = RungResult("geometry", "agree", "", {"resolution": resolved._asdict(), "rays": 1000})
-    above = RungResult("images", "differ", "other")
-    statuses = [rung.status for rung in limited([above, below])]
-    assert statuses == ["agree", "reference-limited"]
-    assert "from 50 of 1000 points by prediction" in limited([below, above])[1].reason
-
-
 @pytest.mark.parametrize(
     "resolved",
     [
@@ -157,19 +148,14 @@ def test_pictures_that_differ_beyond_a_limit_are_limited_by_the_reference() -> N
 def test_without_a_limit_they_differ(resolved: Resolution) -> None:
     below = RungResult("geometry", "agree", "", {"resolution": resolved._asdict(), "rays": 1000})
     above = RungResult("images", "differ", "other")
-    assert limited([below, above])[1].status == "differ"
+
+    def explained(share: float) -> Rest:
+        return Rest("agree", "the rest agrees")
+
+    assert limited([below, above], explained)[1].status == "differ"
     broken = replace(below, status="differ")
-    assert limited([broken, above])[1].status == "differ"
-    assert limited([above])[0].status == "differ"
-
-
-def test_what_a_rung_cannot_resolve_limits_the_picture_above() -> None:
-    numbers = {"pixels": 400, "explained": 40}
-    below = RungResult("whitted", "reference-limited", "40 of 400", numbers)
-    above = RungResult("images", "differ", "other")
-    assert limited([below, above])[1].status == "reference-limited"
-    few = replace(below, status="agree", numbers=numbers | {"explained": 1})
-    assert limited([few, above])[1].status == "differ"
+    assert limited([broken, above], explained)[1].status == "differ"
+    assert limited([above], explained)[0].status == "differ"
 
 
 def test_a_light_that_float32_cannot_aim_at_is_not_called_dark() -> None:

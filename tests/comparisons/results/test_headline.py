@@ -156,7 +156,11 @@ def test_the_bias_that_would_have_been_seen_is_apart():
     ("numbers", "proof"),
     [
         (
-            {"resolution": {"hits": 3699, "found": 483}, "decided_mitsuba": 267},
+            {
+                "resolution": {"hits": 3699, "found": 483},
+                "is_limited": True,
+                "decided_mitsuba": 267,
+            },
             "from 483 of 3,699 points of surfaces, the rays that it starts hit a wrong surface",
         ),
         (
@@ -164,6 +168,7 @@ def test_the_bias_that_would_have_been_seen_is_apart():
             "exact arithmetic finds 267 of its hits wrong, and none of ours",
         ),
         ({"decided_mitsuba": 267, "decided_ours": 1}, ""),
+        ({"resolution": {"hits": 2944, "found": 6}, "is_limited": False}, ""),
     ],
 )
 def test_which_side_is_wrong_and_what_proves_it(numbers, proof):

@@ -101,7 +101,7 @@ textures: {noise: {type: bitmap, file: noise.png}}
 materials: {lamp: {type: emissive, radiance: noise}}
 shapes:
   - {type: rectangle, transform: [{scale: 5}, {translate: [0, 0, -2]}]}
-  - {type: rectangle, material: lamp, transform: [{rotate: {axis: [1, 0, 0], degrees: -89.7}},
+  - {type: rectangle, material: lamp, transform: [{rotate: {axis: [1, 0, 0], degrees: 89.7}},
      {scale: 0.3}, {translate: [0, 9, -1.98]}]}
 """
 
