@@ -7,7 +7,7 @@ import numpy as np
 
 from comparisons.compare.diagnosis.colour import CHANNELS
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
-from comparisons.compare.diagnosis.misfit import Misfit
+from comparisons.compare.diagnosis.misfit import REST, Misfit
 from comparisons.results.case import FloatArray
 from reference_rt.rendering.image import srgb
 from reference_rt.textures.image_file import linear
@@ -39,6 +39,7 @@ def hypotheses(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hyp
     if not lights or gain.picture.mean() > LITTLE * misfit.reference.mean():
         yield gain
     yield from _gains(misfit)
+    yield from _vignette(misfit)
     yield from _limits(misfit)
     yield from _lights(misfit, lights)
 
@@ -77,6 +78,25 @@ def _gains(misfit: Misfit) -> Iterator[Hypothesis]:
     yield Hypothesis("offset", f"constant offset of {amount:+.3g}", evidence, r + amount, 1)
 
 
+def _vignette(misfit: Misfit) -> Iterator[Hypothesis]:
+    """A gain, and one that changes with the square, and its square, of the distance from the
+    middle."""
+    r = misfit.reference
+    y, x = (np.linspace(-1.0, 1.0, n) * n for n in r.shape[:2])
+    square = y[:, None] ** 2 + x**2
+    square = (square / max(float(square.max()), 1e-300))[..., None]
+    columns = np.stack([r, r * square, r * square**2], axis=-1)
+    factors = misfit.nearest(columns)
+    corner, middle = float(factors.sum()), float(factors[0])
+    evidence = (
+        f"the candidate is {middle:.4g} times the reference in the middle of the picture, and "
+        f"{corner:.4g} times in its corners"
+    )
+    name = f"vignette: corners have {corner / middle:.3g} of the middle's light"
+    if corner > 0.0 and middle > 0.0:
+        yield Hypothesis("vignette", name, evidence, columns @ factors, 3)
+
+
 def _limits(misfit: Misfit) -> Iterator[Hypothesis]:
     r, top = misfit.reference, float(misfit.candidate.max())
     above = r > top
@@ -113,4 +133,5 @@ def _lights(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hypoth
         else:
             what = f"light of another strength: {name}"
         evidence = f"the candidate has {1.0 + amount:.3g} times what the reference has of {name}"
-        yield Hypothesis("light", what, evidence, r + amount * light, 1)
+        # Its picture has noise of its own.
+        yield Hypothesis("light", what, evidence, r + amount * light, 1, REST)

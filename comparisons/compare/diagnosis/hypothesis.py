@@ -1,5 +1,6 @@
 """A hypothesis about what is wrong with a picture."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from comparisons.results.case import FloatArray
@@ -8,10 +9,16 @@ from comparisons.results.case import FloatArray
 @dataclass(frozen=True)
 class Hypothesis:
     """family: hypotheses of the same family do not compete;  name, evidence: as in `Cause`;
-    picture: the candidate that the hypothesis predicts;  parameters: how many were fitted."""
+    picture: the candidate that the hypothesis predicts;  parameters: how many were fitted.
+
+    leaves: the fraction of the squared difference by which the picture may be inexact, besides
+    noise;  slack: returns how far its values may be off, of the picture's shape.
+    """
 
     family: str
     name: str
     evidence: str
     picture: FloatArray
     parameters: int
+    leaves: float = 0.0
+    slack: Callable[[], FloatArray] | None = None
