@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from functools import partial
 
 import numpy as np
 
 from comparisons.compare.diagnosis.colour import CHANNELS
-from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.diagnosis.hypothesis import Hypothesis, of_pixels
 from comparisons.compare.diagnosis.misfit import REST, Misfit
 from comparisons.results.case import FloatArray
 from reference_rt.rendering.image import srgb
@@ -27,6 +28,9 @@ REMARKABLE = {
 NEAR = 0.01
 """Relative difference up to which a fitted factor counts as a remarkable one."""
 
+
+OF_LENSES = 0.01
+"""What the two terms of a vignette leave of it, where it is a power of the cosine."""
 
 LITTLE = 0.01
 """Where no more than this of the light is left, a gain near 0 explains that about as well as a lost
@@ -51,7 +55,7 @@ def _gain(misfit: Misfit) -> Hypothesis:
     for factor, name in REMARKABLE.items():
         if abs(gain / factor - 1.0) < NEAR:
             evidence += f", {name} what it should be"
-    return Hypothesis("gain", f"constant gain of {gain:.4g}", evidence, gain * r, 1)
+    return of_pixels("gain", f"constant gain of {gain:.4g}", evidence, lambda p: gain * p, r, 1)
 
 
 def _gains(misfit: Misfit) -> Iterator[Hypothesis]:
@@ -63,19 +67,23 @@ def _gains(misfit: Misfit) -> Iterator[Hypothesis]:
         amount = misfit.amount(alone)
         gains[k] += amount
         evidence = f"{channel} is {1.0 + amount:.4g} times the reference's; other channels agree"
-        yield Hypothesis(
+        only = np.where(np.arange(3) == k, 1.0 + amount, 1.0)
+        yield of_pixels(
             "gain of a channel",
             f"gain of {channel} of {1 + amount:.4g}",
             evidence,
-            r + amount * alone,
+            partial(np.multiply, only),
+            r,
             1,
         )
     each = ", ".join(f"{g:.4g}" for g in gains)
     evidence = f"red, green and blue are {each} times the reference's"
-    yield Hypothesis("gains", "another gain of each channel", evidence, gains * r, 3)
+    yield of_pixels("gains", "another gain of each channel", evidence, lambda p: gains * p, r, 3)
     amount = misfit.amount(np.ones_like(r))
     evidence = f"every pixel of the candidate differs from the reference by {amount:+.3g} W/sr/m²"
-    yield Hypothesis("offset", f"constant offset of {amount:+.3g}", evidence, r + amount, 1)
+    yield of_pixels(
+        "offset", f"constant offset of {amount:+.3g}", evidence, partial(np.add, amount), r, 1
+    )
 
 
 def _vignette(misfit: Misfit) -> Iterator[Hypothesis]:
@@ -94,7 +102,7 @@ def _vignette(misfit: Misfit) -> Iterator[Hypothesis]:
     )
     name = f"vignette: corners have {corner / middle:.3g} of the middle's light"
     if corner > 0.0 and middle > 0.0:
-        yield Hypothesis("vignette", name, evidence, columns @ factors, 3)
+        yield Hypothesis("vignette", name, evidence, columns @ factors, 3, OF_LENSES)
 
 
 def _limits(misfit: Misfit) -> Iterator[Hypothesis]:
@@ -104,7 +112,7 @@ def _limits(misfit: Misfit) -> Iterator[Hypothesis]:
         count = int(np.count_nonzero(above))
         evidence = f"{count} values of the reference are above the candidate's maximum, {top:.6g}"
         name = f"highlights clamped to {top:.4g}"
-        yield Hypothesis("clamped", name, evidence, np.minimum(r, top), 1)
+        yield of_pixels("clamped", name, evidence, partial(np.minimum, top), r, 1)
     clipped = np.clip(r, 0.0, 1.0)
     for name, rounded in (
         ("sRGB", linear(np.round(255.0 * srgb(clipped)) / 255.0)),

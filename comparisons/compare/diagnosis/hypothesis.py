@@ -12,7 +12,9 @@ class Hypothesis:
     picture: the candidate that the hypothesis predicts;  parameters: how many were fitted.
 
     leaves: the fraction of the squared difference by which the picture may be inexact, besides
-    noise;  slack: returns how far its values may be off, of the picture's shape.
+    noise;  slack: returns how far its values may be off, of the picture's shape;
+    noise: the variance of its values;  of: the colours of any picture, where what happens depends on
+    nothing but the colours of a pixel.
     """
 
     family: str
@@ -22,3 +24,17 @@ class Hypothesis:
     parameters: int
     leaves: float = 0.0
     slack: Callable[[], FloatArray] | None = None
+    noise: FloatArray | None = None
+    of: Callable[[FloatArray], FloatArray] | None = None
+
+
+def of_pixels(
+    family: str,
+    name: str,
+    evidence: str,
+    of: Callable[[FloatArray], FloatArray],
+    reference: FloatArray,
+    parameters: int,
+) -> Hypothesis:
+    """What happens to the colours of each pixel of the reference."""
+    return Hypothesis(family, name, evidence, of(reference), parameters, of=of)

@@ -105,6 +105,13 @@ class Misfit:
             found.excess = found._scale.excess(found._difference)
         return found
 
+    def noisier(self, variance: FloatArray) -> "Misfit":
+        """The same for predicted pictures whose values have noise of this variance."""
+        found = copy.copy(self)
+        found._scales = [scale.noisier(variance) for scale in self._scales]
+        found._measure(self._difference)
+        return found
+
     @property
     def weights(self) -> FloatArray:
         """(height, width, 3): of single pixels."""
@@ -249,6 +256,10 @@ class _Scale:
         """The same where there is no noise but `inside`, 1 there and 0 elsewhere."""
         error2, floor2 = self._of_pixels
         return _Scale(self.block, inside * error2, floor2)
+
+    def noisier(self, variance: FloatArray) -> "_Scale":
+        error2, floor2 = self._of_pixels
+        return _Scale(self.block, error2 + variance, floor2)
 
     def binned(self, x: FloatArray) -> FloatArray:
         """Means over whole blocks; partial blocks at the edges are ignored."""

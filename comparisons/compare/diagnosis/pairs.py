@@ -24,6 +24,9 @@ FAR_MORE = 0.5
 TRIED = 4
 """So many families of moves are fitted again in better colours: those that leave least."""
 
+AGAIN = 2
+"""How often they are fitted again: the better the positions, the better the colours."""
+
 MOST_MOVES = 2
 """So many families of moves are joined with colours."""
 
@@ -41,19 +44,30 @@ def pairs(misfit: Misfit) -> Iterator[tuple[Hypothesis, Misfit]]:
     likely, misfit = _likely_moves(misfit)
     for move in likely:
         seen = move.seen(misfit)
-        for one in of_colours(seen):
-            yield (
-                replace(
-                    one,
-                    family=f"{move.family}{JOINED}{one.family}",
-                    name=f"{move.name}{JOINED}{one.name}",
-                    evidence=f"{move.evidence}; then {one.evidence}",
-                    parameters=move.parameters + one.parameters,
-                    leaves=max(move.leaves, one.leaves),
-                    slack=move.slack(one.picture),
-                ),
-                seen,
-            )
+        first = [_joined(move, one, seen) for one in of_colours(seen)]
+        yield from first
+        simple, _ = min(first, key=lambda one: _more_likely((seen.left(one[0].picture), one[0])))
+        if move.warp is None or simple.of is None:
+            continue
+        # Any colours may make up for positions that are a little off, a simple cause may not.
+        search = Search(misfit, misfit.reference, simple.of)
+        for warp in search.fitted(move.family, move.warp.amounts):
+            again = of_warp(warp, misfit.reference.shape)
+            seen = again.seen(misfit)
+            yield from (_joined(again, one, seen) for one in of_colours(seen))
+
+
+def _joined(move: Move, one: Hypothesis, seen: Misfit) -> tuple[Hypothesis, Misfit]:
+    both = replace(
+        one,
+        family=f"{move.family}{JOINED}{one.family}",
+        name=f"{move.name}{JOINED}{one.name}",
+        evidence=f"{move.evidence}; then {one.evidence}",
+        parameters=move.parameters + one.parameters,
+        leaves=max(move.leaves, one.leaves),
+        slack=move.slack(one.picture),
+    )
+    return both, seen
 
 
 def _likely_moves(misfit: Misfit) -> tuple[list[Move], Misfit]:
@@ -68,12 +82,16 @@ def _likely_moves(misfit: Misfit) -> tuple[list[Move], Misfit]:
     def improved(move: Move) -> Iterator[Move]:
         """Fitted again, now that its pixels show which colours became which."""
         yield move
-        if move.family == "filter":
-            yield from filters(misfit, tint(move).of(r))
-        elif move.warp is not None:
-            search = Search(misfit, tint(move).of(r))
-            for warp in search.fitted(move.family, move.warp.amounts, levels=2):
-                yield of_warp(warp, r.shape)
+        for _ in range(AGAIN):
+            if move.family == "filter":
+                move = next(filters(misfit, tint(move).of(r)))
+                yield move
+            elif move.warp is not None:
+                search, order = Search(misfit, r, tint(move).of), move.warp.order
+                for warp in search.fitted(move.family, move.warp.amounts):
+                    if warp.order == order:
+                        move = of_warp(warp, r.shape)
+                        yield move
 
     def left(move: Move) -> float:
         seen = move.seen(misfit)
@@ -99,7 +117,7 @@ def _best_of_each(found: Iterable[tuple[float, Move]]) -> list[tuple[float, Move
     return sorted(best.values(), key=_more_likely)
 
 
-def _more_likely(one: tuple[float, Move]) -> float:
-    """Increases with what a move leaves, and by a tenth for each parameter that was fitted."""
-    left, move = one
-    return (max(left, 0.0) + NO_MATTER) * 1.1**move.parameters
+def _more_likely(one: tuple[float, Move | Hypothesis]) -> float:
+    """Increases with what a cause leaves, and by a tenth for each parameter that was fitted."""
+    left, cause = one
+    return (max(left, 0.0) + NO_MATTER) * 1.1**cause.parameters

@@ -5,10 +5,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from comparisons.compare.diagnosis import brightness, colour, place, tones
+from comparisons.compare.diagnosis.colour import A_MATRIX
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.diagnosis.misfit import NO_MATTER, REST, Misfit
 from comparisons.compare.diagnosis.pairs import pairs
-from comparisons.compare.diagnosis.spots import SHARE, one_place, rim
+from comparisons.compare.diagnosis.spots import FEW_PIXELS, ONE_PIXEL, ONE_TILE, SHARE, one_place, rim
+from comparisons.compare.diagnosis.tones import A_CURVE
 from comparisons.results.case import Cause, FloatArray, Images
 from comparisons.statistics.metrics import count_nonfinite
 
@@ -34,6 +36,22 @@ IN_PART = "in part: "
 """Begins the name of a cause that leaves more than noise."""
 
 
+SURE = 0.995
+"""The fraction of the squared difference that a cause must explain for others not to be rendered.
+If nearly all light is lost, a gain near 0 explains 0.99 of it (measured: a ball under a sky)."""
+
+UNSURE = (A_CURVE, A_MATRIX, ONE_TILE, FEW_PIXELS, ONE_PIXEL)
+"""Causes that others look like, which a scene must be rendered for: the former have so many
+parameters that they may fit what has a simpler cause, and a small shadow lies in one place."""
+
+
+def is_sure(cause: Cause | None) -> bool:
+    """Whether nothing need be rendered to find a likelier cause."""
+    if cause is None or cause.explained <= SURE or cause.name.startswith(IN_PART):
+        return False
+    return not cause.name.endswith(UNSURE)
+
+
 def likeliest(
     images: Images,
     lights: Mapping[str, FloatArray] | None = None,
@@ -57,10 +75,13 @@ def likeliest(
         *((h, misfit) for h in colour.hypotheses(misfit)),
         *((h, misfit) for h in tones.hypotheses(misfit)),
         *place.hypotheses(misfit),
-        *((h, misfit) for h in also(misfit.reference)),
+        *(
+            (h, misfit if h.noise is None else misfit.noisier(h.noise))
+            for h in also(misfit.reference)
+        ),
     ]
     ranked = _ranked(singles)
-    whole = [one for one in ranked if one.is_whole]
+    whole = _simple([one for one in ranked if one.is_whole])
     at_border = rim(misfit)
     # A wrong rim changes no other pixel: what explains more of the difference is not of the rim,
     # nor is what predicts as much of it as must lie in a rim.
@@ -71,7 +92,7 @@ def likeliest(
     if at_border is not None and not enough:
         return at_border
     if not whole:
-        two = [one for one in _ranked(pairs(misfit)) if one.is_whole]
+        two = _simple([one for one in _ranked(pairs(misfit)) if one.is_whole])
         both = _best(two, two[0].seen.margin) if two else None
         if both is not None and both.is_reproduced:
             return both.cause(of=misfit)
@@ -108,6 +129,13 @@ class _Ranked:
             return Cause(one.name, evidence, explained)
         evidence += ", and what is left is more than noise: something else differs, too"
         return Cause(f"{IN_PART}{one.name}", evidence, explained)
+
+
+def _simple(ranked: list[_Ranked]) -> list[_Ranked]:
+    """Without curves and matrices of many parameters, if there are others: these average noise, and
+    so leave less of it than what is right."""
+    few = [one for one in ranked if not one.hypothesis.name.endswith((A_CURVE, A_MATRIX))]
+    return few or ranked
 
 
 def _ranked(hypotheses: Iterable[tuple[Hypothesis, Misfit]]) -> list[_Ranked]:

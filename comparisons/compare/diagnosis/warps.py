@@ -46,6 +46,9 @@ STEPS = ((4.0, 2), (2.0, 2), (1.0, 1), (0.0, 3))
 """The width of a blur in pixels, and steps of Gauss and Newton's method: blurred pictures show
 displacements that are larger than their details."""
 
+STEP = 0.25
+"""Pixels to either side, by whose difference a slope is measured."""
+
 FARTHEST = 3
 """The largest shift that is sought, in pixels along x and y."""
 
@@ -125,19 +128,26 @@ class Warp:
 
 
 class Search:
-    """The amounts with the least misfit between `base` and the candidate.
+    """The amounts with the least misfit between `base`, seen through a warp, and the candidate.
 
-    base: the reference in the candidate's colours.
+    base: the reference in the candidate's colours, or the reference itself where `colours` gives
+    the candidate's for any (points, 3): colours change after positions, and at edges that is not
+    the same.
     """
 
-    def __init__(self, misfit: Misfit, base: FloatArray) -> None:
+    def __init__(
+        self,
+        misfit: Misfit,
+        base: FloatArray,
+        colours: Callable[[FloatArray], FloatArray] | None = None,
+    ) -> None:
         shape = base.shape
         self._shape, self._corner = shape, _corner(shape)
         chosen = chosen_pixels(shape)
         self._grid = tuple(x.ravel()[chosen] for x in grid(shape))
         self._weights = misfit.weights.reshape(-1, 3)[chosen]
         self._levels = []
-        for blur, steps in STEPS:
+        for blur, steps in STEPS if colours is None else STEPS[-1:]:
             wanted: list[FloatArray] = []
             splines: list[FloatArray] = []
             slopes: list[list[FloatArray]] = []
@@ -148,8 +158,10 @@ class Search:
                 wanted.append(a.ravel()[chosen])
                 splines.append(_spline(b, 3))
                 slopes.append([np.asarray(slope) for slope in np.gradient(b)])
-            self._levels.append((steps, _Level(np.stack(wanted, axis=-1), splines, slopes)))
-        self._plain = [np.ascontiguousarray(base[..., k]) for k in range(3)]
+            level = _Level(np.stack(wanted, axis=-1), splines, slopes, 3, colours)
+            self._levels.append((steps, level))
+        plain = [np.ascontiguousarray(base[..., k]) for k in range(3)]
+        self._plain = replace(self._levels[-1][1], splines=plain, slopes=[], order=1)
 
     def warps(self, rolled: tuple[int, int]) -> Iterator[Warp]:
         """All of them, twice: of a scene that was rendered so, and of a picture that was resampled
@@ -157,14 +169,16 @@ class Search:
         for family in WARPS:
             yield from self.fitted(family, self._start(family, rolled))
 
-    def fitted(self, family: str, start: FloatArray, levels: int = len(STEPS)) -> Iterator[Warp]:
-        """From a start (fields, 3), by the last `levels` of STEPS."""
+    def fitted(self, family: str, start: FloatArray) -> Iterator[Warp]:
+        """From a start (fields, 3)."""
         amounts = start
-        for steps, level in self._levels[-levels:]:
+        for steps, level in self._levels:
             for _ in range(steps):
                 amounts = self._improved(family, amounts, start, level)
-        plain = replace(self._levels[-1][1], splines=self._plain, order=1)
-        for order, fitted in ((3, amounts), (1, self._improved(family, amounts, start, plain))):
+        resampled = amounts
+        for _ in range(steps):
+            resampled = self._improved(family, resampled, start, self._plain)
+        for order, fitted in ((3, amounts), (1, resampled)):
             apart = np.ptp(fitted, axis=1).max() > STILL
             if apart or not WARPS[family][1]:
                 yield Warp(family, self._still(family, fitted), order)
@@ -209,14 +223,16 @@ class Search:
         fields, apart = WARPS[family]
         normal, right = np.zeros((3, len(fields), len(fields))), np.zeros((3, len(fields)))
         directions = [FIELDS[name](*self._grid) for name in fields]
+        points = np.stack([self._at(family, amounts[:, k]) for k in range(3)], axis=-1)
+        rest = level.wanted - level.values(points)
+        slopes = level.slopes_at(points)
         for k in range(3):
-            y, x = self._at(family, amounts[:, k])
-            rest = level.wanted[:, k] - _interpolated(level.splines[k], y, x, level.order)
-            slopes = [_interpolated(slope, y, x, 1) for slope in level.slopes[k]]
-            columns = np.stack([slopes[0] * down + slopes[1] * to for down, to in directions])
-            weights = self._weights[:, k] * self._is_inside(y, x)
+            columns = np.stack(
+                [slopes[0][:, k] * down + slopes[1][:, k] * to for down, to in directions]
+            )
+            weights = self._weights[:, k] * self._is_inside(*points[..., k])
             normal[k] = (columns * weights) @ columns.T
-            right[k] = (columns * weights) @ rest
+            right[k] = (columns * weights) @ rest[:, k]
         if not apart:
             normal[:], right[:] = normal.sum(axis=0), right.sum(axis=0)
         steps = [
@@ -234,13 +250,38 @@ class Search:
 
 @dataclass(frozen=True)
 class _Level:
-    """Blurred pictures.  wanted (points, 3): the candidate's values;  splines, slopes (down, right):
-    of the base's channels."""
+    """Blurred pictures.  wanted (points, 3): the candidate's values;  splines, slopes (down, right;
+    none for order 1): of the base's channels."""
 
     wanted: FloatArray
     splines: list[FloatArray]
     slopes: list[list[FloatArray]]
-    order: int = 3
+    order: int
+    colours: Callable[[FloatArray], FloatArray] | None
+
+    def values(self, points: FloatArray) -> FloatArray:
+        """(points, 3) at (2, points, 3)."""
+        found = [
+            _interpolated(self.splines[k], *points[..., k], self.order) for k in range(3)
+        ]
+        together = np.stack(found, axis=-1)
+        return together if self.colours is None else self.colours(together)
+
+    def slopes_at(self, points: FloatArray) -> list[FloatArray]:
+        """(points, 3), down and to the right."""
+        if self.order == 3 and self.colours is None:
+            return [
+                np.stack(
+                    [_interpolated(self.slopes[k][i], *points[..., k], 1) for k in range(3)],
+                    axis=-1,
+                )
+                for i in range(2)
+            ]
+        # What is interpolated linearly has a slope of its own between any two pixels.
+        return [
+            (self.values(points + step) - self.values(points - step)) / (2.0 * STEP)
+            for step in (np.array([a, b])[:, None, None] for a, b in ((STEP, 0.0), (0.0, STEP)))
+        ]
 
 
 def chosen_pixels(shape: tuple[int, ...]) -> npt.NDArray[np.int64]:
