@@ -85,7 +85,13 @@ def of_replicates(
     error = None
     if candidate.shape[1:] == mean.shape:
         error = statistics.standard_error(candidate, reference)
-    return Rendered(Images(candidate.mean(axis=0), mean, error), seconds, (candidate, reference))
+    own = None
+    if isinstance(reference, statistics.Known):
+        own = np.sqrt(reference.variance)
+    elif len(reference) > 1:
+        own = reference.std(axis=0, ddof=1) / np.sqrt(len(reference))
+    images = Images(candidate.mean(axis=0), mean, error, reference_error=own)
+    return Rendered(images, seconds, (candidate, reference))
 
 
 @dataclass(frozen=True)
@@ -261,4 +267,3 @@ def likeliest_cause(
         return plain
     singles = {} if lights is None else lights()
     return diagnosis.likeliest(images, singles, *([] if lengths is None else [lengths]))
-

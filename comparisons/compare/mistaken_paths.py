@@ -147,6 +147,7 @@ class _Tracer:
         self._number = np.array([names.index(shape.material or "") for shape in scene.shapes])
         self._pixels = scene.film.height * scene.film.width
         self._is_lit = scene.light_sources().probability.any()
+
     def _add(self, name: str, pixel: IntArray, light: FloatArray) -> None:
         for k in range(3):
             self.sums[name][:, k] += np.bincount(pixel, light[:, k], self._pixels)

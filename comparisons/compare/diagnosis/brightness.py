@@ -29,9 +29,6 @@ NEAR = 0.01
 """Relative difference up to which a fitted factor counts as a remarkable one."""
 
 
-OF_LENSES = 0.01
-"""What the two terms of a vignette leave of it, where it is a power of the cosine."""
-
 LITTLE = 0.01
 """Where no more than this of the light is left, a gain near 0 explains that about as well as a lost
 light does, and says less: it is no rival."""
@@ -102,7 +99,7 @@ def _vignette(misfit: Misfit) -> Iterator[Hypothesis]:
     )
     name = f"vignette: corners have {corner / middle:.3g} of the middle's light"
     if corner > 0.0 and middle > 0.0:
-        yield Hypothesis("vignette", name, evidence, columns @ factors, 3, OF_LENSES)
+        yield Hypothesis("vignette", name, evidence, columns @ factors, 3)
 
 
 def _limits(misfit: Misfit) -> Iterator[Hypothesis]:

@@ -3,7 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from comparisons.results.case import FloatArray
+
+STEP = 1e-3
+"""Relative, by which brightness is changed."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +31,18 @@ class Hypothesis:
     slack: Callable[[], FloatArray] | None = None
     noise: FloatArray | None = None
     of: Callable[[FloatArray], FloatArray] | None = None
+
+    def slope(self, reference: FloatArray) -> FloatArray | float:
+        """How much more than the reference its picture changes with brightness."""
+        if self.of is None:
+            return 1.0
+        brighter = (1.0 + STEP) * reference
+        change = STEP * reference
+        return np.where(
+            change > 0.0,
+            (self.of(brighter) - self.picture) / np.where(change > 0.0, change, 1.0),
+            1.0,
+        )
 
 
 def of_pixels(

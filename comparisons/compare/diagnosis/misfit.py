@@ -27,6 +27,9 @@ KURTOSIS = 3.0
 CLEARLY = 6.0
 """Standard deviations by which a difference must exceed noise before a cause is sought."""
 
+NO_MORE = 3.0
+"""Standard deviations that the noise of what a right cause leaves hardly ever exceeds: the scatter
+is that of noise with KURTOSIS."""
 
 REST = 0.1
 """The largest part of a bias, or of the squared difference of blocks, that a named cause leaves: a
@@ -63,6 +66,8 @@ class Misfit:
     def __init__(self, images: Images) -> None:
         self.candidate, self.reference = images.candidate, images.reference
         error2 = np.zeros_like(self.reference) if images.error is None else images.error**2
+        own = images.reference_error
+        self._reference_error2 = 0.5 * error2 if own is None else own**2
         # Few replicates estimate the variance badly; neighbouring pixels have similar ones.
         error2 = np.maximum(error2, ndimage.uniform_filter(error2, (3, 3, 1)))
         size = np.maximum(np.abs(self.candidate), np.abs(self.reference))
@@ -124,9 +129,13 @@ class Misfit:
         slack = self._rounding if hypothesis.slack is None else self._rounding + hypothesis.slack()
         left = np.sign(left) * np.maximum(np.abs(left) - slack, 0.0)
         leaves = max(hypothesis.leaves, NO_MATTER)
+        # What changes colours changes the noise of the reference in them.
+        noise = (
+            self._inside * (hypothesis.slope(self.reference) ** 2 - 1.0) * self._reference_error2
+        )
         return all(
-            scale.excess(left)
-            <= leaves * max(scale.excess(self._difference), 0.0) + CLEARLY * scale.scatter
+            scale.excess(left) - scale.noise_of(noise)
+            <= leaves * max(scale.excess(self._difference), 0.0) + NO_MORE * scale.scatter
             for scale in self._scales
         )
 
@@ -197,10 +206,7 @@ class Misfit:
         nearest to the candidate."""
         w = self._scale.weights[..., None]
         binned = np.stack(
-            [
-                self._scale.binned(self._inside * columns[..., k])
-                for k in range(columns.shape[-1])
-            ],
+            [self._scale.binned(self._inside * columns[..., k]) for k in range(columns.shape[-1])],
             axis=-1,
         )
         wanted = self._scale.binned(self._inside * self.candidate)[..., None]
@@ -269,6 +275,10 @@ class _Scale:
         h, w = (n // b for n in x.shape[:2])
         blocks = x[: h * b, : w * b].reshape(h, b, w, b, -1)
         return np.asarray(blocks.mean(axis=(1, 3)))
+
+    def noise_of(self, error2: FloatArray) -> float:
+        """The squares of other noise, whose variance in pixels is this."""
+        return float((self.weights * self.binned(error2)).sum()) / self.block**2
 
     def squares(self, difference: FloatArray) -> float:
         return float((self.weights * self.binned(difference) ** 2).sum())

@@ -1,6 +1,6 @@
 """The hypothesis that explains the difference of two pictures best, where one clearly does."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -9,7 +9,14 @@ from comparisons.compare.diagnosis.colour import A_MATRIX
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.diagnosis.misfit import NO_MATTER, REST, Misfit
 from comparisons.compare.diagnosis.pairs import pairs
-from comparisons.compare.diagnosis.spots import FEW_PIXELS, ONE_PIXEL, ONE_TILE, SHARE, one_place, rim
+from comparisons.compare.diagnosis.spots import (
+    FEW_PIXELS,
+    ONE_PIXEL,
+    ONE_TILE,
+    SHARE,
+    one_place,
+    rim,
+)
 from comparisons.compare.diagnosis.tones import A_CURVE
 from comparisons.results.case import Cause, FloatArray, Images
 from comparisons.statistics.metrics import count_nonfinite
@@ -75,10 +82,7 @@ def likeliest(
         *((h, misfit) for h in colour.hypotheses(misfit)),
         *((h, misfit) for h in tones.hypotheses(misfit)),
         *place.hypotheses(misfit),
-        *(
-            (h, misfit if h.noise is None else misfit.noisier(h.noise))
-            for h in also(misfit.reference)
-        ),
+        *_rendered(misfit, also(misfit.reference)),
     ]
     ranked = _ranked(singles)
     whole = _simple([one for one in ranked if one.is_whole])
@@ -91,10 +95,10 @@ def likeliest(
     enough = enough or (best is not None and best.is_reproduced and best.left <= 1.0 - SHARE)
     if at_border is not None and not enough:
         return at_border
-    if not whole:
+    if all(one.is_flexible for one in whole):
         two = _simple([one for one in _ranked(pairs(misfit)) if one.is_whole])
         both = _best(two, two[0].seen.margin) if two else None
-        if both is not None and both.is_reproduced:
+        if both is not None and both.is_reproduced and not (whole and both.is_flexible):
             return both.cause(of=misfit)
     if whole:
         # Several may explain it, none clearly better than the others.
@@ -106,6 +110,16 @@ def likeliest(
     return one_place(misfit)
 
 
+def _rendered(
+    misfit: Misfit, hypotheses: Iterable[Hypothesis]
+) -> Iterator[tuple[Hypothesis, Misfit]]:
+    """Those whose own noise does not hide the difference."""
+    for one in hypotheses:
+        seen = misfit if one.noise is None else misfit.noisier(one.noise)
+        if seen.clear and seen.excess > 0.0:
+            yield one, seen
+
+
 @dataclass(frozen=True)
 class _Ranked:
     """left: the unexplained fraction;  is_whole: nothing but noise is left;  seen: what compares
@@ -115,6 +129,11 @@ class _Ranked:
     seen: Misfit
     left: float
     is_whole: bool
+
+    @property
+    def is_flexible(self) -> bool:
+        """Whether it has so many parameters that it may fit what has a simpler cause."""
+        return self.hypothesis.name.endswith((A_CURVE, A_MATRIX))
 
     @cached_property
     def is_reproduced(self) -> bool:
@@ -134,7 +153,7 @@ class _Ranked:
 def _simple(ranked: list[_Ranked]) -> list[_Ranked]:
     """Without curves and matrices of many parameters, if there are others: these average noise, and
     so leave less of it than what is right."""
-    few = [one for one in ranked if not one.hypothesis.name.endswith((A_CURVE, A_MATRIX))]
+    few = [one for one in ranked if not one.is_flexible]
     return few or ranked
 
 

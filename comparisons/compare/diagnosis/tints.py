@@ -38,7 +38,10 @@ class Tint:
         values, wanted, weights = values[known], wanted[known], weights[known]
         self._knots = [_knots(values[:, k]) for k in range(3)]
         rows = self._columns(values)
-        scale = np.sqrt((rows**2).mean(axis=0)) + 1e-300
+        scale = np.sqrt((rows**2).mean(axis=0))
+        scale = np.where(
+            scale > 1e-6 * scale.max(), scale, np.inf
+        )  # what is never met changes nothing
         rows /= scale
         factors = []
         self.squares = 0.0

@@ -19,6 +19,9 @@ KNOTS = 8
 """Of a tone curve, with as many of the reference's values between each two, and as many more at
 even distances up to the brightest."""
 
+BENT = 0.01
+"""What straight lines between the knots of a curve leave of the squares."""
+
 CUSTOMARY = (1.8, 2.0, 2.2, 2.4)
 """Gammas of displays and files."""
 
@@ -31,7 +34,9 @@ def hypotheses(misfit: Misfit) -> Iterator[Hypothesis]:
     r = np.maximum(misfit.reference, 0.0)
     gamma = _fitted(misfit, lambda g: r**g)
     evidence = f"the candidate is the reference to the power of {gamma:.4g}"
-    yield of_pixels("gamma", f"gamma of {gamma:.4g}", evidence, lambda p: _positive(p) ** gamma, r, 1)
+    yield of_pixels(
+        "gamma", f"gamma of {gamma:.4g}", evidence, lambda p: _positive(p) ** gamma, r, 1
+    )
     for encoded in (_encoded, lambda p: _encoded(_shown(p))):
         yield of_pixels(
             "sRGB",
@@ -140,7 +145,7 @@ def _any_curve(misfit: Misfit, r: FloatArray) -> Iterator[Hypothesis]:
         for k in (int(np.abs(r - q).argmin()) for q in np.quantile(r, [0.1, 0.5, 0.9, 1.0]))
     )
     evidence = f"the candidate is the reference through a curve that rises everywhere: {told}"
-    yield Hypothesis("tone curve", A_CURVE, evidence, curve, len(knots))
+    yield Hypothesis("tone curve", A_CURVE, evidence, curve, len(knots), BENT)
 
 
 def _factor(misfit: Misfit, picture: FloatArray) -> float:

@@ -95,7 +95,9 @@ class Warp:
         found, inside = self.at(picture, *grid(picture.shape))
         return found, inside
 
-    def at(self, picture: FloatArray, y: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def at(
+        self, picture: FloatArray, y: FloatArray, x: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """The same at points (y, x) of `grid`, (..., 3)."""
         height, width = picture.shape[:2]
         found, inside = np.empty((*y.shape, 3)), np.empty((*y.shape, 3))
@@ -235,9 +237,7 @@ class Search:
             right[k] = (columns * weights) @ rest[:, k]
         if not apart:
             normal[:], right[:] = normal.sum(axis=0), right.sum(axis=0)
-        steps = [
-            np.linalg.lstsq(n, v, rcond=1e-12)[0] for n, v in zip(normal, right, strict=True)
-        ]
+        steps = [np.linalg.lstsq(n, v, rcond=1e-12)[0] for n, v in zip(normal, right, strict=True)]
         most = FARTHEST + 1.0 if "shift" in family else FARTHER * self._corner
         return np.clip(amounts + np.stack(steps, axis=1), start - most, start + most)
 
@@ -261,9 +261,7 @@ class _Level:
 
     def values(self, points: FloatArray) -> FloatArray:
         """(points, 3) at (2, points, 3)."""
-        found = [
-            _interpolated(self.splines[k], *points[..., k], self.order) for k in range(3)
-        ]
+        found = [_interpolated(self.splines[k], *points[..., k], self.order) for k in range(3)]
         together = np.stack(found, axis=-1)
         return together if self.colours is None else self.colours(together)
 
