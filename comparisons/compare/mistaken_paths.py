@@ -31,8 +31,8 @@ LONGEST = 8
 """Edges of paths in scenes without a limit: what longer ones add is a small part of a change."""
 
 AHEAD = 1e-6
-"""Where rays that leave a surface begin, in units of 1 plus the largest coordinate there, and how far
-from a light shadow rays end, as a fraction of the distance."""
+"""Where rays that leave a surface begin, in units of 1 plus the largest coordinate there, and how
+far from a light shadow rays end, as a fraction of the distance."""
 
 FAR = 1e12
 """The length of shadow rays to what is infinitely far."""
@@ -40,9 +40,9 @@ FAR = 1e12
 
 @dataclass
 class _Parts:
-    """Pictures (height, width, 3): `points` of lights without extent, `lamps` of others by samples of
-    these, `met` of others by directions of materials.  At the first surface, and at later ones; as
-    if nothing cast a shadow (`open_`), or multiplied by what was forgotten."""
+    """Pictures (height, width, 3): `points` of lights without extent, `lamps` of others by samples
+    of these, `met` of others by directions of materials.  At the first surface, and at later ones;
+    as if nothing cast a shadow (`open_`), or multiplied by what was forgotten."""
 
     points_first: FloatArray
     points_later: FloatArray
@@ -104,8 +104,8 @@ UNIFORM = "directions are uniform, and weighted as if they had the cosine's dens
 def mistaken_paths(
     scene: Scene, reference: FloatArray, threads: int | None = None
 ) -> Iterator[Hypothesis]:
-    """Hypotheses about a scene; none unless it is rendered by path tracing, and each of its shapes has
-    one material."""
+    """Hypotheses about a scene; none unless it is rendered by path tracing, and each of its shapes
+    has one material."""
     own = scene.integrator
     if not isinstance(own, Path) or not all(hasattr(shape, "material") for shape in scene.shapes):
         return

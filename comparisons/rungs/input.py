@@ -87,8 +87,8 @@ def input_rung(
         if order is not None and order.makes_up:
             text += (
                 f"; successive replicates of the {whose} make up for each other (correlation "
-                f"{order.correlation:+.2f}), as antithetic pairs do: their mean is better than their "
-                "spread says, and means of pairs would show by how much"
+                f"{order.correlation:+.2f}), as antithetic pairs do: their mean is better than "
+                "their spread says, and means of pairs would show by how much"
             )
     return _result("agree", text, numbers)
 

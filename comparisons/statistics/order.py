@@ -45,8 +45,8 @@ standard error of the mean is understated by 9 %: the variance of a mean of many
 times as large."""
 
 ALIKE = 0.05
-"""Correlation from which pictures at some distance in the order are alike, if successive ones make up
-for each other. Of independent ones it is a little below 0, as they deviate from their own mean."""
+"""Correlation from which pictures at some distance in the order are alike, if successive ones make
+up for each other. Of independent ones it is a little below 0: they deviate from their own mean."""
 
 CROP = 128
 """Side in pixels of the middle of the picture, in which a movement is sought."""
@@ -105,7 +105,7 @@ def _none_alike(pairs: FloatArray) -> bool:
     """Whether pictures at no distance in the order are alike: two that take turns with two others
     make up for these, but are of less use than they seem."""
     means = [np.diagonal(pairs, distance).mean() for distance in range(1, len(pairs) // 2 + 1)]
-    return max(means) < ALIKE
+    return bool(max(means) < ALIKE)
 
 
 def shared_by_sides(a: FloatArray, b: FloatArray) -> bool:

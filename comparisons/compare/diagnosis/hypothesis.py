@@ -18,8 +18,8 @@ class Hypothesis:
 
     leaves: the fraction of the squared difference by which the picture may be inexact, besides
     noise;  slack: returns how far its values may be off, of the picture's shape;
-    noise: the variance of its values;  of: the colours of any picture, where what happens depends on
-    nothing but the colours of a pixel.
+    noise: the variance of its values;  of: the colours of any picture, where what happens depends
+    on nothing but the colours of a pixel.
     """
 
     family: str

@@ -11,7 +11,7 @@ LEVELS = 129
 """Quantiles by which distributions of values are made alike."""
 
 KNOTS = 8
-"""Of the curve of each channel, at quantiles; as many as half of them up to the brightest, besides."""
+"""Of the curve of each channel, at quantiles; half as many up to the brightest, besides."""
 
 
 def by_distribution(candidate: FloatArray, reference: FloatArray) -> FloatArray:

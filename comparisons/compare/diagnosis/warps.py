@@ -17,8 +17,8 @@ from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.results.case import FloatArray
 
 Field = Callable[[FloatArray, FloatArray], tuple[FloatArray | float, FloatArray | float]]
-"""Displacements (down, right) in pixels of an amount of 1, of points (y, x) from the middle in units
-of its distance from a corner."""
+"""Displacements (down, right) in pixels of an amount of 1, of points (y, x) from the middle in
+units of its distance from a corner."""
 
 FIELDS: dict[str, Field] = {
     "right": lambda y, x: (0.0, 1.0),
