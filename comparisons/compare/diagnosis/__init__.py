@@ -10,8 +10,8 @@ those of blocks (`Misfit.reproduces`).
 
 To add a hypothesis about colours, yield it from `brightness`, `colour` or `tones`: the picture that
 the candidate would be, and how many parameters were fitted.  One with as many or fewer is its
-rival, unless it is of the same family.  What happens to positions is a `Move` of `place`, or a row of
-`warps.WARPS`.
+rival, unless it is of the same family.  What happens to positions is a `Move` of `place`, or a row
+of `warps.WARPS`.
 """
 
 from comparisons.compare.diagnosis.pictures import IN_PART, is_sure, likeliest

@@ -19,7 +19,7 @@ KNOTS = 8
 """Of a tone curve, with as many of the reference's values between each two, and as many more at
 even distances up to the brightest."""
 
-BENT = 0.01
+BENT = 1e-3
 """What straight lines between the knots of a curve leave of the squares."""
 
 CUSTOMARY = (1.8, 2.0, 2.2, 2.4)

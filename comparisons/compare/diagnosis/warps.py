@@ -82,7 +82,7 @@ class Warp:
     @property
     def parameters(self) -> int:
         moved = np.unique(self.amounts[:, self.amounts.any(axis=0)], axis=1).shape[1]
-        return len(self.fields) * max(moved, 1)
+        return len(self.fields) * max(int(moved), 1)
 
     def is_shift(self, x: float, y: float) -> bool:
         """Whether it is that by so many pixels to the right and down."""
@@ -102,9 +102,10 @@ class Warp:
         height, width = picture.shape[:2]
         found, inside = np.empty((*y.shape, 3)), np.empty((*y.shape, 3))
         for k in range(3):
-            down, right = _points(self.fields, self.amounts[:, k], y, x, _middle(picture.shape))
+            points = _points(self.fields, self.amounts[:, k], y, x, _middle(picture.shape))
             spline = _spline(picture[..., k], self.order)
-            found[..., k] = _interpolated(spline, down, right, self.order)
+            found[..., k] = _interpolated(spline, points, self.order)
+            down, right = points
             inside[..., k] = (np.abs(down - 0.5 * (height - 1)) <= 0.5 * height) & (
                 np.abs(right - 0.5 * (width - 1)) <= 0.5 * width
             )
@@ -146,7 +147,8 @@ class Search:
         shape = base.shape
         self._shape, self._corner = shape, _corner(shape)
         chosen = chosen_pixels(shape)
-        self._grid = tuple(x.ravel()[chosen] for x in grid(shape))
+        y, x = grid(shape)
+        self._grid = y.ravel()[chosen], x.ravel()[chosen]
         self._weights = misfit.weights.reshape(-1, 3)[chosen]
         self._levels = []
         for blur, steps in STEPS if colours is None else STEPS[-1:]:
@@ -204,17 +206,19 @@ class Search:
         """The mean over points inside; a warp that sees little of the picture is no start."""
         total, weight = 0.0, 0.0
         for k in range(3):
-            y, x = self._at(family, amounts[:, k])
-            inside = self._weights[:, k] * self._is_inside(y, x)
-            rest = level.wanted[:, k] - _interpolated(level.splines[k], y, x, level.order)
+            points = self._at(family, amounts[:, k])
+            inside = self._weights[:, k] * self._is_inside(points)
+            rest = level.wanted[:, k] - _interpolated(level.splines[k], points, level.order)
             total += float((inside * rest**2).sum())
             weight += float(inside.sum())
         return total / weight if weight > 0.0 else math.inf
 
     def _at(self, family: str, amounts: FloatArray) -> FloatArray:
-        return _points(WARPS[family][0], amounts, *self._grid, _middle(self._shape))
+        y, x = self._grid
+        return _points(WARPS[family][0], amounts, y, x, _middle(self._shape))
 
-    def _is_inside(self, y: FloatArray, x: FloatArray) -> FloatArray:
+    def _is_inside(self, points: FloatArray) -> FloatArray:
+        y, x = points
         height, width = self._shape[:2]
         return np.asarray((y >= 0) & (y <= height - 1) & (x >= 0) & (x <= width - 1), dtype=float)
 
@@ -232,7 +236,7 @@ class Search:
             columns = np.stack(
                 [slopes[0][:, k] * down + slopes[1][:, k] * to for down, to in directions]
             )
-            weights = self._weights[:, k] * self._is_inside(*points[..., k])
+            weights = self._weights[:, k] * self._is_inside(points[..., k])
             normal[k] = (columns * weights) @ columns.T
             right[k] = (columns * weights) @ rest[:, k]
         if not apart:
@@ -261,7 +265,7 @@ class _Level:
 
     def values(self, points: FloatArray) -> FloatArray:
         """(points, 3) at (2, points, 3)."""
-        found = [_interpolated(self.splines[k], *points[..., k], self.order) for k in range(3)]
+        found = [_interpolated(self.splines[k], points[..., k], self.order) for k in range(3)]
         together = np.stack(found, axis=-1)
         return together if self.colours is None else self.colours(together)
 
@@ -270,7 +274,7 @@ class _Level:
         if self.order == 3 and self.colours is None:
             return [
                 np.stack(
-                    [_interpolated(self.slopes[k][i], *points[..., k], 1) for k in range(3)],
+                    [_interpolated(self.slopes[k][i], points[..., k], 1) for k in range(3)],
                     axis=-1,
                 )
                 for i in range(2)
@@ -326,9 +330,9 @@ def _spline(channel: FloatArray, order: int) -> FloatArray:
     return np.asarray(ndimage.spline_filter(channel, order, mode="nearest"))
 
 
-def _interpolated(spline: FloatArray, y: FloatArray, x: FloatArray, order: int) -> FloatArray:
+def _interpolated(spline: FloatArray, points: FloatArray, order: int) -> FloatArray:
     return np.asarray(
-        ndimage.map_coordinates(spline, [y, x], order=order, mode="nearest", prefilter=False)
+        ndimage.map_coordinates(spline, points, order=order, mode="nearest", prefilter=False)
     )
 
 

@@ -48,8 +48,8 @@ def _hit(p: FloatArray, d: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def picture(spp: int, seed: int, mistake: str = "") -> FloatArray:
-    """(height, width, 3).  mistake: "no shadows", "uniform", "no pi", "no cosine", "1 / d", "twice",
-    "one bounce less" or none."""
+    """(height, width, 3).  mistake: "no shadows", "uniform", "no pi", "no cosine", "1 / d",
+    "twice", "one bounce less" or none."""
     rng = np.random.default_rng(seed)
     forward = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
     right = np.cross(forward, [0.0, 1.0, 0.0])
