@@ -186,7 +186,8 @@ class _Tracer:
             wi, factor, is_seen = self._scattered(at, number)
             o, d, weight = at.p + _beginning(at.p)[:, None] * wi, wi, weight * factor
             goes_on = np.flatnonzero((weight > 0.0).any(axis=1))
-            o, d, weight, pixel, is_seen = (x[goes_on] for x in (o, d, weight, pixel, is_seen))
+            o, d, weight = o[goes_on], d[goes_on], weight[goes_on]
+            pixel, is_seen = pixel[goes_on], is_seen[goes_on]
 
     def _add_direct(
         self, at: "_Surface", number: IntArray, pixel: IntArray, weight: FloatArray, where: str
