@@ -30,6 +30,9 @@ AGAIN = 2
 MOST_MOVES = 2
 """So many families of moves are joined with colours."""
 
+RIVAL = 10.0
+"""Those leave at most this many times what the best one leaves."""
+
 
 def of_colours(misfit: Misfit) -> Iterator[Hypothesis]:
     """Hypotheses about colours alone."""
@@ -52,6 +55,8 @@ def pairs(misfit: Misfit) -> Iterator[tuple[Hypothesis, Misfit]]:
         # Any colours may make up for positions that are a little off, a simple cause may not.
         search = Search(misfit, misfit.reference, simple.of)
         for warp in search.fitted(move.family, move.warp.amounts):
+            if warp.order != move.warp.order:
+                continue
             again = of_warp(warp, misfit.reference.shape)
             seen = again.seen(misfit)
             yield from (_joined(again, one, seen) for one in of_colours(seen))
@@ -105,7 +110,8 @@ def _likely_moves(misfit: Misfit) -> tuple[list[Move], Misfit]:
     tried = [(tint(move).squares, move) for base in bases for move in moves(misfit, base)]
     again = [one for _, move in _best_of_each(tried)[:TRIED] for one in improved(move)]
     likely = _best_of_each((left(move), move) for move in again)
-    return [move for rest, move in likely[:MOST_MOVES] if rest < FAR_MORE], misfit
+    most = min(FAR_MORE, RIVAL * (max(likely[0][0], 0.0) + NO_MATTER))
+    return [move for rest, move in likely[:MOST_MOVES] if rest < most], misfit
 
 
 def _best_of_each(found: Iterable[tuple[float, Move]]) -> list[tuple[float, Move]]:

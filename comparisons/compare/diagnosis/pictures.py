@@ -47,6 +47,10 @@ SURE = 0.995
 """The fraction of the squared difference that a cause must explain for others not to be rendered.
 If nearly all light is lost, a gain near 0 explains 0.99 of it (measured: a ball under a sky)."""
 
+INTERPOLATED = 0.01
+"""Unexplained fractions of what positions change, below which interpolation does not distinguish
+causes."""
+
 UNSURE = (A_CURVE, A_MATRIX, ONE_TILE, FEW_PIXELS, ONE_PIXEL)
 """Causes that others look like, which a scene must be rendered for: the former have so many
 parameters that they may fit what has a simpler cause, and a small shadow lies in one place."""
@@ -97,7 +101,7 @@ def likeliest(
         return at_border
     if all(one.is_flexible for one in whole):
         two = _simple([one for one in _ranked(pairs(misfit)) if one.is_whole])
-        both = _best(two, two[0].seen.margin) if two else None
+        both = _best(two, max(two[0].seen.margin, INTERPOLATED)) if two else None
         if both is not None and both.is_reproduced and not (whole and both.is_flexible):
             return both.cause(of=misfit)
     if whole:

@@ -64,7 +64,8 @@ POINTS = 1 << 12
 of a pixel in noise of a tenth of the steps between neighbours."""
 
 STILL = 0.05
-"""Pixels by which a channel must be moved, and channels differ, to be moved by themselves."""
+"""Pixels by which a channel must be moved, and channels differ, to be moved by themselves, and a
+corner, to be distorted."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +185,8 @@ class Search:
             resampled = self._improved(family, resampled, start, self._plain)
         for order, fitted in ((3, amounts), (1, resampled)):
             apart = np.ptp(fitted, axis=1).max() > STILL
-            if apart or not WARPS[family][1]:
+            bends = family != "distortion" or np.abs(fitted[1]).max() > STILL
+            if bends and (apart or not WARPS[family][1]):
                 yield Warp(family, self._still(family, fitted), order)
 
     def _start(self, family: str, rolled: tuple[int, int]) -> FloatArray:
