@@ -72,7 +72,9 @@ class Misfit:
         error2 = np.maximum(error2, ndimage.uniform_filter(error2, (3, 3, 1)))
         size = np.maximum(np.abs(self.candidate), np.abs(self.reference))
         size = ndimage.maximum_filter(size, (3, 3, 1))
-        floor2 = FLOOR**2 * np.maximum(size, np.median(size)) ** 2 + 1e-300
+        # Most of a picture may be black, and a warp may show something there.
+        least = max(float(np.median(size)), FLOOR * float(size.mean()))
+        floor2 = FLOOR**2 * np.maximum(size, least) ** 2 + 1e-300
         side = min(error2.shape[:2])
         scales = [
             _Scale(block, error2, floor2)
