@@ -90,7 +90,13 @@ def of_replicates(
     error = None
     if candidate.shape[1:] == mean.shape:
         error = statistics.standard_error(candidate, reference)
-    return Rendered(Images(candidate.mean(axis=0), mean, error), seconds, (candidate, reference))
+    own = None
+    if isinstance(reference, statistics.Known):
+        own = np.sqrt(reference.variance)
+    elif len(reference) > 1:
+        own = reference.std(axis=0, ddof=1) / np.sqrt(len(reference))
+    images = Images(candidate.mean(axis=0), mean, error, reference_error=own)
+    return Rendered(images, seconds, (candidate, reference))
 
 
 @dataclass(frozen=True)
@@ -281,15 +287,9 @@ def likeliest_cause(
     only if needed."""
     plain = diagnosis.likeliest(images)
     is_dark = images.candidate.mean() <= LITTLE * images.reference.mean()
-    is_sure = plain is not None and plain.explained > SURE and not is_dark
-    if plain is not None and is_sure and plain.name not in diagnosis.FLEXIBLE:
+    if diagnosis.is_sure(plain) and not is_dark:
         return plain
     if lights is None and lengths is None:
         return plain
     singles = {} if lights is None else lights()
     return diagnosis.likeliest(images, singles, *([] if lengths is None else [lengths]))
-
-
-SURE = 0.995
-"""The fraction of the squared difference that a cause must explain for others not to be rendered.
-If nearly all light is lost, a gain near 0 explains 0.99 of it (measured: a ball under a sky)."""

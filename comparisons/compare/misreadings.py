@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.diagnosis.misfit import REST
 from comparisons.compare.path_length import Lengths
 from reference_rt.cameras import Orthographic
 from reference_rt.cameras.view_rectangle import CentralCamera
@@ -112,7 +113,7 @@ def misreadings(scene: Scene, threads: int | None = None) -> Lengths | None:
                 picture = render(scene.changed(**parts), threads=threads).colour
                 if picture.shape == reference.shape and not np.array_equal(picture, reference):
                     evidence = "so does our picture of the scene change if it is read so"
-                    yield Hypothesis(name, name, evidence, picture, 0)
+                    yield Hypothesis(name, name, evidence, picture, 0, REST)
 
     return hypotheses
 

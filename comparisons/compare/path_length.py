@@ -9,6 +9,8 @@ the same noise but for that of the paths that one of them lacks.
 from collections.abc import Callable, Iterator
 
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.diagnosis.misfit import REST
+from comparisons.compare.mistaken_paths import mistaken_paths
 from comparisons.results.case import FloatArray
 from reference_rt.integrators import Path
 from reference_rt.rendering.render import render
@@ -29,7 +31,8 @@ Lengths = Callable[[FloatArray], Iterator[Hypothesis]]
 
 
 def path_lengths(scene: Scene, threads: int | None = None) -> Lengths | None:
-    """Hypotheses about a scene; None unless it is rendered by path tracing."""
+    """Hypotheses about a scene, and of mistakes on its paths; None unless it is rendered by path
+    tracing."""
     own = scene.integrator
     if not isinstance(own, Path):
         return None
@@ -46,7 +49,8 @@ def path_lengths(scene: Scene, threads: int | None = None) -> Lengths | None:
             had = "no limit" if own.max_depth is None else f"max_depth {own.max_depth}"
             other = "without a limit" if length is None else f"with max_depth {length}"
             evidence = f"so does our picture change if rendered {other}; the scene has {had}"
-            yield Hypothesis("path length", name, evidence, reference + change, 0)
+            yield Hypothesis("path length", name, evidence, reference + change, 0, REST)
+        yield from mistaken_paths(scene, reference, threads)
 
     return hypotheses
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from comparisons.compare.darkness import why_dark
+from comparisons.compare.diagnosis import is_sure
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.looks import Looks
 from comparisons.compare.misreadings import misreadings
@@ -23,7 +24,7 @@ from comparisons.gate.question import LIMIT, Question
 from comparisons.gate.reference import Reference, check_sizes, size_of
 from comparisons.gate.rim import check_rim
 from comparisons.gate.shown_curve import estimated
-from comparisons.gate.terms import is_sure, missing_terms
+from comparisons.gate.terms import missing_terms
 from comparisons.gate.tone_curves import ESTIMATE, ToneCurve, curve_of
 from comparisons.renderers import WitnessName
 from comparisons.results.case import Case, Cause, FloatArray

@@ -9,10 +9,8 @@ terms is `agree`; of several such, the one with the fewest terms.
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from comparisons.compare.diagnosis import FLEXIBLE
+from comparisons.compare.diagnosis import is_sure
 from comparisons.compare.diagnosis.misfit import Misfit
-from comparisons.compare.diagnosis.spots import FEW_PIXELS, ONE_PIXEL, ONE_TILE
-from comparisons.compare.judge import SURE
 from comparisons.compare.path_length import DIRECT, SAMPLES
 from comparisons.results.case import Case, Cause, FloatArray
 from reference_rt.integrators import Direct, Path
@@ -30,19 +28,12 @@ from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
 
-UNSURE = (ONE_TILE, FEW_PIXELS, ONE_PIXEL, *FLEXIBLE)
-"""Causes that missing terms look like, however well they explain the difference."""
-
 WORTH = 0.25
 """Most of the squared difference that pictures leave which are judged: it is measured at few
 samples, whose noise is part of it."""
 
 RIVAL = 2.0
 """Such pictures leave at most this many times what the best one leaves."""
-
-
-def is_sure(cause: Cause | None) -> bool:
-    return cause is not None and cause.explained > SURE and cause.name not in UNSURE
 
 
 def missing_terms(

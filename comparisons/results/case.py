@@ -66,6 +66,8 @@ class Images:
     """A third renderer's, where one was asked."""
     layers: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
     """Other pictures of both sides by name: of hits of the rays through the pixels' centres."""
+    reference_error: FloatArray | None = None
+    """The reference's part of `error`: its own standard error."""
 
 
 @dataclass(frozen=True)

@@ -82,6 +82,14 @@ def input_rung(
     text = f"{a.shape[2]} x {a.shape[1]} pixels, all finite"
     if numbers["negative_values"]:
         text += f"; {numbers['negative_values']} negative values, where the reference has none"
+    for whose, x in (("candidate", a), ("reference", b)):
+        order = successive(x)
+        if order is not None and order.makes_up:
+            text += (
+                f"; successive replicates of the {whose} make up for each other (correlation "
+                f"{order.correlation:+.2f}), as antithetic pairs do: their mean is better than "
+                "their spread says, and means of pairs would show by how much"
+            )
     return _result("agree", text, numbers)
 
 
@@ -232,7 +240,7 @@ INDEPENDENT = "expected independent noise, a seed of its own for each replicate"
 def _in_order(whose: str, x: FloatArray) -> str | None:
     """Replicates that depend on the one before, in words."""
     order = successive(x)
-    if order is None:
+    if order is None or order.makes_up:
         return None
     if any(order.movement):
         x_moved, y_moved = order.movement

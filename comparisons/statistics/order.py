@@ -44,6 +44,10 @@ MATTERS = 0.1
 standard error of the mean is understated by 9 %: the variance of a mean of many is 1 + 2 * 0.1
 times as large."""
 
+ALIKE = 0.05
+"""Correlation from which pictures at some distance in the order are alike, if successive ones make
+up for each other. Of independent ones it is a little below 0: they deviate from their own mean."""
+
 CROP = 128
 """Side in pixels of the middle of the picture, in which a movement is sought."""
 
@@ -51,10 +55,13 @@ CROP = 128
 @dataclass(frozen=True)
 class Successive:
     """correlation: of successive pictures, minus that of any two;  movement: in pixels to the right
-    and down, by which the second is moved."""
+    and down, by which the second is moved;  makes_up: whether they make up for each other, as
+    antithetic pairs do, and none are alike.  The error of their mean is then smaller than their
+    spread shows."""
 
     correlation: float
     movement: tuple[int, int]
+    makes_up: bool = False
 
 
 def successive(pictures: FloatArray) -> Successive | None:
@@ -90,7 +97,15 @@ def successive(pictures: FloatArray) -> Successive | None:
         return None
     if abs(backward) > abs(forward):
         return Successive(backward, (-by[0], -by[1]))
-    return Successive(forward, by)
+    makes_up = forward < 0.0 and not any(by) and _none_alike(correlations[by])
+    return Successive(forward, by, makes_up)
+
+
+def _none_alike(pairs: FloatArray) -> bool:
+    """Whether pictures at no distance in the order are alike: two that take turns with two others
+    make up for these, but are of less use than they seem."""
+    means = [np.diagonal(pairs, distance).mean() for distance in range(1, len(pairs) // 2 + 1)]
+    return bool(max(means) < ALIKE)
 
 
 def shared_by_sides(a: FloatArray, b: FloatArray) -> bool:

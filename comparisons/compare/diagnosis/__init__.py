@@ -2,21 +2,19 @@
 
 `of_rungs` recognises causes from the numbers of the deterministic rungs.  `likeliest` fits each
 `Hypothesis` (gain, gamma, shift, lost light, ...) to the pictures and returns the one that explains
-most of the squared difference beyond noise, if it is clearly better than the others; otherwise the
-one place (row, tile, pixels) that holds the difference, or None.  A cause must also reproduce the
-bias of each channel's mean, and those of blocks (`Misfit.reproduces`).
+most of the squared difference beyond noise, if it is clearly better than the others and leaves no
+more than noise; otherwise two of them together, first of positions and then of colours; otherwise
+the one place (row, tile, pixels) that holds the difference; otherwise a simple one that explains
+most of it, as a part; or None.  A cause must also reproduce the bias of each channel's mean, and
+those of blocks (`Misfit.reproduces`).
 
-To add a hypothesis, yield it from `brightness`, `colour`, `tones` or `place`: the picture that the
-candidate would be, and how many parameters were fitted.  One with as many or fewer is its rival,
-unless it is of the same family.
+To add a hypothesis about colours, yield it from `brightness`, `colour` or `tones`: the picture that
+the candidate would be, and how many parameters were fitted.  One with as many or fewer is its
+rival, unless it is of the same family.  What happens to positions is a `Move` of `place`, or a row
+of `warps.WARPS`.
 """
 
-from comparisons.compare.diagnosis.colour import A_MATRIX
-from comparisons.compare.diagnosis.pictures import likeliest
+from comparisons.compare.diagnosis.pictures import IN_PART, is_sure, likeliest
 from comparisons.compare.diagnosis.rungs import of_rungs
-from comparisons.compare.diagnosis.tones import A_CURVE
 
-__all__ = ["FLEXIBLE", "likeliest", "of_rungs"]
-
-FLEXIBLE = (A_CURVE, A_MATRIX)
-"""Causes with so many parameters that they may fit what has a simpler one."""
+__all__ = ["IN_PART", "is_sure", "likeliest", "of_rungs"]

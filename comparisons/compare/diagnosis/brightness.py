@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from functools import partial
 
 import numpy as np
 
 from comparisons.compare.diagnosis.colour import CHANNELS
-from comparisons.compare.diagnosis.hypothesis import Hypothesis
-from comparisons.compare.diagnosis.misfit import Misfit
+from comparisons.compare.diagnosis.hypothesis import Hypothesis, of_pixels
+from comparisons.compare.diagnosis.misfit import REST, Misfit
 from comparisons.results.case import FloatArray
 from reference_rt.rendering.image import srgb
 from reference_rt.textures.image_file import linear
@@ -39,6 +40,7 @@ def hypotheses(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hyp
     if not lights or gain.picture.mean() > LITTLE * misfit.reference.mean():
         yield gain
     yield from _gains(misfit)
+    yield from _vignette(misfit)
     yield from _limits(misfit)
     yield from _lights(misfit, lights)
 
@@ -50,7 +52,7 @@ def _gain(misfit: Misfit) -> Hypothesis:
     for factor, name in REMARKABLE.items():
         if abs(gain / factor - 1.0) < NEAR:
             evidence += f", {name} what it should be"
-    return Hypothesis("gain", f"constant gain of {gain:.4g}", evidence, gain * r, 1)
+    return of_pixels("gain", f"constant gain of {gain:.4g}", evidence, lambda p: gain * p, r, 1)
 
 
 def _gains(misfit: Misfit) -> Iterator[Hypothesis]:
@@ -62,19 +64,42 @@ def _gains(misfit: Misfit) -> Iterator[Hypothesis]:
         amount = misfit.amount(alone)
         gains[k] += amount
         evidence = f"{channel} is {1.0 + amount:.4g} times the reference's; other channels agree"
-        yield Hypothesis(
+        only = np.where(np.arange(3) == k, 1.0 + amount, 1.0)
+        yield of_pixels(
             "gain of a channel",
             f"gain of {channel} of {1 + amount:.4g}",
             evidence,
-            r + amount * alone,
+            partial(np.multiply, only),
+            r,
             1,
         )
     each = ", ".join(f"{g:.4g}" for g in gains)
     evidence = f"red, green and blue are {each} times the reference's"
-    yield Hypothesis("gains", "another gain of each channel", evidence, gains * r, 3)
+    yield of_pixels("gains", "another gain of each channel", evidence, lambda p: gains * p, r, 3)
     amount = misfit.amount(np.ones_like(r))
     evidence = f"every pixel of the candidate differs from the reference by {amount:+.3g} W/sr/m²"
-    yield Hypothesis("offset", f"constant offset of {amount:+.3g}", evidence, r + amount, 1)
+    yield of_pixels(
+        "offset", f"constant offset of {amount:+.3g}", evidence, partial(np.add, amount), r, 1
+    )
+
+
+def _vignette(misfit: Misfit) -> Iterator[Hypothesis]:
+    """A gain, and one that changes with the square, and its square, of the distance from the
+    middle."""
+    r = misfit.reference
+    y, x = (np.linspace(-1.0, 1.0, n) * n for n in r.shape[:2])
+    square = y[:, None] ** 2 + x**2
+    square = (square / max(float(square.max()), 1e-300))[..., None]
+    columns = np.stack([r, r * square, r * square**2], axis=-1)
+    factors = misfit.nearest(columns)
+    corner, middle = float(factors.sum()), float(factors[0])
+    evidence = (
+        f"the candidate is {middle:.4g} times the reference in the middle of the picture, and "
+        f"{corner:.4g} times in its corners"
+    )
+    name = f"vignette: corners have {corner / middle:.3g} of the middle's light"
+    if corner > 0.0 and middle > 0.0:
+        yield Hypothesis("vignette", name, evidence, columns @ factors, 3)
 
 
 def _limits(misfit: Misfit) -> Iterator[Hypothesis]:
@@ -84,7 +109,7 @@ def _limits(misfit: Misfit) -> Iterator[Hypothesis]:
         count = int(np.count_nonzero(above))
         evidence = f"{count} values of the reference are above the candidate's maximum, {top:.6g}"
         name = f"highlights clamped to {top:.4g}"
-        yield Hypothesis("clamped", name, evidence, np.minimum(r, top), 1)
+        yield of_pixels("clamped", name, evidence, partial(np.minimum, top), r, 1)
     clipped = np.clip(r, 0.0, 1.0)
     for name, rounded in (
         ("sRGB", linear(np.round(255.0 * srgb(clipped)) / 255.0)),
@@ -113,4 +138,5 @@ def _lights(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hypoth
         else:
             what = f"light of another strength: {name}"
         evidence = f"the candidate has {1.0 + amount:.3g} times what the reference has of {name}"
-        yield Hypothesis("light", what, evidence, r + amount * light, 1)
+        # Its picture has noise of its own.
+        yield Hypothesis("light", what, evidence, r + amount * light, 1, REST)

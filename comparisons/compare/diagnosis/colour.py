@@ -2,10 +2,11 @@
 
 import itertools
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
-from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.diagnosis.hypothesis import Hypothesis, of_pixels
 from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.compare.primaries import SPACES, SRGB, conversion, to_xyz
 from comparisons.results.case import FloatArray
@@ -30,12 +31,13 @@ def _permutations(misfit: Misfit) -> Iterator[Hypothesis]:
         if not moved:
             continue
         names = " and ".join(CHANNELS[k] for k in moved) if len(moved) == 2 else "all channels"
-        yield Hypothesis(
+        yield of_pixels(
             "channels",
             f"swapped channels: {names}",
             "the candidate's red, green and blue are the reference's "
             + ", ".join(CHANNELS[k] for k in order),
-            misfit.reference[..., list(order)],
+            partial(np.take, indices=list(order), axis=-1),
+            misfit.reference,
             0,
         )
 
@@ -57,18 +59,24 @@ def _matrices(misfit: Misfit) -> Iterator[Hypothesis]:
     r = misfit.reference
     for name, matrix in _known_matrices():
         evidence = f"the candidate's colours are those of the reference, as {name}"
-        yield Hypothesis("known matrix", name, evidence, r @ matrix.T, 0)
+        yield of_pixels("known matrix", name, evidence, partial(_times, matrix), r, 0)
     grey = (r @ LUMINANCE)[..., None] * np.ones(3)
     saturation = 1.0 + misfit.amount(r - grey)
     evidence = f"colours are {saturation:.3g} times as far from grey as the reference's"
-    yield Hypothesis(
+    partly_grey = saturation * np.eye(3) + (1.0 - saturation) * LUMINANCE
+    yield of_pixels(
         "saturation",
         f"saturation of {saturation:.3g}",
         evidence,
-        grey + saturation * (r - grey),
+        partial(_times, partly_grey),
+        r,
         1,
     )
     matrix = misfit.regression(r).T
     rows = "; ".join(" ".join(f"{v:.3g}" for v in row) for row in matrix)
     evidence = f"the candidate's colours are the reference's times the matrix ({rows})"
-    yield Hypothesis("matrix", A_MATRIX, evidence, r @ matrix.T, 9)
+    yield of_pixels("matrix", A_MATRIX, evidence, partial(_times, matrix), r, 9)
+
+
+def _times(matrix: FloatArray, picture: FloatArray) -> FloatArray:
+    return np.asarray(picture @ matrix.T)

@@ -1,136 +1,193 @@
-"""Hypotheses about positions: shifts, mirrors, filters, lenses."""
+"""Hypotheses about positions: mirrors, shifts, lenses, filters."""
 
-import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
+import numpy.typing as npt
 from scipy import ndimage, optimize
 
-from comparisons.compare.diagnosis import lens
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
-from comparisons.compare.diagnosis.misfit import Misfit
+from comparisons.compare.diagnosis.misfit import REST, Misfit
+from comparisons.compare.diagnosis.warps import FARTHEST, Search, Warp, grid
 from comparisons.results.case import FloatArray
 
-FARTHEST = 3
-"""The largest shift that is tried, in pixels along x and y."""
 
+@dataclass(frozen=True)
+class Move:
+    """What happens to positions.  family, name, evidence, parameters, leaves: as in `Hypothesis`;
+    of: a picture to which it happens;  warp: what was fitted, None for an exact one."""
 
-CORNERS = np.array([[0.0, 0.0], [0.4, 0.1], [0.1, 0.4]])
-"""The initial simplex of the search for a shift, in pixels."""
+    family: str
+    name: str
+    evidence: str
+    parameters: int
+    of: Callable[[FloatArray], FloatArray]
+    leaves: float = 0.0
+    warp: Warp | None = None
 
+    def seen(self, misfit: Misfit) -> Misfit:
+        """The misfit of the reference to which it happens."""
+        if self.warp is None:
+            return misfit.seen(self.of(misfit.reference))
+        return misfit.seen(*self.warp.seen(misfit.reference))
 
-def hypotheses(misfit: Misfit) -> Iterator[Hypothesis]:
-    """All of them, fitted."""
-    yield from _mirrors(misfit.reference)
-    if min(misfit.reference.shape[:2]) > 2 * FARTHEST:
-        yield from _shifts(misfit)
-        yield from _filters(misfit)
-        yield from lens.hypotheses(misfit)
+    def at(self, picture: FloatArray, pixels: npt.NDArray[np.int64]) -> FloatArray:
+        """(pixels, 3): what some pixels of the picture show, by their flat numbers; NaN outside."""
+        if self.warp is None:
+            return np.asarray(self.of(picture).reshape(-1, 3)[pixels])
+        values, inside = self.warp.at(picture, *(x.ravel()[pixels] for x in grid(picture.shape)))
+        return np.where(inside > 0.0, values, np.nan)
 
-
-def _mirrors(r: FloatArray) -> Iterator[Hypothesis]:
-    turned = {
-        "mirrored left to right": r[:, ::-1],
-        "upside down": r[::-1],
-        "rotated by 180 degrees": r[::-1, ::-1],
-    }
-    if r.shape[0] == r.shape[1]:
-        across = r.transpose(1, 0, 2)
-        turned |= {
-            "rows and columns exchanged": across,
-            "rotated by 90 degrees to the left": across[::-1],
-            "rotated by 90 degrees to the right": across[:, ::-1],
-            "rows and columns exchanged, and rotated by 180 degrees": across[::-1, ::-1],
-        }
-    for name, picture in turned.items():
-        yield Hypothesis("mirrored", name, f"the candidate is the reference, {name}", picture, 0)
-
-
-def _shifted(channels: list[FloatArray], x: float, y: float, order: int) -> FloatArray:
-    """Shift single channels, which must be spline coefficients for order 3."""
-    moved = [
-        ndimage.shift(channel, (y, x), order=order, mode="nearest", prefilter=False)
-        for channel in channels
-    ]
-    return np.stack(moved, axis=-1)
-
-
-def _whole_shift(misfit: Misfit) -> tuple[int, int]:
-    """The best shift by whole pixels."""
-    f, r = FARTHEST, misfit.reference
-    padded = np.pad(r, ((f, f), (f, f), (0, 0)), mode="edge")
-    h, w = r.shape[:2]
-    steps = range(-f, f + 1)
-    tried = [
-        (misfit.squares(padded[f - y : f - y + h, f - x : f - x + w]), (x, y))
-        for x in steps
-        for y in steps
-    ]
-    return min(tried)[1]
-
-
-def _shifts(misfit: Misfit) -> Iterator[Hypothesis]:
-    start = _whole_shift(misfit)
-    channels = [np.ascontiguousarray(misfit.reference[..., k]) for k in range(3)]
-    # Resampled pictures are shifted bilinearly; a cubic spline resembles a shifted camera.
-    for order in (1, 3):
-        if order == 3:
-            channels = [
-                np.asarray(ndimage.spline_filter(channel, 3, mode="nearest"))
-                for channel in channels
-            ]
-
-        def squares(v: FloatArray, of: list[FloatArray] = channels, order: int = order) -> float:
-            return misfit.squares(_shifted(of, float(v[0]), float(v[1]), order))
-
-        fit = optimize.minimize(
-            squares,
-            start,
-            method="Nelder-Mead",
-            options={
-                "initial_simplex": np.array(start) + CORNERS,
-                "xatol": 5e-3,
-                "fatol": 1e-4 * misfit.excess,
-                "maxfev": 50,
-            },
+    def alone(self, seen: Misfit) -> Hypothesis:
+        """That nothing else happens;  seen: as above."""
+        return Hypothesis(
+            self.family,
+            self.name,
+            self.evidence,
+            seen.reference,
+            self.parameters,
+            self.leaves,
+            self.slack(seen.reference),
         )
-        x, y = (float(v) for v in fit.x)
-        if max(abs(x), abs(y)) > FARTHEST + 1:
-            continue  # the search diverged: only the repeated edge is left of the picture
-        evidence = f"the candidate is the reference shifted {x:+.3g}, {y:+.3g} pixels (right, down)"
-        yield Hypothesis("shift", _name(x, y), evidence, _shifted(channels, x, y, order), 2)
+
+    def slack(self, picture: FloatArray) -> Callable[[], FloatArray] | None:
+        """As in `Hypothesis`;  picture: the one that the candidate is predicted to be."""
+        return None if self.warp is None else partial(self.warp.slack, picture)
 
 
-def _name(x: float, y: float) -> str:
-    size = math.hypot(x, y)
-    for length, name in ((0.5, "half-pixel shift"), (1.0, "shift by one pixel")):
-        along_x, along_y = (abs(abs(v) - length) < 0.1 for v in (x, y))
-        if (along_x or abs(x) < 0.1) and (along_y or abs(y) < 0.1) and (along_x or along_y):
-            where = " and ".join(axis for axis, is_so in (("x", along_x), ("y", along_y)) if is_so)
-            return f"{name} in {where}"
-    return f"shift by {size:.2g} pixels"
+def hypotheses(misfit: Misfit) -> Iterator[tuple[Hypothesis, Misfit]]:
+    """All of them, fitted, and the misfit that compares what each can know."""
+    for move in moves(misfit, misfit.reference):
+        seen = move.seen(misfit)
+        yield move.alone(seen), seen
+    yield from ((one, misfit) for one in _sharpened(misfit))
 
 
-def _filters(misfit: Misfit) -> Iterator[Hypothesis]:
-    r = misfit.reference
+def moves(misfit: Misfit, base: FloatArray) -> Iterator[Move]:
+    """All, fitted so that `base`, the reference in the candidate's colours, becomes the
+    candidate."""
+    shape = base.shape
+    yield from _turns(shape)
+    if min(shape[:2]) <= 2 * FARTHEST:
+        return
+    rolled = x, y = _largest_correlation(misfit.candidate, base)
+    enters = np.roll(base, (y, x), axis=(0, 1))
+    at = [np.clip(np.arange(n) - by, 0, n - 1) for n, by in zip(shape, (y, x), strict=False)]
+    wraps = misfit.prefers(enters, base[np.ix_(*at)])
+    if wraps:
+        yield Move(
+            "shift",
+            f"shift by {x:+d}, {y:+d} pixels that wraps around",
+            f"the candidate is the reference shifted {x:+d}, {y:+d} pixels (right, down), and what "
+            "leaves it on one side enters on the other",
+            1,
+            lambda p: np.roll(p, (y, x), axis=(0, 1)),
+        )
+    for bilinear in (False, True):
+        yield Move(
+            "half the size",
+            "half the size, enlarged",
+            "the candidate is the reference at half its size, enlarged again",
+            0,
+            _halved_smoothly if bilinear else _halved,
+        )
+    yield from filters(misfit, base)
+    for warp in Search(misfit, base).warps(rolled):
+        if not (wraps and warp.is_shift(x, y)):
+            yield of_warp(warp, shape)
 
-    def blurred(sigma: float) -> FloatArray:
-        return np.asarray(ndimage.gaussian_filter(r, (sigma, sigma, 0.0), mode="nearest"))
+
+def of_warp(warp: Warp, shape: tuple[int, ...]) -> Move:
+    name, evidence = warp.told(shape)
+    return Move(warp.family, name, evidence, warp.parameters, lambda p: warp.seen(p)[0], 0.0, warp)
+
+
+def _turns(shape: tuple[int, ...]) -> Iterator[Move]:
+    turned: dict[str, Callable[[FloatArray], FloatArray]] = {
+        "mirrored left to right": lambda r: r[:, ::-1],
+        "upside down": lambda r: r[::-1],
+        "rotated by 180 degrees": lambda r: r[::-1, ::-1],
+    }
+    if shape[0] == shape[1]:
+        turned |= {
+            "rows and columns exchanged": lambda r: r.transpose(1, 0, 2),
+            "rotated by 90 degrees to the left": lambda r: r.transpose(1, 0, 2)[::-1],
+            "rotated by 90 degrees to the right": lambda r: r.transpose(1, 0, 2)[:, ::-1],
+            "rows and columns exchanged, and rotated by 180 degrees": lambda r: r.transpose(
+                1, 0, 2
+            )[::-1, ::-1],
+        }
+    for name, change in turned.items():
+        evidence = f"the candidate is the reference, {name}"
+        yield Move("mirrored", name, evidence, 0, change)
+
+
+def _largest_correlation(candidate: FloatArray, base: FloatArray) -> tuple[int, int]:
+    """The movement to the right and down, with what leaves on one side entering on the other, by
+    which the two are most alike."""
+    total = np.zeros(base.shape[:2])
+    for k in range(3):
+        a, b = (np.fft.rfft2(p[..., k] - p[..., k].mean()) for p in (candidate, base))
+        total += np.fft.irfft2(a * b.conj(), base.shape[:2])
+    y, x = (int(v) for v in np.unravel_index(int(total.argmax()), total.shape))
+    height, width = base.shape[:2]
+    return x - width * (2 * x > width), y - height * (2 * y > height)
+
+
+def _halved(p: FloatArray) -> FloatArray:
+    """Each pixel has the mean of the two by two to which it belongs."""
+    h, w = (n - n % 2 for n in p.shape[:2])
+    found = p.copy()
+    small = p[:h, :w].reshape(h // 2, 2, w // 2, 2, 3).mean(axis=(1, 3))
+    found[:h, :w] = small.repeat(2, axis=0).repeat(2, axis=1)
+    return found
+
+
+def _halved_smoothly(p: FloatArray) -> FloatArray:
+    """The same, interpolated between the middles of these."""
+    h, w = (n - n % 2 for n in p.shape[:2])
+    small = p[:h, :w].reshape(h // 2, 2, w // 2, 2, 3).mean(axis=(1, 3))
+    at = np.mgrid[: p.shape[0], : p.shape[1]] / 2.0 - 0.25
+    channels = [
+        ndimage.map_coordinates(small[..., k], at, order=1, mode="nearest") for k in range(3)
+    ]
+    return np.stack(channels, axis=-1)
+
+
+def filters(misfit: Misfit, base: FloatArray) -> Iterator[Move]:
+    """Blurs, fitted so that `base` becomes the candidate."""
+
+    def blurred(p: FloatArray, sigma: float) -> FloatArray:
+        return np.asarray(ndimage.gaussian_filter(p, (sigma, sigma, 0.0), mode="nearest"))
 
     fit = optimize.minimize_scalar(
-        lambda s: misfit.squares(blurred(float(s))),
+        lambda s: misfit.squares(blurred(base, float(s))),
         bounds=(0.15, 3.0),
         method="bounded",
         options={"xatol": 0.01, "maxiter": 25},
     )
     sigma = float(fit.x)
     evidence = f"the candidate is the reference through a Gaussian of sigma {sigma:.2g} pixels"
-    yield Hypothesis("filter", f"blurred by {sigma:.2g} pixels", evidence, blurred(sigma), 1)
-    detail = r - blurred(0.7)
+    # A filter is only nearly a Gaussian.
+    yield Move(
+        "filter",
+        f"blurred by {sigma:.2g} pixels",
+        evidence,
+        1,
+        lambda p: blurred(p, sigma),
+        REST,
+    )
+
+
+def _sharpened(misfit: Misfit) -> Iterator[Hypothesis]:
+    r = misfit.reference
+    detail = r - ndimage.gaussian_filter(r, (0.7, 0.7, 0.0), mode="nearest")
     amount = misfit.amount(detail)
-    if amount > 0.0:
+    if amount > 0.0 and min(r.shape[:2]) > 2 * FARTHEST:
         evidence = (
             f"details of the size of a pixel are {1.0 + amount:.3g} times as strong as the "
             "reference's"
         )
-        yield Hypothesis("filter", "sharpened", evidence, r + amount * detail, 1)
+        yield Hypothesis("filter", "sharpened", evidence, r + amount * detail, 1, REST)

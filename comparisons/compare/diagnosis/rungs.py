@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+from comparisons.compare.diagnosis.misfit import REST
 from comparisons.results.case import Cause, RungResult
 
 ALMOST_ALL = 0.95
@@ -64,10 +65,11 @@ def _of_direct(numbers: dict[str, Any]) -> Cause | None:
     with_cosine = numbers.get("ratio_times_cosine_spread")
     if ratio is None or spread is None:
         return None
-    if with_cosine is not None and with_cosine < CONSTANT and with_cosine < 0.5 * spread:
+    if with_cosine is not None and with_cosine < min(CONSTANT, 0.5 * spread):
         evidence = "the candidate's direct light over the reference's is proportional to 1 / cosine"
         return Cause("missing cosine", evidence, 1.0 - with_cosine)
-    if spread < CONSTANT:
+    # A factor that is nearly 1 explains nothing of what spreads further than it is from 1.
+    if spread < min(CONSTANT, REST * abs(ratio - 1.0)):
         evidence = f"the candidate's direct light is {ratio:.4g} times the reference's at every hit"
         return Cause(f"direct light times {ratio:.4g}", evidence, 1.0 - spread)
     return None

@@ -57,7 +57,9 @@ def rim(misfit: Misfit) -> Cause | None:
             if 2 * width >= min(excess.shape) or inner.size < INNER * excess.size:
                 break
             share = 1.0 - float(inner.sum()) / total
-            sides = (excess[:width], excess[-width:], excess[:, :width], excess[:, -width:])
+            # Corners belong to two sides, and a wrong column has ends in the upper and the lower.
+            up, across = excess[:, width:-width], excess[width:-width]
+            sides = (up[:width], up[-width:], across[:, :width], across[:, -width:])
             sums = sorted(float(side.sum()) for side in sides)
             if share > SHARE and sums[1] > ON_A_SIDE * total:
                 pixels = width * block

@@ -128,3 +128,55 @@ def test_replicates_that_make_up_for_each_other_are_judged() -> None:
         shared = compare(own, other + 0.05 * (normal(rng, 16, 48) - 1.0))
         assert shared.status == "invalid"
         assert "they share their noise" in shared.reason
+
+
+def antithetic(
+    rng: np.random.Generator, count: int, side: int, exponent: float = 2.0
+) -> FloatArray:
+    """Pairs of pictures of u and 1 - u."""
+    u = rng.random((count // 2, side, side, 3))
+    both = np.stack([u, 1.0 - u], axis=1).reshape(count, side, side, 3)
+    return (exponent + 1.0) * both**exponent * np.array([1.0, 0.8, 0.5])
+
+
+def independent(rng: np.random.Generator, count: int, side: int) -> FloatArray:
+    return 3.0 * rng.random((count, side, side, 3)) ** 2 * np.array([1.0, 0.8, 0.5])
+
+
+def verdicts_of_antithetic(cases: int, gain: float = 1.0) -> list[str]:
+    found = []
+    for seed in range(cases):
+        rng = np.random.default_rng(seed)
+        a = gain * antithetic(rng, 16, 24)
+        b = independent(rng, 16, 24) if seed % 2 else antithetic(rng, 16, 24)
+        checked = input_rung(a, b)
+        assert checked.status == "agree", checked.reason
+        assert "replicates of the candidate make up for each other" in checked.reason
+        found.append(compare(a, b).status)
+    return found
+
+
+def test_antithetic_pairs_are_judged() -> None:
+    """With errors that are too large, so that they cannot raise false alarms."""
+    assert {*verdicts_of_antithetic(4)} <= {"agree", "inconclusive"}
+    assert verdicts_of_antithetic(2, 1.2) == ["differ", "differ"]
+
+
+@pytest.mark.slow
+def test_antithetic_pairs_raise_no_false_alarms() -> None:
+    assert not {"differ", "invalid"} & {*verdicts_of_antithetic(200)}
+
+
+def test_pictures_that_are_also_alike_do_not_only_make_up_for_each_other() -> None:
+    """Each is the negative of the one before, nearly, so that the next but one is alike."""
+    own = normal(np.random.default_rng(0), 16, 32) - 1.0
+    pictures = [own[0]]
+    for one in own[1:]:
+        pictures.append(-0.8 * pictures[-1] + 0.6 * one)
+    found = successive(1.0 + np.stack(pictures))
+    assert found is not None
+    assert found.correlation < 0.0
+    assert not found.makes_up
+    pairs = successive(antithetic(np.random.default_rng(0), 16, 32))
+    assert pairs is not None
+    assert pairs.makes_up

@@ -1,0 +1,65 @@
+"""Mistakes of a stranger's path tracer are named, and a right one has none."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from small_path_tracer import SCENE, picture
+
+from comparisons.compare import diagnosis, mistaken_paths
+from comparisons.compare.judge import of_replicates
+from comparisons.compare.path_length import path_lengths
+from comparisons.results.case import Images
+from reference_rt.rendering.render import render
+from reference_rt.rendering.scene import Scene
+
+NAMES = {
+    "no shadows": "without shadows of lights without extent",
+    "uniform": mistaken_paths.UNIFORM,
+    "no pi": "direct light of lights without extent is not divided by pi",
+    "no cosine": "direct light of lights without extent lacks the cosine",
+    "1 / d": "light of points falls with the distance, not with its square",
+    "twice": "light is counted twice: by samples of lights, and where paths meet them",
+    "one bounce less": "paths are one edge too short",
+}
+
+
+@cache
+def right() -> np.ndarray:
+    scene = Scene.parse(SCENE)
+    return np.stack([render(scene, spp=128, seed=100 + seed).colour for seed in range(8)])
+
+
+def images(mistake: str) -> Images:
+    wrong = np.stack([picture(32, seed, mistake) for seed in range(8)])
+    return of_replicates(wrong, right(), {}).images
+
+
+@pytest.mark.cases(1)
+@pytest.mark.parametrize("mistake", NAMES)
+def test_a_mistake_is_named(mistake: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mistaken_paths, "SAMPLES", 1 << 18)
+    found = diagnosis.likeliest(images(mistake), {}, path_lengths(Scene.parse(SCENE)))
+    assert found is not None
+    assert found.name == NAMES[mistake]
+
+
+@pytest.mark.slow
+def test_a_right_path_tracer_has_none() -> None:
+    assert diagnosis.likeliest(images(""), {}, path_lengths(Scene.parse(SCENE))) is None
+
+
+def test_the_parts_are_those_of_our_picture() -> None:
+    """Both sums of parts: all light but what is seen, which no mistake changes."""
+    scene = Scene.parse(SCENE)
+    parts = mistaken_paths._traced(scene, 4, False, None)
+    seen = render(scene.changed(integrator={"type": "path", "max_depth": 1}), spp=256).colour
+    means = right().mean(axis=(0, 1, 2))
+    for light in (
+        [p.points + p.met for p in parts],
+        [p.points + p.lamps for p in parts],
+    ):
+        batches = (np.stack(light) + seen).mean(axis=(1, 2))
+        error = batches.std(axis=0, ddof=1) / np.sqrt(len(batches))
+        # Eight batches: 6 standard errors of Student's law with 7 degrees of freedom, 5e-4.
+        assert np.all(np.abs(batches.mean(axis=0) - means) < 6.0 * error + 1e-3 * means)
