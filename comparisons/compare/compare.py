@@ -1,5 +1,6 @@
 """The comparison of one scene with Mitsuba, rung by rung, from the scene to the verdict."""
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -75,7 +76,8 @@ def compare_scene(
 
 
 def budgeted(scene: Scene, budget: Budget) -> Scene:
-    """The scene with the budget's size and samples, a box filter, and no layers.
+    """The scene with the budget's size and samples, a box filter, and no layers; without noise on a
+    grid of samples, since the points of our other samplers are our own.
 
     With a filter wider than a pixel, Mitsuba's neighbouring pixels share samples and hence noise,
     but the statistics need independent pixels.  The scene's own filter and layers have rungs of
@@ -87,6 +89,8 @@ def budgeted(scene: Scene, budget: Budget) -> Scene:
     sampler = scene.resolved_sampler
     if isinstance(sampler, Grid) and not scene.integrator.deterministic:
         sampler = Sobol()
+    elif not isinstance(sampler, Grid) and scene.integrator.deterministic:
+        sampler = Grid(spp=math.isqrt(sampler.spp) ** 2)
     if not scene.integrator.deterministic:
         spp = budget.spp or max(min(LEAST, sampler.spp), sampler.spp // budget.parts)
         sampler = sampler.model_copy(update={"spp": spp})
@@ -162,6 +166,8 @@ def _gather(
         notes.insert(0, "compared with a box filter")
     if not scene.integrator.deterministic and isinstance(subject.scene.sampler, Grid):
         notes.insert(0, "compared with random samples in place of a grid, as Mitsuba has them")
+    if scene.integrator.deterministic and not isinstance(subject.scene.resolved_sampler, Grid):
+        notes.insert(0, "compared with a grid of samples in each pixel, whose rays both trace")
     if moved > 0.0:
         notes.append(
             f"compared with the vertices of meshes rounded to float32, as Mitsuba holds them: they "

@@ -20,7 +20,10 @@ from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.renderers import ReferenceSampler
 from comparisons.results.case import Case, exit_code
 from comparisons.translator import UntranslatableError, load
+from reference_rt.core.model import types_of
+from reference_rt.integrators import RayCast, Whitted
 from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import AnySampler, Grid, Independent, Sobol
 from reference_rt.scene.build import build_tables
 
 SCENES = Path(__file__).parents[3] / "scenes"
@@ -64,6 +67,22 @@ def test_layers_are_the_hits_of_both_sides() -> None:
     assert not any(picture.any() for pair in found.values() for picture in pair)
 
 
+@pytest.mark.parametrize("sampler", types_of(AnySampler), ids=lambda cls: cls.__name__)
+@pytest.mark.parametrize("integrator", [Whitted(), RayCast()], ids=lambda one: one.type)
+def test_pictures_without_noise_are_of_the_same_rays(
+    integrator: Whitted | RayCast, sampler: type[Sobol | Independent | Grid]
+) -> None:
+    """Whichever samples the scene asks for: the points of random ones are our own."""
+    scene = Scene.load(SCENES / "spheres_whitted.yaml")
+    film = scene.film.model_copy(update={"width": 32, "height": 20})
+    scene = scene.changed(integrator=integrator, sampler=sampler(spp=4), film=film)
+    case = comparisons.compare.compare.compare_scene(
+        comparisons.compare.compare.Subject(scene), Budget(), lambda _: None, rungs=("images",)
+    )
+    assert case.verdict == "agree", case.reason
+    assert ("a grid of samples" in str(case.notes)) is (sampler is not Grid)
+
+
 @pytest.mark.slow
 def test_scenes_agree(tmp_path: Path) -> None:
     scenes = [str(SCENES / f"{name}.yaml") for name in ("spheres_whitted", "polygons_fill_rules")]
@@ -73,7 +92,7 @@ def test_scenes_agree(tmp_path: Path) -> None:
     assert [case["verdict"] for case in found["cases"]] == ["agree", "agree"]
     case = found["cases"][0]
     assert set(case) >= {"scene", "verdict", "reason", "tiers", "metrics", "seconds"}
-    of_light = ["direct", "whitted", "statistics", "images"]
+    of_light = ["direct", "sampling", "whitted", "statistics", "images"]
     assert list(case["tiers"]) == ["input", "files", "geometry", *of_light]
     assert set(case["metrics"]) >= {"ssim", "flip", "psnr", "rmse", "relmse", "mean_bias"}
     geometry = case["tiers"]["geometry"]
