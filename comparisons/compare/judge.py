@@ -285,11 +285,13 @@ def likeliest_cause(
 ) -> Cause | None:
     """The likeliest cause of a difference; single lights, and paths of other lengths, are rendered
     only if needed."""
-    plain = diagnosis.likeliest(images)
+    fits = diagnosis.Fits(images)
+    plain = diagnosis.likeliest(images, fits=fits)
     is_dark = images.candidate.mean() <= LITTLE * images.reference.mean()
     if diagnosis.is_sure(plain) and not is_dark:
         return plain
     if lights is None and lengths is None:
         return plain
     singles = {} if lights is None else lights()
-    return diagnosis.likeliest(images, singles, *([] if lengths is None else [lengths]))
+    also = [] if lengths is None else [lengths]
+    return diagnosis.likeliest(images, singles, *also, fits=fits)

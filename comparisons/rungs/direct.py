@@ -17,7 +17,13 @@ from comparisons.rungs.rays.light_context import described as described_light
 from comparisons.rungs.rays.light_error import bounds, slopes_of
 from comparisons.rungs.rays.mitsuba_light import _lamp, is_blocked, is_dark, mitsuba_direct
 from comparisons.rungs.rays.rays import described, mixed_rays
-from comparisons.rungs.rays.resolution import NOT_BEYOND, elsewhere, too_many_elsewhere
+from comparisons.rungs.rays.resolution import (
+    AROUND,
+    NOT_BEYOND,
+    elsewhere,
+    off_surface,
+    too_many_elsewhere,
+)
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.lights import AREA
@@ -58,6 +64,7 @@ class Outcome(NamedTuple):
     ours: FloatArray
     theirs: FloatArray
     explained: IntArray
+    unaimed: IntArray
     max_error: float
     max_ratio: float
     ratio: FloatArray
@@ -114,7 +121,7 @@ def direct(
     }
     numbers["tells"] = arbiter.is_enough(numbers["lit_right"], numbers["lit"])
     numbers |= _ratios(list(outcomes.values()))
-    settled = np.concatenate([o.explained for o in outcomes.values()])
+    settled = np.concatenate([np.setdiff1d(o.explained, o.unaimed) for o in outcomes.values()])
     numbers["explained_elsewhere"] = too_many_elsewhere(
         scene, tables, counterpart, rays.rows(settled), total
     )
@@ -182,7 +189,7 @@ def _compare(
     known = np.flatnonzero(is_known)
     if len(known) == 0:
         none = np.zeros((0, 3))
-        return Outcome(0, 0, 0, known, none, none, known, 0.0, 0.0, np.zeros(0), np.zeros(0))
+        return Outcome(0, 0, 0, known, none, none, known, known, 0.0, 0.0, np.zeros(0), np.zeros(0))
     context, target = context.of(known), target[known]
     rays, hits = context.rays, context.hits
     value = ours.contribution[known]
@@ -223,6 +230,7 @@ def _compare(
     settled |= is_beside(some, light, u, theirs[wrong], allowed, scale[wrong])
     if kind_of(context, light) == AREA:
         settled |= is_doubled(context.sizes, tables, some.hits.p, target[wrong])
+    past = _leads_past(some, target[wrong], lamp[wrong], radius[wrong])
     right, shines = error <= bound, is_lit | theirs.any(axis=1)
     left = wrong[~settled]
     lit = left[value[left].any(axis=1) & theirs[left].any(axis=1)]
@@ -236,11 +244,26 @@ def _compare(
         ours=value[left],
         theirs=theirs[left],
         explained=known[wrong[settled]],
+        unaimed=known[wrong[settled & past]],
         max_error=float(error[right].max(initial=0.0)),
         max_ratio=float(ratio.max(initial=0.0)),
         ratio=value[lit].sum(axis=1) / theirs[lit].sum(axis=1),
         cosine=np.abs(their_cosine[lit]),
     )
+
+
+def _leads_past(
+    context: LightContext, target: FloatArray, lamp: IntArray, radius: FloatArray
+) -> arbiter.BoolArray:
+    """(n,): whether a shadow ray towards a point on a lamp meets another shape, or none, for a move
+    of the point by float32's error, (n,): the lamp is narrower than that, or the point at its rim.
+    No light is asked."""
+    o = off_surface(context.sizes, context.hits, target - context.hits.p)
+    past = np.zeros(len(target), bool)
+    for move in arbiter.directions(AROUND):
+        met = query.intersect(context.tables, o, target + radius[:, None] * move - o)
+        past |= met.shape != lamp
+    return past & (lamp >= 0)
 
 
 def _in_plane(context: LightContext, target: FloatArray) -> arbiter.BoolArray:

@@ -14,7 +14,7 @@ rival, unless it is of the same family.  What happens to positions is a `Move` o
 of `warps.WARPS`.
 """
 
-from comparisons.compare.diagnosis.pictures import IN_PART, is_sure, likeliest
+from comparisons.compare.diagnosis.pictures import IN_PART, Fits, is_sure, likeliest
 from comparisons.compare.diagnosis.rungs import of_rungs
 
-__all__ = ["IN_PART", "is_sure", "likeliest", "of_rungs"]
+__all__ = ["IN_PART", "Fits", "is_sure", "likeliest", "of_rungs"]

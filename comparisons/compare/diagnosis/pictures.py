@@ -63,29 +63,52 @@ def is_sure(cause: Cause | None) -> bool:
     return not cause.name.endswith(UNSURE)
 
 
+class Fits:
+    """What is fitted to two pictures without rendering, once for several calls of `likeliest`."""
+
+    def __init__(self, images: Images) -> None:
+        self._images = images
+
+    @cached_property
+    def misfit(self) -> Misfit:
+        return Misfit(self._images)
+
+    @cached_property
+    def singles(self) -> list[tuple[Hypothesis, Misfit]]:
+        """Hypotheses about colours or positions, but for those of brightness."""
+        colours = (*colour.hypotheses(self.misfit), *tones.hypotheses(self.misfit))
+        return [*((one, self.misfit) for one in colours), *place.hypotheses(self.misfit)]
+
+    @cached_property
+    def two(self) -> "list[_Ranked]":
+        """Two causes together that leave no more than noise."""
+        return _simple([one for one in _ranked(pairs(self.misfit)) if one.is_whole])
+
+
 def likeliest(
     images: Images,
     lights: Mapping[str, FloatArray] | None = None,
     also: Callable[[FloatArray], Iterable[Hypothesis]] = lambda reference: (),
+    fits: Fits | None = None,
 ) -> Cause | None:
     """Name the one cause that explains most of the squared difference beyond noise, or None where
     nothing does so clearly.
 
     lights: the reference's pictures of single lights (height, width, 3), by name;  also: other
-    hypotheses about a reference, rendered only if the difference is clear.
+    hypotheses about a reference, rendered only if the difference is clear;  fits: of the same
+    pictures, from an earlier call.
     """
     if images.candidate.shape != images.reference.shape:
         return None
     if count_nonfinite(images.candidate, images.reference):
         return None
-    misfit = Misfit(images)
+    fits = fits or Fits(images)
+    misfit = fits.misfit
     if not (misfit.clear and misfit.excess > 0.0):
         return None
     singles = [
         *((h, misfit) for h in brightness.hypotheses(misfit, lights or {})),
-        *((h, misfit) for h in colour.hypotheses(misfit)),
-        *((h, misfit) for h in tones.hypotheses(misfit)),
-        *place.hypotheses(misfit),
+        *fits.singles,
         *_rendered(misfit, also(misfit.reference)),
     ]
     ranked = _ranked(singles)
@@ -100,7 +123,7 @@ def likeliest(
     if at_border is not None and not enough:
         return at_border
     if all(one.is_flexible for one in whole):
-        two = _simple([one for one in _ranked(pairs(misfit)) if one.is_whole])
+        two = fits.two
         both = _best(two, max(two[0].seen.margin, INTERPOLATED)) if two else None
         if both is not None and both.is_reproduced and not (whole and both.is_flexible):
             return both.cause(of=misfit)

@@ -168,10 +168,16 @@ def too_many_elsewhere(
     scene: Scene, tables: SceneTables, counterpart: Counterpart, rays: Rays, total: int
 ) -> int:
     """Of rays that the arbiter explains, among `total`: how many Mitsuba's precision does not
-    concern, if that is more than such rays may be; else 0."""
-    if not arbiter.too_many(len(rays.o), total):
+    concern, if that is more than such rays may be; else 0.
+
+    Those that hit a shape for which a mesh stands in are not asked: its edges are wider, and also
+    change what lies beyond the hit.
+    """
+    hits = query.intersect(tables, rays.o, rays.d)
+    asked = rays.rows(np.flatnonzero(counterpart.off_by(hits.shape, "sag") == 0.0))
+    if not arbiter.too_many(len(asked.o), total):
         return 0
-    count = elsewhere(scene, tables, counterpart, rays)
+    count = elsewhere(scene, tables, counterpart, asked)
     return count if arbiter.too_many(count, min(total, MOST_ASKED)) else 0
 
 

@@ -120,7 +120,7 @@ def test_half_a_file_is_left_out(tmp_path):
 def test_the_command_refuses_what_it_does_not_know(tmp_path):
     for words, said in (
         (["--rungs", "geometri"], "--rungs: expected one of"),
-        (["--time", "10"], "--time: expected a duration"),
+        (["--time", "10 apples"], "--time: expected a duration"),
         (["--features", "glas"], "did you mean 'glass'"),
         (["--planted", "nothing like it"], "no source fault matches"),
     ):

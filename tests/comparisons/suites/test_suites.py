@@ -53,7 +53,7 @@ def test_a_suite_may_be_a_file_of_ones_own(tmp_path):
     with pytest.raises(SceneError, match="cannot be read"):
         load_suite(str(tmp_path / "none.yaml"))
     path.write_bytes(b"\xff\xfe\xfa")
-    with pytest.raises(SceneError, match="is not text"):
+    with pytest.raises(SceneError, match="is UTF-16; expected UTF-8"):
         load_suite(str(path))
 
 
