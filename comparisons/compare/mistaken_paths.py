@@ -21,7 +21,7 @@ from reference_rt.integrators import Path
 from reference_rt.rendering.query.hits import BoolArray
 from reference_rt.rendering.scene import Scene
 
-SAMPLES = 1 << 19
+SAMPLES = 1 << 18
 """Paths of a picture, some seconds: the change is known to some percent of itself."""
 
 BATCHES = 8
