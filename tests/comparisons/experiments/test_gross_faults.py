@@ -93,11 +93,13 @@ def test_changes_of_pictures_are_gross() -> None:
 
 # ---- none passes --------------------------------------------------------------------------------
 
-SAMPLE = {
-    "grazing": ("directional light reversed", "picture twice as bright"),
-    "planet": ("half of the reflectance", "picture mirrored"),
-    "light_directional": ("directional light reversed",),
-}
+SAMPLE = (
+    ("grazing", "directional light reversed"),
+    ("grazing", "picture twice as bright"),
+    ("planet", "half of the reflectance"),
+    ("planet", "picture mirrored"),
+    ("light_directional", "directional light reversed"),
+)
 """Two scenes that are `reference-limited`, with a fault of the scene and of the picture in each,
 and one in which the fault once seemed to be an unresolved shadow."""
 
@@ -107,10 +109,10 @@ def planted(name: str, faults: list[of_limits.GrossFault]) -> list[Answer]:
     return list(answers(scene, budget_of(name), faults))
 
 
-@pytest.mark.parametrize("name", SAMPLE)
-def test_a_limit_does_not_excuse_a_gross_fault(name: str) -> None:
-    for found in planted(name, [BY_NAME[fault] for fault in SAMPLE[name]]):
-        assert found.is_caught, found
+@pytest.mark.parametrize(("name", "fault"), SAMPLE)
+def test_a_limit_does_not_excuse_a_gross_fault(name: str, fault: str) -> None:
+    (found,) = planted(name, [BY_NAME[fault]])
+    assert found.is_caught, found
 
 
 @pytest.mark.slow
