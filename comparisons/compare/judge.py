@@ -293,5 +293,6 @@ def likeliest_cause(
     if lights is None and lengths is None:
         return plain
     singles = {} if lights is None else lights()
-    also = [] if lengths is None else [lengths]
-    return diagnosis.likeliest(images, singles, *also, fits=fits)
+    if lengths is None:
+        return diagnosis.likeliest(images, singles, fits=fits)
+    return diagnosis.likeliest(images, singles, lengths, fits)
