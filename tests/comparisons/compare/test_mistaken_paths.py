@@ -37,8 +37,7 @@ def images(mistake: str) -> Images:
 
 @pytest.mark.cases(1)
 @pytest.mark.parametrize("mistake", NAMES)
-def test_a_mistake_is_named(mistake: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mistaken_paths, "SAMPLES", 1 << 18)
+def test_a_mistake_is_named(mistake: str) -> None:
     found = diagnosis.likeliest(images(mistake), {}, path_lengths(Scene.parse(SCENE)))
     assert found is not None
     assert found.name == NAMES[mistake]
