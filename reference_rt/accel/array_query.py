@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from reference_rt.accel.block_query import any_hits, closest_hits, hit_of
+from reference_rt.accel.block_query import any_hits, closest_hits
 from reference_rt.accel.geometry import Geometry, closest_hit, occluded
 from reference_rt.accel.packet import PACKET_SIZE, TILE, may_be_coherent, ray_number
 from reference_rt.accel.packet_traversal import FOUND, INCOHERENT, closest_of_packet
@@ -20,6 +20,7 @@ from reference_rt.core.ray import (
     Hit,
     HitBlock,
     RayBlock,
+    hit_of,
     put_ray,
     ray_of,
     scaled,
@@ -78,7 +79,7 @@ def trace_packet(
     outcome = _together(geometry, o, d, begin, width, count, work.packet, work.hits)
     if outcome == FOUND:
         for j in range(PACKET_SIZE):
-            hit = hit_of(geometry, ray_of(work.packet, j), work.hits, j)
+            hit = hit_of(work.hits, j)
             filled = _add_hit(found, numbers, filled, hit, ray_number(begin, width, j))
     elif outcome == INCOHERENT:
         for j in range(count):
@@ -91,7 +92,7 @@ def trace_packet(
     if waiting > BLOCK - PACKET_SIZE or is_last:
         closest_hits(geometry, work.rays, work.hits, waiting)
         for j in range(waiting):
-            hit = hit_of(geometry, ray_of(work.rays, j), work.hits, j)
+            hit = hit_of(work.hits, j)
             filled = _add_hit(found, numbers, filled, hit, work.numbers[j])
         waiting = 0
     return waiting, filled

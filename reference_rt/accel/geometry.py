@@ -26,7 +26,6 @@ from reference_rt.accel.single_ray import (
 from reference_rt.core.arrays import IntArray
 from reference_rt.core.ray import Hit, Ray, SurfacePoint, no_hit
 from reference_rt.core.vec3 import Vec3
-from reference_rt.jit.function_pointer import FunctionPointer
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.links import Linkable
 from reference_rt.jit.simd import VECTOR_WIDTH
@@ -46,16 +45,13 @@ and for `Bvh.unbounded`."""
 
 class Geometry(NamedTuple):
     """The tables of all shapes.  bvh: None where brute force is faster;  solids, instances, parts:
-    None where there are none;  tracer: address of `stream.traversal.trace_block` compiled for these
-    tables, None where it is inlined.
-    """
+    None where there are none."""
 
     shapes: Shapes
     bvh: Bvh | None
     solids: Solids | None
     instances: Instances | None
     parts: Parts | None
-    tracer: FunctionPointer | None = None
 
 
 geometries = Linkable()

@@ -218,23 +218,6 @@ _ALL = (1 << VECTOR_WIDTH) - 1
 _LAST = 1 << (VECTOR_WIDTH - 1)
 
 
-@entry_kernel
-def trace_block(
-    bvh: Bvh,
-    shapes: Shapes,
-    solids: Solids | None,
-    rays: RayBlock,
-    hits: HitBlock,
-    n: int,
-    any_hit: bool,
-) -> None:
-    """`any_of_block` or `closest_of_block`, compiled separately: see `Geometry.tracer`."""
-    if any_hit:
-        any_of_block(bvh, shapes, solids, rays, hits, n)
-    else:
-        closest_of_block(bvh, shapes, solids, rays, hits, n)
-
-
 @kernel
 def closest_of_block(
     bvh: Bvh, shapes: Shapes, solids: Solids | None, rays: RayBlock, hits: HitBlock, n: int

@@ -3,8 +3,9 @@
 A camera has a `Camera` description, in scene units and degrees, with
 `setup(width, height)` for a picture of that many pixels, which returns a NamedTuple (a *view*); the
 kernel camera_ray(view, x, y, lens) -> `Ray` with a unit direction and no end, for the film point
-(x, y), each in [0, 1] across the picture from its top left corner; and, for a camera with a lens,
-lens_sample(view, sampler), which draws the lens point.
+(x, y), each in [0, 1] across the picture from its top left corner, and the lens point for `lens`, a
+pair of random numbers.  The module of a camera with a lens says so: HAS_LENS; for others it is
+LENS_CENTRE.
 
 To add a camera: its description and kernel, in a module that has no other `camera_ray`, and its
 line in `AnyCamera`.
@@ -15,7 +16,6 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from reference_rt.cameras.camera import LENS_CENTRE as LENS_CENTRE
-from reference_rt.cameras.camera import no_lens
 from reference_rt.cameras.orthographic import Orthographic as Orthographic
 from reference_rt.cameras.perspective import Perspective as Perspective
 from reference_rt.cameras.perspective import Pinhole as Pinhole
@@ -46,12 +46,6 @@ def camera_ray(view: Any, x: float, y: float, lens: tuple[float, float]) -> Ray:
     return ray
 
 
-_lens_samples = {view: getattr(module_of(view), "lens_sample", no_lens) for view in VIEWS}
-lens_sample = by_class("lens_sample", _lens_samples)
-"""lens_sample(view, sampler) -> `lens` for a sample's ray: drawn for a camera with a lens, else
-LENS_CENTRE."""
-
-
 def has_lens(view: Any) -> bool:
     """Whether lens points are drawn for a camera."""
-    return _lens_samples[type(view)] is not no_lens
+    return getattr(module_of(type(view)), "HAS_LENS", False)

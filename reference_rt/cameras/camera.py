@@ -1,4 +1,4 @@
-"""What all cameras share: position and orientation; and `no_lens`, for most of them."""
+"""What all cameras share: position and orientation."""
 
 import math
 from typing import Annotated, Any, NamedTuple, Self
@@ -76,9 +76,3 @@ def clipped_ray(clip: Clip, o: Vec3, s: Vec3) -> Ray:
     to o + s, at distance 1 along the direction of view."""
     size = length(s)
     return Ray(o + s * clip.near, s * (1.0 / size), clip.depth * size)
-
-
-@kernel
-def no_lens(view: Any, sampler: Sample) -> tuple[float, float]:
-    """The `lens_sample` of cameras without a lens: draws nothing."""
-    return LENS_CENTRE

@@ -15,6 +15,9 @@ from reference_rt.sampling import LENS, Sample, draw_pair
 from reference_rt.sampling.warp import concentric_disk
 
 
+HAS_LENS = True
+
+
 class ThinLens(CentralCamera):
     """A perspective camera with an ideal lens: what is not in the plane of focus is blurred (Cook
     et al. 1984).
@@ -76,12 +79,6 @@ class ThinLensView(NamedTuple):
     radius: float
     slope: float
     clip: Clip
-
-
-@kernel
-def lens_sample(view: ThinLensView, sampler: Sample) -> tuple[float, float]:
-    u0, u1 = draw_pair(sampler, LENS)
-    return u0, u1
 
 
 @kernel

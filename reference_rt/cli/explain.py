@@ -1,5 +1,5 @@
-"""`reference-rt explain`: what a scene uses, what is specialised away because the scene lacks it,
-which kernels its picture uses, and which of them are compiled already.
+"""`reference-rt explain`: what a scene uses, what is left out because the scene lacks it, which
+kernels its picture uses, and which of them are compiled already.
 """
 
 import importlib.metadata
@@ -21,12 +21,11 @@ from reference_rt.jit.kernel import Signature, is_compiled
 from reference_rt.jit.parallel_compile import Call
 from reference_rt.lights import Lights
 from reference_rt.lights.emitters.environment_map import EnvironmentMaps
-from reference_rt.materials import any_smooth
 from reference_rt.materials.bsdfs.tables import TABLES as MATERIAL_TABLES
 from reference_rt.materials.nested.flattened import FlattenedMaterials
 from reference_rt.rendering.kernels import operation_of
 from reference_rt.rendering.scene import Scene
-from reference_rt.rendering.warm_up import picture_calls, specialised_calls
+from reference_rt.rendering.warm_up import picture_calls
 from reference_rt.sampling import Grid
 from reference_rt.scene.likely_mistakes import likely_mistakes
 from reference_rt.shapes import TABLES as SHAPE_TABLES
@@ -49,7 +48,7 @@ _METHODS = {
 
 
 def explain(scene: Scene, tables: SceneTables) -> tuple[Lines, Lines]:
-    """(what is used, what is specialised away), each a list of (what, how much or why)."""
+    """(what is used, what is left out), each a list of (what, how much or why)."""
     used: Lines = []
     pruned: Lines = []
     _shapes(tables, used, pruned)
@@ -162,7 +161,7 @@ def _materials(tables: SceneTables, used: Lines, pruned: Lines) -> None:
         else:
             used.append((field, f"{_rows(table):,}"))
     _layers(materials.flat_leaves, used, pruned)
-    if materials.oriented is None:
+    if not materials.oriented.any():
         pruned.append(("tangents", "no material depends on the directions of u and v"))
     else:
         used.append(("tangents", "dp/du and dp/dv where a material depends on them"))
@@ -264,7 +263,7 @@ def _light_selection(tables: SceneTables, used: Lines, pruned: Lines) -> None:
     if choice is None:
         pruned.append(("light sampling", "there is no light to sample"))
         return
-    if not any_smooth(tables.materials):
+    if not tables.materials.smooth.any():
         pruned.append(("light sampling", "every BSDF is a delta lobe: it would contribute nothing"))
     if len(choice.kind) == 1:
         pruned.append(("light selection", "there is one light"))
@@ -365,28 +364,17 @@ _DRIVERS = {
 
 
 def kernels_of(scene: Scene) -> Lines:
-    """(what, which kernels): those of a scene's picture, linked and specialised."""
+    """(what, which kernels): those of a scene's picture."""
     if numba.config.DISABLE_JIT:
         return [("kernels", "NUMBA_DISABLE_JIT is set: they run as plain Python")]
-    linked, specialised = picture_calls(scene), specialised_calls(scene)
-    if all(is_compiled(*call) for call in specialised):
-        use = "this scene is rendered by them"
-    else:
-        use = "a long render compiles them meanwhile, `warm-up` with this scene beforehand"
-    lines = [
-        ("linked", f"{_compiled(linked)}; shared by all scenes"),
-        ("specialised", f"{_compiled(specialised)}: {use}"),
-    ]
+    calls = picture_calls(scene)
+    ready = sum(is_compiled(*call) for call in calls)
+    lines = [("compiled", f"{ready} of {len(calls)}; all scenes share them")]
     found: dict[str, set[str]] = {}
-    for compiled, signature in linked:
+    for compiled, signature in calls:
         what, operation = _named(operation_of(compiled), signature)
         found.setdefault(what, set()).add(operation)
     return lines + [(what, ", ".join(sorted(of_type))) for what, of_type in sorted(found.items())]
-
-
-def _compiled(calls: Iterable[Call]) -> str:
-    found = [is_compiled(*call) for call in calls]
-    return f"{sum(found)} of {len(found)} compiled"
 
 
 def _named(kernel: str, signature: Signature) -> tuple[str, str]:
@@ -419,7 +407,7 @@ def print_page(scene: Scene) -> None:
     console = Console()
     for title, lines in (
         ("used", used),
-        ("specialised away", _by_reason(pruned)),
+        ("left out", _by_reason(pruned)),
         ("kernels", kernels_of(scene)),
         ("nearest to float64's limits", near),
         ("warning: beyond float64", beyond),

@@ -241,7 +241,7 @@ def explain(
 def warm_up(
     scenes: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[SCENE]...", help="Whose specialised kernels are compiled, too."),
+        typer.Argument(metavar="[SCENE]...", help="Whose kernels are compiled, too, if its tables are of rare types."),
     ] = None,
     threads: Threads = None,
 ) -> None:

@@ -16,7 +16,7 @@ from reference_rt.jit.kernel_cache import cache_root
 from reference_rt.jit.parallel_compile import Call, compile_all
 from reference_rt.rendering.kernels import cost
 from reference_rt.rendering.scene import Scene
-from reference_rt.rendering.warm_up import linked_calls, picture_calls, specialised_calls
+from reference_rt.rendering.warm_up import all_calls, picture_calls
 from reference_rt.util.console import Bar
 from reference_rt.util.errors import ImageError, UsageError
 from reference_rt.util.files import check_writable
@@ -33,7 +33,7 @@ class Warmed(NamedTuple):
 
 
 def warm_up(scenes: Sequence[Scene], threads: int | None) -> Warmed:
-    """Compile all linked kernels, and the specialised ones of these scenes.
+    """Compile all kernels, those of these scenes too.
 
     threads: the number of processes, default all cores.  Shows the progress on standard error.
     Kernels are kept one by one, so that what is compiled before an interruption stays.  Raises
@@ -42,9 +42,8 @@ def warm_up(scenes: Sequence[Scene], threads: int | None) -> Warmed:
     folder = _folder()
     began = time.monotonic()
     with CountBar() as progress:
-        specialised = [call for scene in scenes for call in specialised_calls(scene)]
-        linked = [*linked_calls(), *(call for scene in scenes for call in picture_calls(scene))]
-        calls = [*dict.fromkeys((*specialised, *linked))]
+        own = (call for scene in scenes for call in picture_calls(scene))
+        calls = [*dict.fromkeys((*all_calls(), *own))]
         missing = [call for call in calls if not is_cached(*call)]
         progress.begin(missing)
         compile_all(missing, threads or os.cpu_count() or 1, progress)

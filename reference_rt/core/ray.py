@@ -180,6 +180,7 @@ IntArray = npt.NDArray[np.int64]
 
 RAY_FLOATS = 7 * BLOCK
 HIT_FLOATS, HIT_INTEGERS = 3 * BLOCK, 3 * BLOCK
+POINT_FLOATS, POINT_INTEGERS = 10 * BLOCK, 2 * BLOCK
 
 
 class RayBlock(NamedTuple):
@@ -192,6 +193,14 @@ class RayBlock(NamedTuple):
 class HitBlock(NamedTuple):
     """Up to BLOCK hits as SoA: numbers (HIT_FLOATS,), t of all hits, then u and v;  codes
     (HIT_INTEGERS,), kind of all hits, then row and instance."""
+
+    numbers: FloatArray
+    codes: IntArray
+
+
+class PointBlock(NamedTuple):
+    """Up to BLOCK surface points as SoA: numbers (POINT_FLOATS,), p.x of all points, then p.y, p.z,
+    n, ns and the error;  codes (POINT_INTEGERS,), material of all points, then light."""
 
     numbers: FloatArray
     codes: IntArray
@@ -251,3 +260,27 @@ def put_hit(hits: HitBlock, j: int, hit: Hit) -> None:
     numbers, codes = hits.numbers, hits.codes
     numbers[j], numbers[BLOCK + j], numbers[2 * BLOCK + j] = hit.t, hit.u, hit.v
     codes[j], codes[BLOCK + j], codes[2 * BLOCK + j] = hit.kind, hit.row, hit.instance
+
+
+@kernel
+def point_of(points: PointBlock, j: int) -> SurfacePoint:
+    """Surface point j."""
+    numbers, codes = points.numbers, points.codes
+    return SurfacePoint(
+        vector_of(numbers, 0, j),
+        vector_of(numbers, 3, j),
+        vector_of(numbers, 6, j),
+        numbers[9 * BLOCK + j],
+        codes[j],
+        codes[BLOCK + j],
+    )
+
+
+@kernel
+def put_point(points: PointBlock, j: int, point: SurfacePoint) -> None:
+    numbers, codes = points.numbers, points.codes
+    put_vector(numbers, 0, j, point.p)
+    put_vector(numbers, 3, j, point.n)
+    put_vector(numbers, 6, j, point.ns)
+    numbers[9 * BLOCK + j] = point.error
+    codes[j], codes[BLOCK + j] = point.material, point.light

@@ -23,7 +23,7 @@ from reference_rt.integrators.direct import Direct as Direct
 from reference_rt.integrators.path import Path as Path
 from reference_rt.integrators.path import Scratch
 from reference_rt.integrators.ray_cast import RayCast as RayCast
-from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.integrators.scene_tables import KernelScene
 from reference_rt.integrators.whitted import Whitted as Whitted
 from reference_rt.integrators.whitted import WhittedSetup as WhittedSetup
 from reference_rt.jit.kernel import by_class, kernel
@@ -56,7 +56,7 @@ def _radiances_of(setup: type) -> Any:
 
     @kernel
     def one_by_one(
-        setup: Any, scene: SceneTables, samplers: Samplers, n: int, scratch: Scratch
+        setup: Any, scene: KernelScene, samplers: Samplers, n: int, scratch: Scratch
     ) -> None:
         for j in range(n):
             ray, sampler = ray_of(scratch.rays, j), sampler_of(samplers, j)

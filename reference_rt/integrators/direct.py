@@ -13,7 +13,8 @@ from pydantic import Field, model_validator
 
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
-from reference_rt.accel.block_query import closest_hits, hit_of
+from reference_rt import sampling
+from reference_rt.accel.block_query import closest_hits
 from reference_rt.core.model import Description, Examples
 from reference_rt.core.ray import (
     BLOCK,
@@ -21,14 +22,16 @@ from reference_rt.core.ray import (
     HIT_INTEGERS,
     RAY_FLOATS,
     HitBlock,
+    Ray,
     RayBlock,
     add_vector,
+    hit_of,
     put_ray,
     put_vector,
     ray_of,
 )
-from reference_rt.core.vec3 import Vec3, is_black
-from reference_rt.integrators.direct_light import pass_lamps, power_heuristic
+from reference_rt.core.vec3 import Vec3, is_black, to_local, to_world
+from reference_rt.integrators.direct_light import light_selection_normal, pass_lamps, power_heuristic
 from reference_rt.integrators.path import (
     LIGHT_SAMPLING,
     UNLIMITED,
@@ -37,23 +40,23 @@ from reference_rt.integrators.path import (
     PathSetup,
     Scratch,
     State,
+    Step,
     add_unoccluded,
     connect,
     environment_emission,
+    go_on,
     hit_emission,
     mis_weights,
-    next_event_estimation,
     prepare,
     put_state,
-    scatter,
     state_of,
 )
-from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
+from reference_rt.integrators.scene_tables import KernelScene, surface
 from reference_rt.integrators.shading import shade, shade_point
 from reference_rt.jit.kernel import ByClass, kernel, local_floats, local_integers
-from reference_rt.lights import Pick
-from reference_rt.materials import Shading
-from reference_rt.sampling import Sample, Samplers, sampler_of, split_sample
+from reference_rt.lights import LightSample, Pick, background_of
+from reference_rt.materials import BsdfSample, Scattered, Shading
+from reference_rt.sampling import Sample, Samplers, draw_pair, sampler_of, split_sample
 from reference_rt.sampling.blocks import BlockSample
 from reference_rt.sampling.grid import GridSample
 from reference_rt.sampling.independent import IndependentSample
@@ -141,7 +144,7 @@ class Waiting(NamedTuple):
 
 @kernel
 def radiances(
-    direct: DirectSetup, scene: SceneTables, samplers: Samplers, n: int, scratch: Scratch
+    direct: DirectSetup, scene: KernelScene, samplers: Samplers, n: int, scratch: Scratch
 ) -> None:
     """Unbiased estimates of the radiance along the first n of `scratch.rays`, by paths of at most
     two edges, into `scratch.totals`.
@@ -154,13 +157,15 @@ def radiances(
         rays=RayBlock(local_floats(RAY_FLOATS)),
         totals=scratch.totals,
         shadows=scratch.shadows,
-        lights=scratch.lights,
-        lit=scratch.lit,
+        arriving=scratch.arriving,
+        of=scratch.of,
         hits=HitBlock(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS)),
         states=scratch.states,
         samples=scratch.samples,
         kept=local_floats(any_material.scratch_floats(scene.materials)),
-        sky=scratch.sky,
+        points=scratch.points,
+        lit=scratch.lit,
+        scattered=scratch.scattered,
     )
     prepare(queue)
     rays, hits, waiting = scratch.rays, scratch.hits, Waiting(0, 0)
@@ -170,7 +175,7 @@ def radiances(
     for j in range(n):
         put_vector(scratch.totals, 0, j, Vec3(0.0, 0.0, 0.0))
         ray = ray_of(rays, j)
-        hit = hit_of(scene.geometry, ray, hits, j)
+        hit = hit_of(hits, j)
         if hit.kind < 0:
             if not direct.hides_lamps:
                 put_vector(scratch.totals, 0, j, any_light.background(scene.lights, ray.d))
@@ -200,7 +205,7 @@ def _group(n: int) -> int:
 @kernel
 def _enqueue(
     direct: DirectSetup,
-    scene: SceneTables,
+    scene: KernelScene,
     connection: LightConnection,
     j: int,
     n: int,
@@ -216,16 +221,81 @@ def _enqueue(
         add_unoccluded(scene, queue, n)
         n = 0
     put_ray(queue.shadows, n, connection.shadow)
-    put_vector(queue.lights, 0, n, connection.light)
-    queue.lit[n] = j
+    put_vector(queue.arriving, 0, n, connection.light)
+    queue.of[n] = j
     return n + 1
+
+
+@kernel
+def _connected(
+    direct: DirectSetup,
+    scene: KernelScene,
+    state: State,
+    shading: Shading,
+    light: LightSample,
+    picked: Pick,
+) -> LightConnection:
+    """What a sample of a light adds, if nothing is between."""
+    scattered = Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
+    if light.pdf > 0.0:
+        wi = to_local(shading.frame, light.wi)
+        scattered = any_material.eval_pdf(scene.materials, shading, wi)
+    return connect(direct, state, shading.point, light, picked, scattered)
+
+
+@kernel
+def _light_sample(
+    direct: DirectSetup,
+    scene: KernelScene,
+    state: State,
+    shading: Shading,
+    sampler: Sample,
+    group: int,
+) -> LightConnection:
+    """Direct light of one randomly selected light.  Random numbers that decide nothing are not
+    drawn."""
+    point, dimension = shading.point, sampling.PER_BOUNCE * group
+    nothing = LightConnection(Vec3(0.0, 0.0, 0.0), Ray(point.p, point.n, 0.0))
+    count, u_pick = any_light.count(scene.lights), 0.5
+    if count == 0 or not any_material.is_smooth(scene.materials, point.material):
+        return nothing
+    if count > 1:
+        u_pick, _ = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
+    picked = any_light.pick(scene.lights, point.p, light_selection_normal(scene, point), u_pick)
+    if picked.probability == 0.0:
+        return nothing
+    u0, u1 = draw_pair(sampler, dimension + sampling.LIGHT_POINT)
+    light = any_light.sample_one(
+        scene.lights, picked.light, scene.shapes, scene.textures, point.p, u0, u1
+    )
+    return _connected(direct, scene, state, shading, light, picked)
+
+
+@kernel
+def _scattered(
+    direct: DirectSetup,
+    scene: KernelScene,
+    state: State,
+    shading: Shading,
+    sampler: Sample,
+    group: int,
+) -> Step:
+    """A direction that the material has drawn."""
+    dimension, u_lobe = sampling.PER_BOUNCE * group, 0.5
+    if any_material.uses_u_lobe(scene.materials, shading.point.material):
+        _, u_lobe = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
+    u0, u1 = draw_pair(sampler, dimension + sampling.BSDF_DIRECTION)
+    drawn = any_material.sample(scene.materials, shading, u_lobe, u0, u1)
+    wi = to_world(shading.frame, drawn.wi)
+    drawn = BsdfSample(wi, drawn.weight, drawn.pdf, drawn.eta, drawn.is_delta)
+    return go_on(direct, scene, state, shading.point, drawn, sampler, group)
 
 
 @kernel
 def _of_samples(
     sampler: Sample,
     direct: DirectSetup,
-    scene: SceneTables,
+    scene: KernelScene,
     shading: Shading,
     j: int,
     waiting: Waiting,
@@ -237,19 +307,19 @@ def _of_samples(
     state, group = _part(n), _group(n)
     for k in range(n):
         part = split_sample(sampler, n, k)
-        connection = next_event_estimation(direct, scene, state, shading, part, group, None)
+        connection = _light_sample(direct, scene, state, shading, part, group)
         shadows = _enqueue(direct, scene, connection, j, shadows, queue)
     n = direct.bsdf_samples
     state, group = _part(n), _group(n)
     for k in range(n):
-        step = scatter(direct, scene, state, shading, split_sample(sampler, n, k), group)
+        step = _scattered(direct, scene, state, shading, split_sample(sampler, n, k), group)
         if not step.goes_on:
             continue
         if scattered == BLOCK:
             _trace(direct, scene, Waiting(shadows, scattered), queue)
             shadows, scattered = 0, 0
         put_ray(queue.rays, scattered, step.ray)
-        put_state(scene, queue, scattered, j, step.state)
+        put_state(queue, scattered, j, step.state)
         scattered += 1
     return Waiting(shadows, scattered)
 
@@ -258,7 +328,7 @@ def _of_samples(
 def _of_all_lights(
     sampler: GridSample,
     direct: DirectSetup,
-    scene: SceneTables,
+    scene: KernelScene,
     shading: Shading,
     j: int,
     waiting: Waiting,
@@ -269,10 +339,10 @@ def _of_all_lights(
         return waiting
     if not any_material.is_smooth(scene.materials, shading.point.material):
         return waiting
-    shadows, shapes, p = waiting.shadows, shapes_of(scene), shading.point.p
+    shadows, shapes, p = waiting.shadows, scene.shapes, shading.point.p
     for k in range(any_light.count(scene.lights)):
         light = any_light.sample_one(scene.lights, k, shapes, scene.textures, p, 0.5, 0.5)
-        connection = connect(direct, scene, _part(1), shading, light, Pick(k, 1.0))
+        connection = _connected(direct, scene, _part(1), shading, light, Pick(k, 1.0))
         shadows = _enqueue(direct, scene, connection, j, shadows, queue)
     return Waiting(shadows, waiting.scattered)
 
@@ -285,18 +355,19 @@ _scatter_light = _choice.function
 
 
 @kernel
-def _trace(direct: DirectSetup, scene: SceneTables, waiting: Waiting, queue: Scratch) -> None:
+def _trace(direct: DirectSetup, scene: KernelScene, waiting: Waiting, queue: Scratch) -> None:
     """Add the light of all shadow rays that wait, then the emission that scattered rays meet."""
     add_unoccluded(scene, queue, waiting.shadows)
     rays, hits = queue.rays, queue.hits
     closest_hits(scene.geometry, rays, hits, waiting.scattered)
     for k in range(waiting.scattered):
-        state, ray, j = state_of(scene, queue, k), ray_of(rays, k), queue.samples[k]
-        hit = hit_of(scene.geometry, ray, hits, k)
+        state, ray, j = state_of(queue, k), ray_of(rays, k), queue.samples[k]
+        hit = hit_of(hits, k)
         if hit.kind < 0:
-            add_vector(queue.totals, 0, j, environment_emission(direct, scene, state, ray, None))
+            background = background_of(scene.lights, ray.d)
+            add_vector(queue.totals, 0, j, environment_emission(direct, scene, state, background))
             continue
         point = surface(scene, ray, hit)
-        if any_light.is_area(scene.lights, point):
-            shading = shade_point(scene, ray, hit, point, queue.kept)
-            add_vector(queue.totals, 0, j, hit_emission(direct, scene, state, ray, shading))
+        if any_light.is_area(point):
+            at = shade_point(scene, ray, hit, point, queue.kept).at
+            add_vector(queue.totals, 0, j, hit_emission(direct, scene, state, ray, point, at))

@@ -4,13 +4,23 @@ from typing import NamedTuple
 
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
-from reference_rt.accel.block_query import closest_hits, hit_of
+from reference_rt.accel.block_query import closest_hits
 from reference_rt.accel.geometry import occluded
-from reference_rt.core.ray import Hit, HitBlock, Ray, RayBlock, put_ray, ray_from, ray_of
+from reference_rt.core.ray import (
+    Hit,
+    HitBlock,
+    Ray,
+    RayBlock,
+    SurfacePoint,
+    hit_of,
+    put_ray,
+    ray_from,
+    ray_of,
+)
 from reference_rt.core.vec3 import Vec3, is_black, to_local
-from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
+from reference_rt.integrators.scene_tables import KernelScene, surface
 from reference_rt.jit.kernel import kernel
-from reference_rt.lights import ENVIRONMENT, LightSample, LightSampler, shadow_ray
+from reference_rt.lights import ENVIRONMENT, LightSample, shadow_ray
 from reference_rt.materials import Shading
 
 # ---- lamps that are not seen directly: camera rays go on behind them -----------------------------
@@ -24,18 +34,18 @@ class Onward(NamedTuple):
 
 
 @kernel
-def onward(scene: SceneTables, ray: Ray, hit: Hit) -> Onward:
+def onward(scene: KernelScene, ray: Ray, hit: Hit) -> Onward:
     if hit.kind < 0:
         return Onward(False, ray)
     point = surface(scene, ray, hit)
-    if not any_light.is_area(scene.lights, point):
+    if not any_light.is_area(point):
         return Onward(False, ray)
     rest = ray_from(point, ray.d)
     return Onward(True, Ray(rest.o, rest.d, ray.t_max - hit.t))
 
 
 @kernel
-def pass_lamps(scene: SceneTables, rays: RayBlock, hits: HitBlock, n: int) -> None:
+def pass_lamps(scene: KernelScene, rays: RayBlock, hits: HitBlock, n: int) -> None:
     """Replace the first n rays of a block by the rest of each behind the area lights that it meets
     before any other surface."""
     is_going = True
@@ -44,7 +54,7 @@ def pass_lamps(scene: SceneTables, rays: RayBlock, hits: HitBlock, n: int) -> No
         is_going = False
         for j in range(n):
             ray = ray_of(rays, j)
-            going = onward(scene, ray, hit_of(scene.geometry, ray, hits, j))
+            going = onward(scene, ray, hit_of(hits, j))
             if going.is_lamp:
                 put_ray(rays, j, going.ray)
                 is_going = True
@@ -64,15 +74,15 @@ class Direct(NamedTuple):
 
 
 @kernel
-def direct(scene: SceneTables, shading: Shading, k: int, u0: float, u1: float) -> Direct:
+def direct(scene: KernelScene, shading: Shading, k: int, u0: float, u1: float) -> Direct:
     """A sample of light number k at a surface, tested for visibility."""
-    shapes, p = shapes_of(scene), shading.point.p
+    shapes, p = scene.shapes, shading.point.p
     light = any_light.sample_one(scene.lights, k, shapes, scene.textures, p, u0, u1)
     return direct_from(scene, shading, light)
 
 
 @kernel
-def direct_from(scene: SceneTables, shading: Shading, light: LightSample) -> Direct:
+def direct_from(scene: KernelScene, shading: Shading, light: LightSample) -> Direct:
     """A light sample at a surface, tested for visibility."""
     found = unshadowed(scene, shading, light)
     black = Vec3(0.0, 0.0, 0.0)
@@ -85,7 +95,7 @@ def direct_from(scene: SceneTables, shading: Shading, light: LightSample) -> Dir
 
 
 @kernel
-def unshadowed(scene: SceneTables, shading: Shading, light: LightSample) -> Direct:
+def unshadowed(scene: KernelScene, shading: Shading, light: LightSample) -> Direct:
     """A light sample at a surface, without the visibility test."""
     if light.pdf == 0.0:
         black = Vec3(0.0, 0.0, 0.0)
@@ -97,18 +107,12 @@ def unshadowed(scene: SceneTables, shading: Shading, light: LightSample) -> Dire
 
 @kernel
 def fixed_lights(
-    scene: SceneTables,
-    choice: LightSampler | None,
-    shading: Shading,
-    u0: float,
-    u1: float,
+    scene: KernelScene, shading: Shading, u0: float, u1: float
 ) -> Vec3:
     """Direct light without random numbers: of every point, spot and directional light, and of the
     point (u0, u1) of every area light."""
-    total = Vec3(0.0, 0.0, 0.0)
-    if choice is None:
-        return total
-    shapes, p = shapes_of(scene), shading.point.p
+    total, choice = Vec3(0.0, 0.0, 0.0), scene.lights.choice
+    shapes, p = scene.shapes, shading.point.p
     for k in range(len(choice.kind)):
         if choice.kind[k] != ENVIRONMENT and choice.probability[k] > 0.0:
             light = any_light.sample_fixed(scene.lights, k, shapes, scene.textures, p, u0, u1)
@@ -128,8 +132,8 @@ def power_heuristic(pdf: float, other: float) -> float:
 
 
 @kernel
-def light_selection_normal(scene: SceneTables, shading: Shading) -> Vec3:
+def light_selection_normal(scene: KernelScene, point: SurfacePoint) -> Vec3:
     """The shading normal for light selection; 0 if the material takes light from both sides."""
-    if any_material.takes_light_from_behind(scene.materials, shading.point.material):
+    if any_material.takes_light_from_behind(scene.materials, point.material):
         return Vec3(0.0, 0.0, 0.0)
-    return shading.frame.n
+    return point.ns

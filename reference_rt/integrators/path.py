@@ -9,15 +9,19 @@ direction at each surface.  Its throughput is the product of f |cos| / pdf along
 of the path takes three steps:
 
 1. `environment_emission` or `hit_emission`: throughput times L_e of what the ray has hit.
-2. `next_event_estimation`: throughput f |cos| L_e / pdf of one sampled point on a light, if its
-   shadow ray is not occluded.
-3. `scatter`: the BSDF samples the next direction; Russian roulette may end the path.
+2. `connect`: throughput f |cos| L_e / pdf of one sampled point on a light, if its shadow ray is not
+   occluded.
+3. `go_on`: along the next direction, which the BSDF samples; Russian roulette may end the path.
 
 Step 2 and the next edge's step 1 estimate the same direct light.  `mis_weights` weight them so
 that it is counted once (multiple importance sampling, Veach 1997).
 
-`_edge` takes these steps.  `radiances` does so for a block of paths, edge by edge, so that the rays
-of all paths are traced together.
+`radiances` traces a block of paths, edge by edge, and each edge in stages (Laine, Karras & Aila
+2013, "Megakernels Considered Harmful"): of all paths the hits, then the surface points, the light
+samples, what the materials scatter.  A stage is one kernel for each type of shape, light or
+material, which is called for the block, so that it is compiled once for all scenes, and costs a
+call for 64 paths.  What passes from stage to stage is in `Scratch`.  simple_path.py has the same as
+one loop.
 """
 
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
@@ -27,37 +31,60 @@ from pydantic import Field
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt import sampling
-from reference_rt.accel.block_query import any_hits, closest_hits, hit_of
+from reference_rt.accel.block_query import any_hits, closest_hits
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.model import Description, Examples
 from reference_rt.core.ray import (
     BLOCK,
     RAY_FLOATS,
-    Hit,
     HitBlock,
+    PointBlock,
     Ray,
     RayBlock,
+    SurfacePoint,
     add_vector,
+    hit_of,
+    point_of,
     put_ray,
     put_vector,
     ray_from,
     ray_of,
     vector_of,
 )
-from reference_rt.core.vec3 import Vec3, is_black, max_component, to_world
+from reference_rt.core.vec3 import Vec3, is_black, max_component, to_local
 from reference_rt.integrators.direct_light import (
     light_selection_normal,
     pass_lamps,
     power_heuristic,
-    unshadowed,
 )
-from reference_rt.integrators.look_ahead import look_ahead
-from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
-from reference_rt.integrators.shading import shade_point
+from reference_rt.integrators.scene_tables import KernelScene, surfaces
+from reference_rt.integrators.shading import frame_at, place, shade_point
 from reference_rt.jit.kernel import ByClass, kernel
-from reference_rt.lights import Ahead, LightSample, Pick, shadow_ray
-from reference_rt.materials import Shading
+from reference_rt.lights import (
+    Background,
+    LightBlock,
+    LightSample,
+    Pick,
+    ask_for_light,
+    background_in,
+    direction_of,
+    light_of,
+    picked_in,
+    shadow_ray,
+)
+from reference_rt.materials import (
+    Asked,
+    BsdfSample,
+    ScatterBlock,
+    Scattered,
+    drawn_in,
+    lit_in,
+    put_asked,
+    put_scattered,
+)
+from reference_rt.materials.textured import evaluate_textures
 from reference_rt.sampling import Sample, Samplers, draw_pair, sampler_of
+from reference_rt.textures import At
 
 STATE_FLOATS = 11 * BLOCK
 VECTOR_FLOATS = 3 * BLOCK
@@ -67,23 +94,25 @@ class Scratch(NamedTuple):
     """rays: input, the camera rays; integrators overwrite them;  totals (VECTOR_FLOATS,): output,
     the radiance along each camera ray.
 
-    Buffers of integrators: shadows, the shadow rays; for each of them lights (VECTOR_FLOATS,), what
-    it adds if it is not occluded, and lit (BLOCK,), the sample that it belongs to;  hits;  states
-    (STATE_FLOATS,) of the active paths and samples (BLOCK,), the sample of each;  kept
-    (`materials.scratch_floats`,), the buffer of `shade`;  sky (AHEAD_FLOATS,): light of an
-    environment map, see `look_ahead`; of length 0 without one.
+    Buffers of integrators: shadows, the shadow rays; for each of them arriving (VECTOR_FLOATS,),
+    what it adds if it is not occluded, and of (BLOCK,), the sample that it belongs to;  hits;
+    states (STATE_FLOATS,) of the active paths and samples (BLOCK,), the sample of each;  kept
+    (`materials.scratch_floats`,), the buffer of `shade`;  points, lit, scattered: of the active
+    paths the surface points, light samples, and what the materials scatter.
     """
 
     rays: RayBlock
     totals: FloatArray
     shadows: RayBlock
-    lights: FloatArray
-    lit: IntArray
+    arriving: FloatArray
+    of: IntArray
     hits: HitBlock
     states: FloatArray
     samples: IntArray
     kept: FloatArray
-    sky: FloatArray
+    points: PointBlock
+    lit: LightBlock
+    scattered: ScatterBlock
 
 
 @kernel
@@ -93,8 +122,6 @@ def prepare(scratch: Scratch) -> None:
     for k in range(RAY_FLOATS):
         scratch.rays.numbers[k] = 1.0
         scratch.shadows.numbers[k] = 1.0
-    for k in range(len(scratch.sky)):
-        scratch.sky[k] = 0.0
 
 
 class State(NamedTuple):
@@ -120,29 +147,23 @@ def start(ray: Ray) -> State:
 
 
 @kernel
-def state_of(scene: SceneTables, scratch: Scratch, j: int) -> State:
+def state_of(scratch: Scratch, j: int) -> State:
     """The state of active path j."""
-    numbers, nowhere = scratch.states, Vec3(0.0, 0.0, 0.0)
-    eta = numbers[4 * BLOCK + j] if any_material.any_transmits(scene.materials) else 1.0
-    previous = vector_of(numbers, 5, j) if any_light.depends_on_point(scene.lights) else nowhere
-    normal = vector_of(numbers, 8, j) if any_light.depends_on_normal(scene.lights) else nowhere
-    return State(vector_of(numbers, 0, j), eta, numbers[3 * BLOCK + j], previous, normal)
+    numbers = scratch.states
+    bsdf_pdf, eta = numbers[3 * BLOCK + j], numbers[4 * BLOCK + j]
+    previous, normal = vector_of(numbers, 5, j), vector_of(numbers, 8, j)
+    return State(vector_of(numbers, 0, j), eta, bsdf_pdf, previous, normal)
 
 
 @kernel
-def put_state(scene: SceneTables, scratch: Scratch, j: int, k: int, state: State) -> None:
-    """Store the state of sample k's path as active path j.  Fields that this scene's kernels never
-    read are not stored (measured: storing all takes 3 % longer for spheres under a sky)."""
+def put_state(scratch: Scratch, j: int, k: int, state: State) -> None:
+    """Store the state of sample k's path as active path j."""
     scratch.samples[j] = k
     numbers = scratch.states
     put_vector(numbers, 0, j, state.throughput)
-    numbers[3 * BLOCK + j] = state.bsdf_pdf
-    if any_material.any_transmits(scene.materials):
-        numbers[4 * BLOCK + j] = state.eta
-    if any_light.depends_on_point(scene.lights):
-        put_vector(numbers, 5, j, state.previous)
-    if any_light.depends_on_normal(scene.lights):
-        put_vector(numbers, 8, j, state.normal)
+    numbers[3 * BLOCK + j], numbers[4 * BLOCK + j] = state.bsdf_pdf, state.eta
+    put_vector(numbers, 5, j, state.previous)
+    put_vector(numbers, 8, j, state.normal)
 
 
 UNLIMITED = 2**31
@@ -156,7 +177,7 @@ mean does not depend on the cap.
 """
 
 LIGHT_SAMPLING, BSDF_SAMPLING, _BOTH = range(3)
-_STRATEGIES = {"lights": LIGHT_SAMPLING, "bsdf": BSDF_SAMPLING}
+_STRATEGIES = {"lights": LIGHT_SAMPLING, "bsdf": BSDF_SAMPLING, "both": _BOTH}
 
 
 class Path(Description):
@@ -192,23 +213,18 @@ class Path(Description):
 
     def setup(self) -> "PathSetup":
         limit = UNLIMITED if self.max_depth is None else min(self.max_depth, UNLIMITED)
-        strategy = _STRATEGIES.get(self.sampling)
+        strategy = _STRATEGIES[self.sampling]
         return PathSetup(limit, self.rr_depth, strategy, self.hide_emitters)
 
 
 class PathSetup(NamedTuple):
-    """strategy: the only sampling strategy for direct light, `LIGHT_SAMPLING` or `BSDF_SAMPLING`;
-    None for both with multiple importance sampling, which compiles to no branch;  `_BOTH` for both
-    in kernels that do not depend on it;  hides_lamps: see `Path.hide_emitters`."""
+    """strategy: the only sampling strategy for direct light, `LIGHT_SAMPLING` or `BSDF_SAMPLING`,
+    or both with multiple importance sampling;  hides_lamps: see `Path.hide_emitters`."""
 
     max_depth: int
     rr_depth: int
-    strategy: int | None
+    strategy: int
     hides_lamps: bool
-
-    def linked(self) -> "PathSetup":
-        """The same for linked kernels: of one type for all strategies."""
-        return self._replace(strategy=_BOTH) if self.strategy is None else self
 
 
 class Step(NamedTuple):
@@ -227,52 +243,9 @@ class LightConnection(NamedTuple):
     shadow: Ray
 
 
-class Edge(NamedTuple):
-    """An edge of a path.  emitted: what it adds to the path's radiance by emission of what it has
-    hit;  connection: by next-event estimation there;  step: how the path goes on."""
-
-    emitted: Vec3
-    connection: LightConnection
-    step: Step
-
-
-@kernel
-def _edge(
-    path: PathSetup,
-    scene: SceneTables,
-    state: State,
-    ray: Ray,
-    hit: Hit,
-    sampler: Sample,
-    depth: int,
-    kept: FloatArray,
-    ahead: Ahead | None,
-) -> Edge:
-    """Edge number `depth`, along `ray`, which has hit `hit`.  kept: the buffer of `shade`;  ahead:
-    light of an environment map that was computed ahead."""
-    nothing = Vec3(0.0, 0.0, 0.0)
-    unlit, ended = LightConnection(nothing, ray), Step(False, ray, state)
-    if hit.kind < 0:
-        if depth == 0 and path.hides_lamps:
-            return Edge(nothing, unlit, ended)
-        return Edge(environment_emission(path, scene, state, ray, ahead), unlit, ended)
-    point = surface(scene, ray, hit)
-    is_last, emits = depth + 1 >= path.max_depth, any_light.is_area(scene.lights, point)
-    if is_last and not emits:
-        return Edge(nothing, unlit, ended)
-    shading = shade_point(scene, ray, hit, point, kept)
-    emitted = nothing
-    if emits:
-        emitted = hit_emission(path, scene, state, ray, shading)
-    if is_last:
-        return Edge(emitted, unlit, ended)
-    connection = next_event_estimation(path, scene, state, shading, sampler, depth, ahead)
-    return Edge(emitted, connection, scatter(path, scene, state, shading, sampler, depth))
-
-
 @kernel
 def radiances(
-    path: PathSetup, scene: SceneTables, samplers: Samplers, n: int, scratch: Scratch
+    path: PathSetup, scene: KernelScene, samplers: Samplers, n: int, scratch: Scratch
 ) -> None:
     """Unbiased estimates of the radiance that arrives at the origins of the first n of
     `scratch.rays` from their directions, one path each, into `scratch.totals`.
@@ -280,87 +253,178 @@ def radiances(
     Ended paths are removed: number j of the active paths belongs to sample `scratch.samples[j]`.
     The other paths of a block do not change a path's bits.
     """
-    rays, shadows, hits, lights = scratch.rays, scratch.shadows, scratch.hits, scene.lights
-    sky = any_light.map_of(lights)
+    rays, hits, points, lit = scratch.rays, scratch.hits, scratch.points, scratch.lit
     if path.hides_lamps:
         pass_lamps(scene, rays, hits, n)
     for j in range(n):
-        put_state(scene, scratch, j, j, start(ray_of(rays, j)))
+        put_state(scratch, j, j, start(ray_of(rays, j)))
         put_vector(scratch.totals, 0, j, Vec3(0.0, 0.0, 0.0))
     for depth in range(path.max_depth):
         if n == 0:
             break
         closest_hits(scene.geometry, rays, hits, n)
-        is_last, samples = depth + 1 >= path.max_depth, scratch.samples
-        look_ahead(sky, samplers, samples, depth, is_last, rays, hits, n, scratch.sky)
-        alive, lit = 0, 0
-        for j in range(n):
-            k = scratch.samples[j]
-            state, ray = state_of(scene, scratch, j), ray_of(rays, j)
-            hit, sampler = hit_of(scene.geometry, ray, hits, j), sampler_of(samplers, k)
-            ahead = any_light.ahead_of(lights, scratch.sky, j)
-            edge = _edge(path, scene, state, ray, hit, sampler, depth, scratch.kept, ahead)
-            add_vector(scratch.totals, 0, k, edge.emitted)
-            if not is_black(edge.connection.light):
-                put_ray(shadows, lit, edge.connection.shadow)
-                put_vector(scratch.lights, 0, lit, edge.connection.light)
-                scratch.lit[lit] = k
-                lit += 1
-            if edge.step.goes_on:
-                put_ray(rays, alive, edge.step.ray)
-                put_state(scene, scratch, alive, k, edge.step.state)
-                alive += 1
-        add_unoccluded(scene, scratch, lit)
-        n = alive
+        surfaces(scene, rays, hits, n, points)
+        any_light.backgrounds(scene.lights, rays, hits, n, lit)
+        _emission(path, scene, depth, n, scratch)
+        if depth + 1 >= path.max_depth:
+            break
+        _pick_lights(scene, samplers, depth, n, scratch)
+        any_light.samples(scene.lights, lit, scene.shapes, scene.textures, points, n)
+        _scatter(scene, samplers, depth, n, scratch)
+        n = _next_edges(path, scene, samplers, depth, n, scratch)
 
 
 @kernel
-def add_unoccluded(scene: SceneTables, scratch: Scratch, n: int) -> None:
+def _emission(path: PathSetup, scene: KernelScene, depth: int, n: int, scratch: Scratch) -> None:
+    """Adds the emission that the rays of the active paths have met."""
+    rays, hits, totals = scratch.rays, scratch.hits, scratch.totals
+    for j in range(n):
+        if hits.codes[j] < 0:
+            if depth > 0 or not path.hides_lamps:
+                state, background = state_of(scratch, j), background_in(scratch.lit, j)
+                emitted = environment_emission(path, scene, state, background)
+                add_vector(totals, 0, scratch.samples[j], emitted)
+        elif scratch.points.codes[BLOCK + j] >= 0:
+            ray, point = ray_of(rays, j), point_of(scratch.points, j)
+            looked = place(scene, point.material, ray, hit_of(hits, j))
+            textured = scene.materials.textured
+            at = evaluate_textures(textured, point.material, looked, scratch.kept)
+            emitted = hit_emission(path, scene, state_of(scratch, j), ray, point, at)
+            add_vector(totals, 0, scratch.samples[j], emitted)
+
+
+@kernel
+def _pick_lights(
+    scene: KernelScene, samplers: Samplers, depth: int, n: int, scratch: Scratch
+) -> None:
+    """Picks a light for each surface.  Random numbers that decide nothing are not drawn."""
+    count, dimension = any_light.count(scene.lights), sampling.PER_BOUNCE * depth
+    for j in range(n):
+        scratch.lit.codes[j] = -1
+        if scratch.hits.codes[j] < 0 or count == 0:
+            continue
+        point, u_pick = point_of(scratch.points, j), 0.5
+        if not any_material.is_smooth(scene.materials, point.material):
+            continue
+        sampler = sampler_of(samplers, scratch.samples[j])
+        if count > 1:
+            u_pick, _ = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
+        normal = light_selection_normal(scene, point)
+        picked = any_light.pick(scene.lights, point.p, normal, u_pick)
+        if picked.probability > 0.0:
+            u0, u1 = draw_pair(sampler, dimension + sampling.LIGHT_POINT)
+            ask_for_light(scene.lights, scratch.lit, j, picked, u0, u1)
+
+
+@kernel
+def _scatter(
+    scene: KernelScene, samplers: Samplers, depth: int, n: int, scratch: Scratch
+) -> None:
+    """What the materials scatter: the light samples, and the paths themselves."""
+    materials, rays, hits, points = scene.materials, scratch.rays, scratch.hits, scratch.points
+    block, dimension = scratch.scattered, sampling.PER_BOUNCE * depth
+    is_flattened = any_material.are_flattened(materials)
+    for j in range(n):
+        block.codes[j] = -1
+        if hits.codes[j] < 0:
+            continue
+        ray, point, hit = ray_of(rays, j), point_of(points, j), hit_of(hits, j)
+        m, sampler, u_lobe = point.material, sampler_of(samplers, scratch.samples[j]), 0.5
+        if not (is_flattened or any_material.scatters(materials, m)):
+            continue
+        if any_material.uses_u_lobe(materials, m):
+            _, u_lobe = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
+        u0, u1 = draw_pair(sampler, dimension + sampling.BSDF_DIRECTION)
+        wi = direction_of(scratch.lit, j)
+        if is_flattened:
+            shading = shade_point(scene, ray, hit, point, scratch.kept)
+            sent = Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
+            if not is_black(wi):
+                sent = any_material.eval_pdf(materials, shading, to_local(shading.frame, wi))
+            drawn = any_material.sample(materials, shading, u_lobe, u0, u1)
+            block.codes[j] = 0
+            put_scattered(block, j, shading.frame, sent, drawn)
+        else:
+            frame, _ = frame_at(materials, scene.geometry, ray, hit, point)
+            at = place(scene, m, ray, hit)
+            asked = Asked(frame, wi, u_lobe, u0, u1, at.u, at.v, at.colour)
+            put_asked(block, j, materials.kind[m], materials.row[m], asked)
+    if not is_flattened:
+        any_material.scatter(materials, block, rays, points, scene.textures, scratch.kept, n)
+
+
+@kernel
+def _next_edges(
+    path: PathSetup, scene: KernelScene, samplers: Samplers, depth: int, n: int, scratch: Scratch
+) -> int:
+    """Adds the light samples that are not occluded, and starts the next edges; returns how many
+    paths are active then."""
+    alive, waiting = 0, 0
+    for j in range(n):
+        if scratch.scattered.codes[j] < 0:
+            continue
+        k, state, point = scratch.samples[j], state_of(scratch, j), point_of(scratch.points, j)
+        if scratch.lit.codes[j] >= 0:
+            light, picked = light_of(scratch.lit, j), picked_in(scratch.lit, j)
+            connection = connect(path, state, point, light, picked, lit_in(scratch.scattered, j))
+            if not is_black(connection.light):
+                put_ray(scratch.shadows, waiting, connection.shadow)
+                put_vector(scratch.arriving, 0, waiting, connection.light)
+                scratch.of[waiting] = k
+                waiting += 1
+        drawn, sampler = drawn_in(scratch.scattered, j), sampler_of(samplers, k)
+        step = go_on(path, scene, state, point, drawn, sampler, depth)
+        if step.goes_on:
+            put_ray(scratch.rays, alive, step.ray)
+            put_state(scratch, alive, k, step.state)
+            alive += 1
+    add_unoccluded(scene, scratch, waiting)
+    return alive
+
+
+@kernel
+def add_unoccluded(scene: KernelScene, scratch: Scratch, n: int) -> None:
     """Add the lights of the first n shadow rays that are not occluded."""
     any_hits(scene.geometry, scratch.shadows, scratch.hits, n)
     for j in range(n):
         if scratch.hits.codes[j] < 0:
-            add_vector(scratch.totals, 0, scratch.lit[j], vector_of(scratch.lights, 0, j))
+            add_vector(scratch.totals, 0, scratch.of[j], vector_of(scratch.arriving, 0, j))
 
 
 @kernel
 def environment_emission(
-    setup: Any, scene: SceneTables, state: State, ray: Ray, ahead: Ahead | None
+    setup: Any, scene: KernelScene, state: State, background: Background
 ) -> Vec3:
     """Emission of the environment along a ray that hits nothing: throughput L_e, MIS-weighted."""
-    lights, weight = scene.lights, 1.0
-    emitted = any_light.background_of(ahead, lights, ray.d)
+    weight = 1.0
     if state.bsdf_pdf > 0.0:
-        light_pdf = any_light.environment_pdf(ahead, lights, state.previous, state.normal, ray.d)
+        previous, normal = state.previous, state.normal
+        light_pdf = any_light.environment_density(
+            scene.lights, previous, normal, background.density
+        )
         weight = _mis_weight(setup, BSDF_SAMPLING, state.bsdf_pdf, light_pdf)
-    return state.throughput * emitted * weight
+    return state.throughput * background.radiance * weight
 
 
 @kernel
-def hit_emission(setup: Any, scene: SceneTables, state: State, ray: Ray, shading: Shading) -> Vec3:
+def hit_emission(
+    setup: Any, scene: KernelScene, state: State, ray: Ray, point: SurfacePoint, at: At
+) -> Vec3:
     """Emission of the area light that the ray has hit: throughput L_e, MIS-weighted."""
-    lights, point, weight = scene.lights, shading.point, 1.0
+    lights, weight = scene.lights, 1.0
     if state.bsdf_pdf > 0.0:
-        shapes = shapes_of(scene)
-        light_pdf = any_light.area_pdf(lights, shapes, state.previous, state.normal, point)
+        light_pdf = any_light.area_pdf(lights, scene.shapes, state.previous, state.normal, point)
         weight = _mis_weight(setup, BSDF_SAMPLING, state.bsdf_pdf, light_pdf)
-    return state.throughput * any_light.emitted(lights, point, shading.at, -ray.d) * weight
-
-
-@kernel
-def _weight_of(only: int | None, strategy: int, pdf: float, other: float) -> float:
-    """With the single strategy `only`, samples of the other count nothing, except where the single
-    one cannot draw them (other = 0)."""
-    if only is None:
-        return power_heuristic(pdf, other)
-    if only == _BOTH:
-        return power_heuristic(pdf, other)
-    return 1.0 if only == strategy or other == 0.0 else 0.0
+    return state.throughput * any_light.emitted(lights, point, at, -ray.d) * weight
 
 
 @kernel
 def _weight_of_path(path: PathSetup, strategy: int, pdf: float, other: float) -> float:
-    return _weight_of(path.strategy, strategy, pdf, other)
+    """With a single strategy, samples of the other count nothing, except where the single one
+    cannot draw them (other = 0)."""
+    if path.strategy == _BOTH:
+        return power_heuristic(pdf, other)
+    return 1.0 if path.strategy == strategy or other == 0.0 else 0.0
 
 
 mis_weights = ByClass("mis_weight")
@@ -372,82 +436,50 @@ _mis_weight = mis_weights.function
 
 
 @kernel
-def next_event_estimation(
-    setup: Any,
-    scene: SceneTables,
-    state: State,
-    shading: Shading,
-    sampler: Sample,
-    depth: int,
-    ahead: Ahead | None,
-) -> LightConnection:
-    """Direct light of one randomly selected light: throughput f |cos| L_e / pdf, MIS-weighted
-    against BSDF sampling.  Random numbers that decide nothing are not drawn."""
-    point, dimension = shading.point, sampling.PER_BOUNCE * depth
-    nothing = LightConnection(Vec3(0.0, 0.0, 0.0), Ray(point.p, point.n, 0.0))
-    count = any_light.count(scene.lights)
-    if count == 0 or not any_material.is_smooth(scene.materials, point.material):
-        return nothing
-    u_pick = 0.5
-    if count > 1:
-        u_pick, _ = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
-    picked = any_light.pick(scene.lights, point.p, light_selection_normal(scene, shading), u_pick)
-    if picked.probability == 0.0:
-        return nothing
-    u0, u1 = draw_pair(sampler, dimension + sampling.LIGHT_POINT)
-    shapes, textures = shapes_of(scene), scene.textures
-    light = any_light.sample_picked(
-        ahead, scene.lights, picked.light, shapes, textures, point.p, u0, u1
-    )
-    return connect(setup, scene, state, shading, light, picked)
-
-
-@kernel
 def connect(
     setup: Any,
-    scene: SceneTables,
     state: State,
-    shading: Shading,
+    point: SurfacePoint,
     light: LightSample,
     picked: Pick,
+    scattered: Scattered,
 ) -> LightConnection:
-    """What a sample of the light that was picked adds, if nothing is between."""
-    sample = unshadowed(scene, shading, light)
-    if is_black(sample.contribution):
-        return LightConnection(sample.contribution, Ray(shading.point.p, shading.point.n, 0.0))
-    pdf = light.pdf * picked.probability
-    weight = 1.0
+    """What a sample of the light that was picked adds, if nothing is between: throughput f |cos|
+    L_e / pdf, MIS-weighted against BSDF sampling.  scattered: what the surface scatters of it."""
+    contribution = scattered.value * light.radiance
+    if light.pdf == 0.0 or is_black(contribution):
+        return LightConnection(Vec3(0.0, 0.0, 0.0), Ray(point.p, point.n, 0.0))
+    pdf, weight = light.pdf * picked.probability, 1.0
     if not light.is_delta:
-        weight = _mis_weight(setup, LIGHT_SAMPLING, pdf, sample.bsdf_pdf)
-    arriving = sample.contribution * (weight / pdf)
-    return LightConnection(state.throughput * arriving, shadow_ray(shading.point, light))
+        weight = _mis_weight(setup, LIGHT_SAMPLING, pdf, scattered.density)
+    arriving = contribution * (weight / pdf)
+    return LightConnection(state.throughput * arriving, shadow_ray(point, light))
 
 
 @kernel
-def scatter(
-    setup: Any, scene: SceneTables, state: State, shading: Shading, sampler: Sample, depth: int
+def go_on(
+    setup: Any,
+    scene: KernelScene,
+    state: State,
+    point: SurfacePoint,
+    drawn: BsdfSample,
+    sampler: Sample,
+    depth: int,
 ) -> Step:
-    """Sample the BSDF at the surface that edge number `depth` has hit; apply Russian roulette."""
-    point, dimension = shading.point, sampling.PER_BOUNCE * depth
+    """The next edge of a path, in the direction, in the world, that the BSDF has drawn at the
+    surface that edge number `depth` has hit; Russian roulette may end it."""
     ended = Step(False, Ray(point.p, point.n, 0.0), state)
-    u_lobe = 0.5
-    if any_material.uses_u_lobe(scene.materials, point.material):
-        _, u_lobe = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
-    u0, u1 = draw_pair(sampler, dimension + sampling.BSDF_DIRECTION)
-    scattered = any_material.sample(scene.materials, shading, u_lobe, u0, u1)
-    if scattered.pdf == 0.0:
+    if drawn.pdf == 0.0:
         return ended
-    throughput = state.throughput * scattered.weight
-    eta = state.eta * scattered.eta
+    throughput, eta = state.throughput * drawn.weight, state.eta * drawn.eta
     if depth + 1 >= setup.rr_depth:
         # Radiance changes by 1 / eta² on entering a medium.  eta² undoes that: survival depends on
         # the power that is left.
         survival = min(max_component(throughput) * eta * eta, ROULETTE_CAP)
-        u_roulette, _ = draw_pair(sampler, dimension + sampling.ROULETTE)
+        u_roulette, _ = draw_pair(sampler, sampling.PER_BOUNCE * depth + sampling.ROULETTE)
         if not u_roulette < survival:  # also ends what is NaN
             return ended
         throughput = throughput * (1.0 / survival)
-    bsdf_pdf = 0.0 if scattered.is_delta else scattered.pdf
-    ray = ray_from(point, to_world(shading.frame, scattered.wi))
-    normal = light_selection_normal(scene, shading)
-    return Step(True, ray, State(throughput, eta, bsdf_pdf, point.p, normal))
+    bsdf_pdf = 0.0 if drawn.is_delta else drawn.pdf
+    normal = light_selection_normal(scene, point)
+    return Step(True, ray_from(point, drawn.wi), State(throughput, eta, bsdf_pdf, point.p, normal))

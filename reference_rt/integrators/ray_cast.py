@@ -7,7 +7,7 @@ from reference_rt.accel.geometry import closest_hit, colour, coordinates, owner
 from reference_rt.core.model import Description, Examples
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3, length
-from reference_rt.integrators.scene_tables import SceneTables, shapes_of, surface
+from reference_rt.integrators.scene_tables import KernelScene, surface
 from reference_rt.integrators.shading import texture_place
 from reference_rt.jit.kernel import kernel
 from reference_rt.textures import colour_at
@@ -48,7 +48,7 @@ class Cast(NamedTuple):
 
 
 @kernel
-def cast(scene: SceneTables, ray: Ray) -> Cast:
+def cast(scene: KernelScene, ray: Ray) -> Cast:
     """All layers of one ray."""
     nothing = Vec3(0.0, 0.0, 0.0)
     hit = closest_hit(scene.geometry, ray)
@@ -58,5 +58,5 @@ def cast(scene: SceneTables, ray: Ray) -> Cast:
     whose, where = owner(scene.geometry, hit), coordinates(scene.geometry, ray, hit)
     at = texture_place(scene.textures, scene.geometry, ray, hit)
     own = colour_at(scene.materials.shown, point.material, at)
-    shown = colour(shapes_of(scene), hit, own)
+    shown = colour(scene.shapes, hit, own)
     return Cast(shown, hit.t * length(ray.d), point.n, whose.shape, where.u, where.v)

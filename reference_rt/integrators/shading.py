@@ -4,7 +4,7 @@ from reference_rt.accel.geometry import Geometry, coordinates, tangents
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import Hit, Ray, SurfacePoint
 from reference_rt.core.vec3 import Frame, Vec3, frame_from_normal, to_local
-from reference_rt.integrators.scene_tables import SceneTables, surface
+from reference_rt.integrators.scene_tables import KernelScene, surface
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.links import is_absent
 from reference_rt.materials import Materials, Shading, is_oriented, prepare, uses_textures
@@ -17,7 +17,7 @@ _NO_COLOUR = Vec3(-1.0, -1.0, -1.0)
 
 
 @kernel
-def shade(scene: SceneTables, ray: Ray, hit: Hit, kept: FloatArray) -> Shading:
+def shade(scene: KernelScene, ray: Ray, hit: Hit, kept: FloatArray) -> Shading:
     """The BSDF's input at a hit (not a miss), seen along the ray.
 
     kept (`materials.scratch_floats`,): buffer for texture values and layers; the result refers to
@@ -28,10 +28,10 @@ def shade(scene: SceneTables, ray: Ray, hit: Hit, kept: FloatArray) -> Shading:
 
 @kernel
 def shade_point(
-    scene: SceneTables, ray: Ray, hit: Hit, point: SurfacePoint, kept: FloatArray
+    scene: KernelScene, ray: Ray, hit: Hit, point: SurfacePoint, kept: FloatArray
 ) -> Shading:
     """The same, where the `surface` of the hit is known."""
-    frame, local = _frame(scene.materials, scene.geometry, ray, hit, point)
+    frame, local = frame_at(scene.materials, scene.geometry, ray, hit, point)
     at = place(scene, point.material, ray, hit)
     looked = evaluate_textures(scene.materials.textured, point.material, at, kept)
     flat_leaves = kept[lookup_cache_size(scene.materials.textured) :]
@@ -41,7 +41,7 @@ def shade_point(
 
 
 @kernel
-def place(scene: SceneTables, m: int, ray: Ray, hit: Hit) -> At:
+def place(scene: KernelScene, m: int, ray: Ray, hit: Hit) -> At:
     """Texture coordinates at a hit for material m; any, if it has no textures."""
     if not uses_textures(scene.materials, m):
         return At(scene.textures, 0.0, 0.0, _NO_COLOUR)
@@ -51,8 +51,6 @@ def place(scene: SceneTables, m: int, ray: Ray, hit: Hit) -> At:
 @kernel
 def texture_place(textures: Textures | None, geometry: Geometry, ray: Ray, hit: Hit) -> At:
     """Texture coordinates at a hit; computed only if the scene has textures."""
-    if textures is None:
-        return At(textures, 0.0, 0.0, _NO_COLOUR)
     if is_absent(textures):
         return At(textures, 0.0, 0.0, _NO_COLOUR)
     found = coordinates(geometry, ray, hit)
@@ -60,14 +58,12 @@ def texture_place(textures: Textures | None, geometry: Geometry, ray: Ray, hit: 
 
 
 @kernel
-def _frame(
+def frame_at(
     materials: Materials, geometry: Geometry, ray: Ray, hit: Hit, point: SurfacePoint
 ) -> tuple[Frame, Tangents]:
     """The shading frame, and the tangents in it, which are 0 for materials that need none: on a
     floor under a brushed ball they took a twentieth of the time (measured)."""
     zero = Vec3(0.0, 0.0, 0.0)
-    if materials.oriented is None:
-        return frame_from_normal(point.ns), Tangents(zero, zero)
     if not is_oriented(materials, point.material):
         return frame_from_normal(point.ns), Tangents(zero, zero)
     world = tangents(geometry, ray, hit)

@@ -12,7 +12,7 @@ from reference_rt.core.ray import Ray, ray_from
 from reference_rt.core.vec3 import Vec3, max_component, to_local, to_world
 from reference_rt.integrators.direct_light import light_selection_normal, power_heuristic
 from reference_rt.integrators.path import ROULETTE_CAP, PathSetup
-from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.integrators.scene_tables import KernelScene
 from reference_rt.integrators.shading import shade
 from reference_rt.jit.kernel import kernel, local_floats
 from reference_rt.lights import shadow_ray
@@ -20,11 +20,11 @@ from reference_rt.sampling import Sample, draw_pair
 
 
 @kernel
-def radiance(path: PathSetup, scene: SceneTables, ray: Ray, sampler: Sample) -> Vec3:
+def radiance(path: PathSetup, scene: KernelScene, ray: Ray, sampler: Sample) -> Vec3:
     """An unbiased estimate of the radiance along a camera ray, with both samples of direct light
     (`Path.sampling`)."""
     materials, lights, textures = scene.materials, scene.lights, scene.textures
-    shapes, kept = scene.geometry.shapes, local_floats(any_material.scratch_floats(materials))
+    shapes, kept = scene.shapes, local_floats(any_material.scratch_floats(materials))
     light, throughput, eta = Vec3(0.0, 0.0, 0.0), Vec3(1.0, 1.0, 1.0), 1.0
     # The density with which the ray's direction was drawn, and the point and the normal from which
     # a light might have been; 0 where none could: for the camera's ray and for perfect mirrors.
@@ -37,12 +37,12 @@ def radiance(path: PathSetup, scene: SceneTables, ray: Ray, sampler: Sample) -> 
         if hit.kind < 0:
             weight = 1.0
             if bsdf_pdf > 0.0:
-                light_pdf = any_light.environment_pdf(None, lights, previous, normal, ray.d)
+                light_pdf = any_light.environment_pdf(lights, previous, normal, ray.d)
                 weight = power_heuristic(bsdf_pdf, light_pdf)
             return light + throughput * any_light.background(lights, ray.d) * weight
         shading = shade(scene, ray, hit, kept)
         point = shading.point
-        if any_light.is_area(lights, point):
+        if any_light.is_area(point):
             weight = 1.0
             if bsdf_pdf > 0.0:
                 light_pdf = any_light.area_pdf(lights, shapes, previous, normal, point)
@@ -51,7 +51,7 @@ def radiance(path: PathSetup, scene: SceneTables, ray: Ray, sampler: Sample) -> 
             light = light + throughput * emitted * weight
         if depth + 1 == path.max_depth:
             break
-        normal = light_selection_normal(scene, shading)
+        normal = light_selection_normal(scene, point)
 
         # Next event estimation: a point on one light, if nothing is between.
         u_light, u_lobe = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)

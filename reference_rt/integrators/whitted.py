@@ -17,7 +17,7 @@ from reference_rt.core.model import Description, Examples
 from reference_rt.core.ray import Ray, ray_from
 from reference_rt.core.vec3 import Vec3, max_component, to_world
 from reference_rt.integrators.direct_light import fixed_lights
-from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.integrators.scene_tables import KernelScene
 from reference_rt.integrators.shading import shade
 from reference_rt.jit.kernel import kernel, local_floats
 from reference_rt.sampling import Sample
@@ -68,7 +68,7 @@ def _vector(stack: FloatArray, k: int) -> Vec3:
 
 
 @kernel
-def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: Sample) -> Vec3:
+def radiance(whitted: WhittedSetup, scene: KernelScene, ray: Ray, sampler: Sample) -> Vec3:
     """The radiance along `ray`: a depth-first walk of the ray tree with an explicit stack.  Each
     level leaves at most all its branches but one on the stack."""
     waiting = 2 * any_material.most_branches(scene.materials) - 1
@@ -95,7 +95,7 @@ def radiance(whitted: WhittedSetup, scene: SceneTables, ray: Ray, sampler: Sampl
         total = total + weight * ambient
         if any_material.is_smooth(scene.materials, point.material):
             u0, u1 = whitted.u0, whitted.u1
-            light = fixed_lights(scene, scene.lights.choice, shading, u0, u1)
+            light = fixed_lights(scene, shading, u0, u1)
             total = total + weight * light
         if depth == whitted.max_depth:
             continue

@@ -5,7 +5,6 @@
 - `by_code.py`: `ByCode`, a choice by a number among shapes, materials, ..., as generated kernels.
 - `links.py`: `Link`, through which a kernel reaches tables and operations without being compiled
   for their types; `Linkable`, operations on one table; Numba's types of their annotations.
-- `function_pointer.py`: calls through function pointers.
 - `compiler.py`: our pipeline of Numba's passes.
 - `numba_codegen.py`: what code generation takes from inside Numba (docs/numba.md), and kernels from
   generated text.

@@ -19,7 +19,9 @@ becomes, for scenes of spheres and boxes,
             return boxes(shapes.boxes, ray, hit)  # box.uv
         return otherwise(shapes, ray, hit)  # the function as it was decorated
 
-Compiled code and plain Python run this text, and tracebacks show it.
+Compiled code and plain Python run this text, and tracebacks show it.  Given the table of one type in
+place of all tables, as a kernel for one type has it, the kernel of that type is called: so the same
+text serves all types in a loop over a block of paths.
 
 For a link to tables (`links.py`) the text depends on no scene.  A list has, for each code, the
 address of the table and the function pointers of the operations, 32 words (`STRIDE`) in all, of
@@ -44,15 +46,15 @@ from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_origin, ge
 from numba import types
 
 from reference_rt.jit.kernel import is_named_tuple, kernel, overload_kernel
-from reference_rt.jit.links import Group, Link, Operation, Row, stop
+from reference_rt.jit.links import Group, Link, Operation, Row
 from reference_rt.jit.numba_codegen import define, parameters_of
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 class Table(NamedTuple):
-    """A type of table.  code: its number;  field: of the NamedTuple of all tables;  table: the
-    class;  module: what has its kernels as attributes."""
+    """A type of table.  code: its number;  field: of the NamedTuple of all tables;  table: its
+    class, the first of those that it may have;  module: what has its kernels as attributes."""
 
     code: int
     field: str
@@ -64,12 +66,17 @@ def tables_of(of_all: type) -> tuple[Table, ...]:
     """The tables in a NamedTuple of all tables of a kind, whose fields of tables are annotated as
     Annotated[Spheres | None, sphere]: the table, None where there is none, and its kernels.  Their
     order is that of the codes, from 0 on."""
+    return tuple(
+        Table(code, field, classes[0], module)
+        for code, (field, classes, module) in enumerate(_fields_of(of_all))
+    )
+
+
+def _fields_of(of_all: type) -> list[tuple[str, tuple[type, ...], Any]]:
+    """(field, the classes that its table may have, module)."""
     hints = get_type_hints(of_all, include_extras=True).items()
     fields = [(field, *get_args(hint)) for field, hint in hints if get_origin(hint) is Annotated]
-    return tuple(
-        Table(code, field, get_args(table)[0], module)
-        for code, (field, table, module) in enumerate(fields)
-    )
+    return [(field, get_args(table)[:-1], module) for field, table, module in fields]
 
 
 def described_in(module: ModuleType, union: Any) -> type:
@@ -79,12 +86,17 @@ def described_in(module: ModuleType, union: Any) -> type:
 
 
 class ByCode(Group):
-    """rows: the code of each type, the field of its table, and the module that has its kernels, in
-    the order in which codes are compared."""
+    """Of the tables in a NamedTuple of all tables of a kind (see `tables_of`)."""
 
-    def __init__(self, rows: Iterable[tuple[int, str, Any]]) -> None:
+    def __init__(self, of_all: type) -> None:
         super().__init__()
-        self._rows = tuple(rows)
+        self._rows = tables_of(of_all)
+        self._field_of = {cls: field for field, some, _ in _fields_of(of_all) for cls in some}
+
+    def tables(self, of_all: Any) -> dict[int, Any]:
+        """The tables that are there, by code."""
+        found = {row.code: getattr(of_all, row.field) for row in self._rows}
+        return {code: table for code, table in found.items() if table is not None}
 
     def __call__(
         self, name: str | Callable[[Any], Callable[..., Any] | None], code: str = "kind"
@@ -98,7 +110,7 @@ class ByCode(Group):
         """
         found = [
             (number, field, name(m) if callable(name) else getattr(m, name, None))
-            for number, field, m in self._rows
+            for number, field, _, m in self._rows
         ]
         rows = [Row(number, field, of_row) for number, field, of_row in found if of_row is not None]
 
@@ -121,71 +133,66 @@ class ByCode(Group):
 
             operation, body = self._add(otherwise, rows), kernel(otherwise)
             linked = functools.partial(operation.through_link, tables, code, body)
-            chosen = _chosen(otherwise, [tables, *others], rows, lines, linked, otherwise=body)
+            chosen = self._chosen(otherwise, [tables, *others], rows, lines, linked, body)
             Operation.of[chosen] = operation
             return chosen
 
         return decorate
 
-    def in_turn(self, step: Callable[..., Any]) -> Callable[..., Any]:
-        """f(tables, ..., result): what step(code, table, ..., result) returns for the last table
-        that is present, the result of each being passed to the next; no loop, so that the code and
-        the type of the table are constants in each step.  Given a link, it stops the process:
-        Numba's own compiler compiles calls that are never made."""
-        _, _, *others = parameters_of(step)
-        given, result = ", ".join(others), others[-1]
-        rows = [Row(number, field, step) for number, field, _ in self._rows]
+    def _chosen(
+        self,
+        function: F,
+        parameters: Sequence[str],
+        rows: Sequence[Row],
+        lines: Callable[[Sequence[Row]], Iterable[str]],
+        linked: Callable[[], Callable[..., Any]],
+        otherwise: Callable[..., Any],
+    ) -> F:
+        """The kernel that runs, for tables of which some are None, the text `lines` of the others;
+        for a link, what `linked` returns; for one table, the kernel of its type.
 
-        def lines(present: Sequence[Row]) -> Iterable[str]:
-            for number, field, _ in present:
-                yield f"{result} = {field}({number}, tables.{field}, {given})"
-            yield f"return {result}"
+        function: of which it has the name, the module and the docstring;  otherwise: the same as a
+        kernel.
+        """
+        written: dict[Any, Callable[..., Any]] = {}
+        field_of = self._field_of
 
-        def linked() -> Callable[..., Any]:
-            name = step.__name__
-            text = f"def {name}(tables, {given}):\n    stop()\n    return {result}\n"
-            return define(text, step.__module__, name, "for a link", {"stop": stop})
+        def write(key: Any, label: str, text: Iterable[str], known: Any) -> Callable[..., Any]:
+            if key not in written:
+                module, name = function.__module__, function.__name__
+                whole = f"def {name}({', '.join(parameters)}):\n"
+                whole += "".join(f"    {line}\n" for line in text)
+                known = {"otherwise": otherwise, **known}
+                written[key] = define(whole, module, name, label, known)
+            return written[key]
 
-        return _chosen(step, ["tables", *others], rows, lines, linked)
-
-
-def _chosen(
-    function: F,
-    parameters: Sequence[str],
-    rows: Sequence[Row],
-    lines: Callable[[Sequence[Row]], Iterable[str]],
-    linked: Callable[[], Callable[..., Any]],
-    **names: Any,
-) -> F:
-    """The kernel that runs, for tables of which some are None, the text `lines` of the others; for
-    a link, what `linked` returns.
-
-    function: of which it has the name, the module and the docstring;  names: what the text uses
-    beside the parameters and a kernel for each field.
-    """
-    written: dict[tuple[str, ...], Callable[..., Any]] = {}
-
-    def write(is_present: Callable[[str], bool]) -> Callable[..., Any]:
-        present = [row for row in rows if is_present(row.field)]
-        fields = tuple(row.field for row in present)
-        if fields not in written:
-            module, name = function.__module__, function.__name__
-            text = f"def {name}({', '.join(parameters)}):\n"
-            text += "".join(f"    {line}\n" for line in lines(present))
-            known = names | {row.field: row.kernel for row in present}
+        def of_all(is_present: Callable[[str], bool]) -> Callable[..., Any]:
+            present = [row for row in rows if is_present(row.field)]
+            fields = tuple(row.field for row in present)
             label = f"for {', '.join(fields) or 'no tables'}"
-            written[fields] = define(text, module, name, label, known)
-        return written[fields]
+            return write(fields, label, lines(present), {row.field: row.kernel for row in present})
 
-    @functools.wraps(function)
-    def choose(tables: Any, *rest: Any) -> Any:
-        return write(lambda field: getattr(tables, field) is not None)(tables, *rest)
+        def of_one(cls: type) -> Callable[..., Any]:
+            for row in rows:
+                if row.field == field_of[cls]:
+                    given = ", ".join([parameters[0], *parameters_of(row.kernel)[1:]])
+                    text = [f"return {row.field}({given})"]
+                    return write(cls, f"for a table of {row.field}", text, {row.field: row.kernel})
+            return otherwise
 
-    @overload_kernel(choose)
-    def _compiled(tables: Any, *rest: Any) -> Callable[..., Any]:
-        if is_named_tuple(tables, Link):
-            return linked()
-        type_of = dict(zip(tables.fields, tables.types, strict=True))
-        return write(lambda field: not isinstance(type_of[field], types.NoneType))
+        @functools.wraps(function)
+        def choose(tables: Any, *rest: Any) -> Any:
+            if type(tables) in field_of:
+                return of_one(type(tables))(tables, *rest)
+            return of_all(lambda field: getattr(tables, field) is not None)(tables, *rest)
 
-    return choose  # type: ignore[return-value]
+        @overload_kernel(choose)
+        def _compiled(tables: Any, *rest: Any) -> Callable[..., Any]:
+            if is_named_tuple(tables, Link):
+                return linked()
+            if tables.instance_class in field_of:
+                return of_one(tables.instance_class)
+            type_of = dict(zip(tables.fields, tables.types, strict=True))
+            return of_all(lambda field: not isinstance(type_of[field], types.NoneType))
+
+        return choose  # type: ignore[return-value]

@@ -34,12 +34,19 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from reference_rt.jit.function_pointer import emit_call, pointer_to
-from reference_rt.jit.kernel import callee_kernel, is_named_tuple, kernel, overload_kernel
+from reference_rt.jit.compiler import invoke
+from reference_rt.jit.kernel import (
+    Signature,
+    callee_kernel,
+    is_named_tuple,
+    kernel,
+    overload_kernel,
+)
 from reference_rt.jit.numba_codegen import (
     array_at,
     call_llvm,
     define,
+    function_at,
     items_of,
     nothing,
     parameters_of,
@@ -207,6 +214,32 @@ _IN_TEXTS = {
 """Names that generated text uses."""
 
 
+def pointer_to(compiled: Callable[..., Any], signature: Signature) -> int:
+    """The function pointer of an entry kernel that is compiled for arguments of these types."""
+    taken = signature if isinstance(signature, tuple) else signature.args
+    found = compiled.overloads[taken]  # type: ignore[attr-defined]
+    return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
+
+
+def _emit_call(
+    context: Any,
+    builder: Any,
+    address: Any,
+    returns: Any,
+    declared: Sequence[Any],
+    given: Sequence[Any],
+    values: Sequence[Any],
+) -> Any:
+    """Emit a call of the entry kernel at an address.  returns, declared: the types for which it was
+    compiled;  given, values: the types and values of the arguments, which are cast."""
+    function = function_at(context, builder, address, returns, declared)
+    arguments = [
+        context.cast(builder, value, a, b)
+        for value, a, b in zip(values, given, declared, strict=True)
+    ]
+    return invoke(context, builder, function, returns, declared, arguments)
+
+
 class Row(NamedTuple):
     """A type of table in a group: its code, the field of its table, its kernel."""
 
@@ -302,7 +335,7 @@ class Operation:
             def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
                 given = [values[1], *items_of(builder, values[2])]
                 types_of = [table, *arguments]
-                return emit_call(context, builder, values[0], returns, declared, types_of, given)
+                return _emit_call(context, builder, values[0], returns, declared, types_of, given)
 
             return returns(pointer, table, arguments), generate
 
@@ -315,6 +348,10 @@ class Group:
 
     def __init__(self) -> None:
         self.operations: dict[str, Operation] = {}
+
+    def tables(self, of_all: Any) -> dict[int, Any]:
+        """The tables in what kernels take in place of a link, by code."""
+        raise NotImplementedError
 
     def _add(self, function: Callable[..., Any], rows: Sequence[Row]) -> Operation:
         number = len(self.operations) + 1
@@ -341,6 +378,9 @@ class Linkable(Group):
     Given the table, the kernel is inlined; given a link, it is called through the link.
     """
 
+    def tables(self, of_all: Any) -> dict[int, Any]:
+        return {0: of_all}
+
     def operation(self, function: F) -> F:
         """Decorates an operation."""
         body = kernel(function)
@@ -365,20 +405,25 @@ class Linker:
     calls: the entry kernels to be compiled, with their signatures.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, is_plain: bool = bool(numba.config.DISABLE_JIT)) -> None:
+        """is_plain: for kernels that run as plain Python, which take the tables themselves."""
         self.calls: dict[tuple[Any, Any], list[tuple[Words, int]]] = {}
-        self._kept: list[Any] = []
+        self.nothing: Any = None if is_plain else Link(0)
+        self._is_plain, self._kept = is_plain, list[Any]()
 
     def link(
         self,
-        operations: Mapping[str, Operation],
+        group: Group,
         wanted: Iterable[str],
-        tables: Mapping[int, Any],
+        of_all: Any,
         only: Mapping[str, Collection[int]] | None = None,
-    ) -> Link:
-        """A link to tables, by code, with the operations `wanted` of a group's `operations`;  only:
-        the codes of those tables that need an operation, where not all do.  Calls of other
-        operations stop the process."""
+    ) -> Any:
+        """A link to the tables of a group, with the operations `wanted`;  only: the codes of those
+        tables that need an operation, where not all do.  Calls of other operations stop the
+        process."""
+        if self._is_plain:
+            return of_all
+        operations, tables = group.operations, group.tables(of_all)
         found = [operations[name] for name in wanted]
         codes = [code for operation in operations.values() for code in operation.rows]
         words = np.zeros(STRIDE * (max([*tables, *codes]) + 1), np.int64)
@@ -428,8 +473,8 @@ def _never(table: Any) -> bool:
 
 
 def is_absent(table: Any) -> bool:
-    """Whether a link in place of a table is a link to nothing; False for tables."""
-    return False
+    """Whether there is no table: a link to nothing, or None in plain Python."""
+    return table is None
 
 
 @overload_kernel(is_absent)

@@ -3,7 +3,16 @@
 import math
 from typing import NamedTuple
 
-from reference_rt.core.ray import Ray, SurfacePoint, ray_from, segment_to
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.ray import (
+    BLOCK,
+    Ray,
+    SurfacePoint,
+    put_vector,
+    ray_from,
+    segment_to,
+    vector_of,
+)
 from reference_rt.core.vec3 import Vec3, dot
 from reference_rt.jit.kernel import kernel
 
@@ -51,3 +60,69 @@ def shadow_ray(point: SurfacePoint, light: LightSample) -> Ray:
     if light.distance < math.inf:
         return segment_to(point, light.target)
     return ray_from(point, light.wi)
+
+
+LIGHT_FLOATS, LIGHT_INTEGERS = 15 * BLOCK, 3 * BLOCK
+
+
+class LightBlock(NamedTuple):
+    """Light samples of up to BLOCK paths as SoA: numbers (LIGHT_FLOATS,), columns of wi, radiance,
+    pdf, target, distance, is_delta, and of the random numbers u0 and u1 and the probability of
+    picking the light;  codes (LIGHT_INTEGERS,), table of all lights, -1 where none is sampled, then
+    row and number."""
+
+    numbers: FloatArray
+    codes: IntArray
+
+
+@kernel
+def put_light(lit: LightBlock, j: int, light: LightSample) -> None:
+    numbers = lit.numbers
+    put_vector(numbers, 0, j, light.wi)
+    put_vector(numbers, 3, j, light.radiance)
+    numbers[6 * BLOCK + j] = light.pdf
+    put_vector(numbers, 7, j, light.target)
+    numbers[10 * BLOCK + j] = light.distance
+    numbers[11 * BLOCK + j] = 1.0 if light.is_delta else 0.0
+
+
+@kernel
+def light_of(lit: LightBlock, j: int) -> LightSample:
+    """Light sample j."""
+    numbers = lit.numbers
+    return LightSample(
+        vector_of(numbers, 0, j),
+        vector_of(numbers, 3, j),
+        numbers[6 * BLOCK + j],
+        vector_of(numbers, 7, j),
+        numbers[10 * BLOCK + j],
+        numbers[11 * BLOCK + j] != 0.0,
+    )
+
+
+@kernel
+def direction_of(lit: LightBlock, j: int) -> Vec3:
+    """The direction of light sample j; 0 if there is none, or nothing arrives."""
+    if lit.codes[j] < 0 or lit.numbers[6 * BLOCK + j] == 0.0:
+        return Vec3(0.0, 0.0, 0.0)
+    return vector_of(lit.numbers, 0, j)
+
+
+class Background(NamedTuple):
+    """radiance: of the environment along a ray that hits nothing;  density: of the environment's
+    samples in its direction."""
+
+    radiance: Vec3
+    density: float
+
+
+@kernel
+def put_background(lit: LightBlock, j: int, background: Background) -> None:
+    """Of path j, whose ray hits nothing, in the columns of radiance and pdf."""
+    put_vector(lit.numbers, 3, j, background.radiance)
+    lit.numbers[6 * BLOCK + j] = background.density
+
+
+@kernel
+def background_in(lit: LightBlock, j: int) -> Background:
+    return Background(vector_of(lit.numbers, 3, j), lit.numbers[6 * BLOCK + j])

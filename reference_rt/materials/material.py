@@ -10,9 +10,9 @@ light: see `reference_rt.lights.emitters.area`.
 import math
 from typing import Any, ClassVar, Literal, NamedTuple
 
-from reference_rt.core.arrays import FloatArray
+from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.model import Description, Examples
-from reference_rt.core.ray import UNIT_ROUNDOFF, SurfacePoint
+from reference_rt.core.ray import BLOCK, UNIT_ROUNDOFF, SurfacePoint, put_vector, vector_of
 from reference_rt.core.vec3 import (
     Frame,
     Vec3,
@@ -22,6 +22,7 @@ from reference_rt.core.vec3 import (
     is_black,
     max_abs,
     normalize,
+    to_world,
 )
 from reference_rt.jit.kernel import kernel
 from reference_rt.shapes.shape import Tangents
@@ -153,6 +154,92 @@ class Shading(NamedTuple):
     at: At
     tangents: Tangents
     flat_leaves: FloatArray
+
+
+SCATTER_FLOATS, SCATTER_INTEGERS = 30 * BLOCK, 2 * BLOCK
+
+
+class ScatterBlock(NamedTuple):
+    """What materials scatter of up to BLOCK paths, as SoA.
+
+    numbers (SCATTER_FLOATS,): columns of `Asked`, but for the frame's n;  of the answer value and
+    density towards the light, and of the `BsdfSample`.  codes (SCATTER_INTEGERS,): table of all
+    materials, -1 where none scatters, then row.
+    """
+
+    numbers: FloatArray
+    codes: IntArray
+
+
+class Asked(NamedTuple):
+    """What is asked of a material.  frame: the shading frame;  wi: the unit direction, in the
+    world, of a light sample, 0 for none;  u_lobe, u0, u1: numbers for `sample`;  u, v, colour: the
+    place for texture lookups, see `At`."""
+
+    frame: Frame
+    wi: Vec3
+    u_lobe: float
+    u0: float
+    u1: float
+    u: float
+    v: float
+    colour: Vec3
+
+
+@kernel
+def put_asked(block: ScatterBlock, j: int, kind: int, i: int, asked: Asked) -> None:
+    """Path j is scattered by row i of a kind of materials."""
+    numbers = block.numbers
+    block.codes[j], block.codes[BLOCK + j] = kind, i
+    put_vector(numbers, 0, j, asked.frame.s)
+    put_vector(numbers, 3, j, asked.frame.t)
+    put_vector(numbers, 6, j, Vec3(asked.u_lobe, asked.u0, asked.u1))
+    numbers[9 * BLOCK + j], numbers[10 * BLOCK + j] = asked.u, asked.v
+    put_vector(numbers, 11, j, asked.colour)
+    put_vector(numbers, 27, j, asked.wi)
+
+
+@kernel
+def asked_in(block: ScatterBlock, j: int, n: Vec3) -> Asked:
+    """What is asked for path j.  n: the normal of the frame."""
+    numbers = block.numbers
+    frame, u = Frame(vector_of(numbers, 0, j), vector_of(numbers, 3, j), n), vector_of(numbers, 6, j)
+    at_u, at_v = numbers[9 * BLOCK + j], numbers[10 * BLOCK + j]
+    wi, colour = vector_of(numbers, 27, j), vector_of(numbers, 11, j)
+    return Asked(frame, wi, u.x, u.y, u.z, at_u, at_v, colour)
+
+
+@kernel
+def put_scattered(
+    block: ScatterBlock, j: int, frame: Frame, lit: Scattered, drawn: BsdfSample
+) -> None:
+    """Stores what path j's light sample contributes, and its sampled direction."""
+    numbers = block.numbers
+    put_vector(numbers, 14, j, lit.value)
+    numbers[17 * BLOCK + j] = lit.density
+    put_vector(numbers, 18, j, to_world(frame, drawn.wi))
+    put_vector(numbers, 21, j, drawn.weight)
+    numbers[24 * BLOCK + j], numbers[25 * BLOCK + j] = drawn.pdf, drawn.eta
+    numbers[26 * BLOCK + j] = 1.0 if drawn.is_delta else 0.0
+
+
+@kernel
+def lit_in(block: ScatterBlock, j: int) -> Scattered:
+    """What path j's light sample contributes."""
+    return Scattered(vector_of(block.numbers, 14, j), block.numbers[17 * BLOCK + j])
+
+
+@kernel
+def drawn_in(block: ScatterBlock, j: int) -> BsdfSample:
+    """The sampled direction of path j, in the world."""
+    numbers = block.numbers
+    return BsdfSample(
+        vector_of(numbers, 18, j),
+        vector_of(numbers, 21, j),
+        numbers[24 * BLOCK + j],
+        numbers[25 * BLOCK + j],
+        numbers[26 * BLOCK + j] != 0.0,
+    )
 
 
 _NOISE = 64.0 * UNIT_ROUNDOFF

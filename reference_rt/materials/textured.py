@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.jit.kernel import by_class, kernel
+from reference_rt.jit.kernel import kernel
 from reference_rt.materials.material import Emissive, Material
 from reference_rt.materials.nested.tilted import Bump
 from reference_rt.materials.nested.wrappers import Wrapper
@@ -33,14 +33,13 @@ class Textured(NamedTuple):
     size: int
 
 
-def textured_table(materials: Mapping[str, Material], palette: Palette) -> Textured | None:
-    """None if no material has a texture."""
+def textured_table(materials: Mapping[str, Material], palette: Palette) -> Textured:
+    """The table of a scene's materials."""
     found = [_textures(name, materials, palette) for name in materials]
-    if not any(found):
-        return None
     number = np.array([len(numbers) for numbers in found])
-    texture = np.array([k for numbers in found for k in sorted(numbers)])
-    return Textured(np.cumsum(number) - number, number, texture, len(palette.greatest))
+    texture = np.array([k for numbers in found for k in sorted(numbers)], np.int64)
+    size = len(palette.greatest) if number.any() else 0
+    return Textured(np.cumsum(number) - number, number, texture, size)
 
 
 def _textures(name: str, materials: Mapping[str, Material], palette: Palette) -> set[int]:
@@ -72,27 +71,17 @@ def _bases(material: Material) -> list[str]:
 
 
 @kernel
-def lookup_cache_size(textured: Textured | None) -> int:
+def lookup_cache_size(textured: Textured) -> int:
     """The size of the array that `evaluate_textures` writes."""
-    if textured is None:
-        return 0
     return 3 * textured.size
 
 
 @kernel
-def _nothing(textured: None, m: int, at: At, colours: FloatArray) -> At:
-    return at
-
-
-@kernel
-def _look(textured: Textured, m: int, at: At, colours: FloatArray) -> At:
+def evaluate_textures(textured: Textured, m: int, at: At, colours: FloatArray) -> At:
+    """Evaluates the textures of material m at `at`, into the scratch buffer `colours`, and returns
+    a place where `lookup` reads these."""
     first = textured.first[m]
     for s in range(first, first + textured.number[m]):
         k = textured.texture[s]
         colours[3 * k], colours[3 * k + 1], colours[3 * k + 2] = lookup(k, at)
     return At(CachedLookups(colours), at.u, at.v, at.colour)
-
-
-evaluate_textures = by_class("look", {type(None): _nothing, Textured: _look})
-"""look(textured, m, at, colours) -> At.  Evaluates the textures of material m at `at`, into the
-scratch buffer `colours`, and returns a place where `lookup` reads these."""

@@ -13,8 +13,6 @@ import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators import RayCast, setup_of
-from reference_rt.integrators.path import PathSetup
-from reference_rt.integrators.scene_tables import LinkedScene
 from reference_rt.rendering.tiles import aov_tile, cost_tile, first_hits_tile, render_tile
 from reference_rt.sampling import Grid
 from reference_rt.scene.build import BuiltScene
@@ -46,8 +44,7 @@ class Job:
     """A kernel of `tiles`.
 
     setup: the class of its integrator's setup, None for others;  arguments: from the scene, the
-    view and the filter, each the tables themselves or linked, to the kernel's arguments before its
-    sums;  sums: the names of these, "" for one that is absent;  columns: of a kernel that computes
+    view and the filter, as kernels take them, to the kernel's arguments before its sums;  sums: the names of these, "" for one that is absent;  columns: of a kernel that computes
     values, once for each pixel, instead of adding up samples: by name, the columns that are stored.
     """
 
@@ -57,18 +54,18 @@ class Job:
     sums: tuple[str, ...]
     columns: Mapping[str, slice] = field(default_factory=dict)
 
-    def given(self, sums: Mapping[str, FloatArray], absent: Any) -> tuple[Any, ...]:
-        """The kernel's arguments for its sums.  absent: in the place of one that is absent."""
-        return tuple(sums[name] if name else absent for name in self.sums)
+    def given(self, sums: Mapping[str, FloatArray]) -> tuple[Any, ...]:
+        """The kernel's arguments for its sums."""
+        return tuple(sums[name] if name else _ABSENT for name in self.sums)
 
-    def empty(self, absent: Any) -> tuple[Any, ...]:
+    def empty(self) -> tuple[Any, ...]:
         """The same of no pixels, which have the same types."""
         width = _CENTRE_WIDTH if self.columns else 3
-        return self.given(dict.fromkeys(self.sums, np.zeros((0, width))), absent)
+        return self.given(dict.fromkeys(self.sums, np.zeros((0, width))))
 
 
-ABSENT = np.zeros((0, 3))
-"""In place of absent sums, for kernels of one type for all scenes."""
+_ABSENT = np.zeros((0, 3))
+"""In place of absent sums."""
 
 
 def samples_of(scene: BuiltScene) -> int:
@@ -110,10 +107,7 @@ def radiance_job(setup: Any, sampler: Any, shape: tuple[int, int], has_variance:
     random_numbers = sampler.setup()
 
     def arguments(tables: Any, view: Any, film_filter: Any) -> tuple[Any, ...]:
-        own = setup
-        if isinstance(tables, LinkedScene) and isinstance(setup, PathSetup):
-            own = setup.linked()  # of one type for all scenes
-        return own, tables, view, film_filter, random_numbers, shape
+        return setup, tables, view, film_filter, random_numbers, shape
 
     sums = ("colour", "m2" if has_variance else "")
     return Job(render_tile, type(setup), arguments, sums)

@@ -20,10 +20,10 @@ from reference_rt.jit.parallel_compile import Report
 from reference_rt.rendering import units
 from reference_rt.rendering.accumulation import Sums, add_samples, jobs_of, widths_of
 from reference_rt.rendering.checkpoint import render_digest, sources_digest
-from reference_rt.rendering.kernels import Running, compile_ahead
+from reference_rt.rendering.kernels import Linked, compile_ahead
 from reference_rt.rendering.noise import statistics
 from reference_rt.rendering.units import Unit, tiles_of
-from reference_rt.scene.build import BuiltScene, build_tables
+from reference_rt.scene.build import BuiltScene
 from reference_rt.scene.likely_mistakes import likely_mistakes
 from reference_rt.util.errors import SceneWarning, WorkersError
 from reference_rt.util.workers import Workers
@@ -59,9 +59,6 @@ class Executor(Protocol):
     def recovers(self, error: BaseException) -> bool:
         """Called for a unit that failed: whether it may be submitted again."""
 
-    def progress(self, fraction: float) -> None:
-        """Called in the main thread now and then, with the fraction of the picture that is done."""
-
     def stop(self) -> None:
         """Give up what is being computed, as soon as possible: it raises `StoppedError`."""
 
@@ -75,14 +72,14 @@ class Executor(Protocol):
 def build_and_check(scene: BuiltScene, tables: SceneTables | None = None) -> SceneTables:
     """The tables of a scene, unless they are given.  Raises SceneError; issues a SceneWarning for
     each of `likely_mistakes`."""
-    tables = build_tables(scene) if tables is None else tables
+    tables = scene.tables if tables is None else tables
     for mistake in likely_mistakes(scene, tables):
         scene.warn(mistake.message, *mistake.path)
     return tables
 
 
 class Prepared:
-    """A scene with its tables and kernels.  A context manager while units are computed.
+    """A scene with its tables and kernels.
 
     seconds: of "tables" (files, arrays, hierarchy) and "compile" (or loading cached kernels).
     """
@@ -93,22 +90,18 @@ class Prepared:
         threads: int,
         tables: SceneTables | None = None,
         compiling: Report | None = None,
-        specialised: bool | None = None,
     ) -> None:
         """Parameters as for `render.render`; raises as `build_and_check` does."""
         film = scene.film
         self.scene, self.jobs = scene, jobs_of(scene)
         view = scene.camera.setup(film.width, film.height)
         clock = [time.perf_counter()]
-        with compile_ahead(self.jobs, threads if specialised is not True else 1) as ahead:
+        with compile_ahead(self.jobs, threads) as ahead:
             self.tables = build_and_check(scene, tables)
             clock.append(time.perf_counter())
-            filter_setup = film.filter.setup()
-            self.running = Running(
-                self.jobs, self.tables, view, filter_setup, threads, compiling, specialised, ahead
-            )
+            linked = Linked(self.jobs, self.tables, view, film.filter.setup())
+            self._kernels = linked.compile(threads, compiling, ahead)
         clock.append(time.perf_counter())
-        self._kernels = [self.running.run(k) for k in range(len(self.jobs))]
         self.seconds = dict(zip(("tables", "compile"), np.diff(clock).tolist(), strict=True))
 
     def compute(self, unit: Unit, sums: Sums, chunk: int, stop: threading.Event) -> Done:
@@ -151,9 +144,6 @@ class Threads:
     def recovers(self, error: BaseException) -> bool:
         return False
 
-    def progress(self, fraction: float) -> None:
-        self._prepared.running.progress(fraction)
-
     def stop(self) -> None:
         self._stop.set()
 
@@ -175,11 +165,6 @@ result are nothing."""
 _MOST_SCENES = 2
 """Scenes that a worker keeps: one that is being finished, and the next."""
 
-_SPECIALISED_AFTER = 30.0
-"""Seconds of units with linked kernels (see `kernels`) after which a worker compiles specialised
-ones: these take 8 s to compile, and render in 0.7 of the time."""
-
-
 class RemoteScene(NamedTuple):
     """A scene for workers.  digest: of the render (`render_digest`);  sources: of this package;
     description: the scene, pickled;  chunk: see `units`."""
@@ -194,8 +179,7 @@ class _Worker:
     """A scene that this process computes units of."""
 
     def __init__(self, scene: BuiltScene, prepared: Prepared) -> None:
-        self.widths, self.prepared, self.seconds = widths_of(scene), prepared, 0.0
-        self.lock = threading.Lock()
+        self.widths, self.prepared = widths_of(scene), prepared
 
 
 _workers: dict[bytes, _Worker] = {}
@@ -205,7 +189,7 @@ _never = threading.Event()
 
 def remote_scene(scene: BuiltScene, digest: bytes, chunk: int) -> RemoteScene:
     """A scene for workers, which must have the files that it names under the same paths."""
-    copy = scene.changed()  # without its tables
+    copy = scene.without_tables()
     copy._folder = scene.folder.resolve()
     return RemoteScene(digest, sources_digest(), pickle.dumps(copy), chunk)
 
@@ -219,13 +203,7 @@ def compute_remotely(scene: RemoteScene, unit: Unit, sums: Sums | None) -> Done:
         sums = {name: np.zeros((count, width)) for name, width in worker.widths.items()}
     # Arrays from a message may be read-only.
     sums = {name: a if a.flags.writeable else a.copy() for name, a in sums.items()}
-    began = time.perf_counter()
-    done = worker.prepared.compute(Unit(*unit), sums, scene.chunk, _never)
-    worker.seconds += time.perf_counter() - began
-    if worker.seconds > _SPECIALISED_AFTER:
-        with worker.lock:
-            worker.prepared.running.specialise()
-    return done
+    return worker.prepared.compute(Unit(*unit), sums, scene.chunk, _never)
 
 
 def _worker_for(scene: RemoteScene) -> _Worker:
@@ -289,9 +267,6 @@ class Remote:
 
     def recovers(self, error: BaseException) -> bool:
         return self._workers.recovers(error)
-
-    def progress(self, fraction: float) -> None:
-        pass
 
     def stop(self) -> None:
         self._workers.stop()

@@ -8,10 +8,10 @@ import numpy as np
 from reference_rt.accel.geometry import Geometry, geometries
 from reference_rt.cameras import has_lens, views
 from reference_rt.cameras.film import film_filters
-from reference_rt.integrators.scene_tables import LinkedScene, SceneTables
+from reference_rt.integrators.scene_tables import KernelScene, SceneTables
 from reference_rt.jit.called import called
 from reference_rt.jit.links import Group, Link, Linker, Operation
-from reference_rt.lights import Lights, LightSampler, LinkedLights
+from reference_rt.lights import Lights, LightSampler, LightTables
 from reference_rt.lights import tables as light_tables
 from reference_rt.lights.emitters.area import Areas
 from reference_rt.lights.selection.choice import light_trees
@@ -19,22 +19,23 @@ from reference_rt.materials import Materials
 from reference_rt.materials.bsdfs import tables as bsdfs
 from reference_rt.materials.nested.flattened import flattened_materials
 from reference_rt.materials.textured import Textured
-from reference_rt.rendering.tiles import GivenRays, LinkedView
-from reference_rt.shapes import TABLES as SHAPES
+from reference_rt.rendering.tiles import GivenRays, View
 from reference_rt.shapes import Shapes
 from reference_rt.shapes import tables as shape_tables
 from reference_rt.textures import Textures
 from reference_rt.textures.lookup import lookups
-from reference_rt.textures.parameter import Colours, Numbers
+from reference_rt.textures.parameter import Colours
 
 _NO_INTEGERS = np.zeros(0, np.int64)
 _NO_FLOATS = np.zeros(0)
 _NOTHING: Any = Link(0)
 _NO_LIGHTS = LightSampler(_NO_INTEGERS, _NO_INTEGERS, _NO_FLOATS, _NO_FLOATS, np.zeros(1))
 
-EMPTY_VIEW = LinkedView(Link(0), 0, GivenRays(np.zeros((0, 3)), np.zeros((0, 3))))
+_NO_RAYS = GivenRays(np.zeros((0, 3)), np.zeros((0, 3)))
 
-EMPTY_SCENE = LinkedScene(
+EMPTY_VIEW = View(Link(0), 0, _NO_RAYS)
+
+EMPTY_SCENE = KernelScene(
     geometry=Link(0),
     shapes=Link(0),
     is_placed=0,
@@ -51,24 +52,22 @@ EMPTY_SCENE = LinkedScene(
         flat_leaves=_NOTHING,
         leaves=_NOTHING,
     ),
-    lights=LinkedLights(Link(0), _NO_LIGHTS, Link(0), np.zeros((1, 3))),
+    lights=LightTables(Link(0), _NO_LIGHTS, Link(0), np.zeros((1, 3))),
     textures=Link(0),
 )
 """Nothing, of the type of every linked scene."""
 
 
-def linked_view(linker: Linker, view: Any) -> LinkedView:
-    """A camera's view, or `GivenRays`, behind a link."""
+def linked_view(linker: Linker, view: Any) -> View:
+    """A camera's view, or `GivenRays`, as kernels take it."""
     if isinstance(view, GivenRays):
-        return LinkedView(Link(0), 0, view)
-    link = linker.link(views.operations, views.operations, {0: view})
-    nothing: Any = np.zeros((0, 3))
-    return LinkedView(link, int(has_lens(view)), GivenRays(nothing, nothing))
+        return View(linker.nothing, 0, view)
+    return View(linker.link(views, views.operations, view), int(has_lens(view)), _NO_RAYS)
 
 
-def linked_filter(linker: Linker, setup: Any) -> Link:
+def linked_filter(linker: Linker, setup: Any) -> Any:
     """A filter's setup behind a link."""
-    return linker.link(film_filters.operations, film_filters.operations, {0: setup})
+    return linker.link(film_filters, film_filters.operations, setup)
 
 
 # ---- what is called ------------------------------------------------------------------------------
@@ -89,7 +88,7 @@ def calls_of_geometry(names: Iterable[str]) -> Calls:
     return found.union(*(called(row, _CLASSES, geometries) for row in rows))
 
 
-_CLASSES = frozenset((Link, LinkedScene, LinkedLights, LinkedView))
+_CLASSES = frozenset((Link,))
 
 
 def _names(calls: Calls, group: Group) -> set[str]:
@@ -130,12 +129,12 @@ def _of_scene(calls: Calls, tables: SceneTables) -> Calls:
     """Of the operations those that are called for a scene."""
     shapes, geometry = shape_tables.by_code, tables.geometry
     calls = _of_geometry(calls, geometry)
-    if geometry.parts is None and geometry.instances is None:  # as `LinkedScene.is_placed`
+    if geometry.parts is None and geometry.instances is None:  # as `KernelScene.is_placed`
         calls = _without(calls, geometries, "surface")
     if tables.textures is None and geometries.operations["owner"] not in calls:  # as ray casting
         calls = _without(calls, geometries, "coordinates")
         calls = _without(calls, shapes, "uv", "colour")
-    if tables.materials.oriented is None:
+    if not tables.materials.oriented.any():
         calls = _without(calls, geometries, "tangents")
         calls = _without(calls, shapes, "tangents")
         calls = _without(calls, lookups, "gradient")
@@ -147,126 +146,68 @@ def _of_scene(calls: Calls, tables: SceneTables) -> Calls:
 # ---- tables behind links -------------------------------------------------------------------------
 
 
-def linked_scene(linker: Linker, tables: SceneTables, calls: Calls) -> LinkedScene:
-    """A scene behind links, with the operations of `calls` that it needs."""
+def linked_scene(linker: Linker, tables: SceneTables, calls: Calls) -> KernelScene:
+    """A scene as kernels take it, with the operations of `calls` that it needs."""
     calls = _of_scene(calls, tables)
     geometry, lights = tables.geometry, tables.lights
-    textures = linked_textures(linker, tables.textures, calls)
     shapes = linked_shapes(linker, geometry.shapes, calls, lights.areas)
-    return LinkedScene(
+    return KernelScene(
         geometry=linked_geometry(linker, geometry, shapes, calls),
         shapes=shapes,
         is_placed=int(geometry.parts is not None or geometry.instances is not None),
-        materials=linked_materials(linker, tables.materials, calls, textures.address != 0),
+        materials=linked_materials(linker, tables.materials, calls),
         lights=linked_lights(linker, lights, calls),
-        textures=textures,
+        textures=linked_textures(linker, tables.textures, calls),
     )
 
 
-def geometry_of(linker: Linker, geometry: Geometry, names: Iterable[str]) -> Link:
+def geometry_of(linker: Linker, geometry: Geometry, names: Iterable[str]) -> Any:
     """A geometry behind a link that has these operations, and what they call."""
     calls = _of_geometry(calls_of_geometry(names), geometry)
     shapes = linked_shapes(linker, geometry.shapes, calls)
     return linked_geometry(linker, geometry, shapes, calls)
 
 
-def linked_textures(linker: Linker, textures: Textures | None, calls: Calls) -> Link:
+def linked_textures(linker: Linker, textures: Textures | None, calls: Calls) -> Any:
     """Textures behind a link; None, and those that nothing looks up, have a link to nothing."""
     wanted = _names(calls, lookups)
     if textures is None or not wanted:
-        return Link(0)
-    return linker.link(lookups.operations, wanted, {0: textures})
+        return linker.nothing
+    return linker.link(lookups, wanted, textures)
 
 
-def linked_shapes(linker: Linker, shapes: Shapes, calls: Calls, areas: Areas | None = None) -> Link:
+def linked_shapes(linker: Linker, shapes: Shapes, calls: Calls, areas: Areas | None = None) -> Any:
     """Shapes behind a link.  areas: the area lights, whose types of shape alone are sampled."""
     group = shape_tables.by_code
-    found = {
-        code: table for code, field, _, _ in SHAPES if (table := getattr(shapes, field)) is not None
-    }
     kinds: set[int] = set() if areas is None else set(areas.kind.tolist())
     only = dict.fromkeys(("sample", "sample_fixed", "pdf"), kinds)
-    return linker.link(group.operations, _names(calls, group), found, only)
+    return linker.link(group, _names(calls, group), shapes, only)
 
 
-def linked_geometry(linker: Linker, geometry: Geometry, shapes: Any, calls: Calls) -> Link:
+def linked_geometry(linker: Linker, geometry: Geometry, shapes: Any, calls: Calls) -> Any:
     """A geometry behind a link.  shapes: the link to its shapes."""
     bvh = geometry.bvh
     if bvh is not None and bvh.corners is None:  # one type less: without triangles none are read
         bvh = bvh._replace(corners=_NO_FLOATS)
-    table = geometry._replace(shapes=shapes, bvh=bvh, tracer=None)
-    return linker.link(geometries.operations, _names(calls, geometries), {0: table})
+    table = geometry._replace(shapes=shapes, bvh=bvh)
+    return linker.link(geometries, _names(calls, geometries), table)
 
 
-def _present(array: Any, n: int, value: int) -> Any:
-    return np.full(n, value, np.int64) if array is None else array
-
-
-def _always_textured(table: Any) -> Any:
-    """A table whose columns of parameters all have `texture`."""
-    if not isinstance(table, tuple):
-        return table
-    if isinstance(table, Colours | Numbers):
-        return table._replace(texture=_present(table.texture, len(table.value), -1))
-    return type(table)(*(_always_textured(part) for part in table))
-
-
-def linked_materials(
-    linker: Linker, materials: Materials, calls: Calls, is_textured: bool
-) -> Materials:
+def linked_materials(linker: Linker, materials: Materials, calls: Calls) -> Materials:
     """Materials whose tables are behind links."""
-    n = len(materials.shown.value)
-    tables = {
-        code: _always_textured(table)
-        for code, field, _, _, _ in bsdfs.TABLES
-        if (table := getattr(materials.leaves, field)) is not None
-    }
-    leaves: Any = linker.link(bsdfs.by_code.operations, _names(calls, bsdfs.by_code), tables)
-    flat, nested = _NOTHING, _names(calls, flattened_materials)
+    group, flat, nested = bsdfs.by_code, linker.nothing, _names(calls, flattened_materials)
     if materials.flat_leaves is not None and nested:
-        table = _always_textured(materials.flat_leaves)
-        flat = linker.link(flattened_materials.operations, nested, {0: table})
-    only = list(tables)
-    kind = materials.kind if materials.kind is not None else np.full(n, only[0] if only else -1)
-    row = materials.row if materials.row is not None else np.arange(n)
-    textured = materials.textured
-    if textured is None:
-        textured = Textured(np.zeros(n, np.int64), np.zeros(n, np.int64), _NO_INTEGERS, 0)
-    return Materials(
-        kind=kind,
-        row=row,
-        smooth=_present(materials.smooth, n, 1),
-        uses_u_lobe=_present(materials.uses_u_lobe, n, 0),
-        behind=_present(materials.behind, n, 0),
-        shown=_always_textured(materials.shown),
-        oriented=_present(materials.oriented, n, 0),
-        asks=_present(materials.asks, n, int(is_textured)),
-        textured=textured,
-        flat_leaves=flat,
-        leaves=leaves,
-    )
+        flat = linker.link(flattened_materials, nested, materials.flat_leaves)
+    leaves = linker.link(group, _names(calls, group), materials.leaves)
+    return materials._replace(flat_leaves=flat, leaves=leaves)
 
 
-def linked_lights(linker: Linker, lights: Lights, calls: Calls) -> LinkedLights:
-    """Lights behind links."""
-    emitters = linker.link(
-        light_tables.by_code.operations,
-        _names(calls, light_tables.by_code),
-        {
-            code: _always_textured(table)
-            for code, field, _, _ in light_tables.ALL
-            if (table := getattr(lights, field)) is not None
-        },
-    )
-    choice = lights.choice
-    if choice is None:
-        choice = _NO_LIGHTS
-    if choice.cumulative is None:
-        choice = choice._replace(cumulative=np.ones(1))
-    tree, picked = Link(0), _names(calls, light_trees)
-    if lights.tree is None:
-        choice = choice._replace(bounded=np.zeros(1))
-    elif picked:
-        tree = linker.link(light_trees.operations, picked, {0: lights.tree})
+def linked_lights(linker: Linker, lights: Lights, calls: Calls) -> LightTables:
+    """Lights as kernels take them."""
+    group, tree, picked = light_tables.by_code, linker.nothing, _names(calls, light_trees)
+    if lights.tree is not None and picked:
+        tree = linker.link(light_trees, picked, lights.tree)
     ambient = np.zeros((1, 3)) if lights.ambient is None else lights.ambient
-    return LinkedLights(emitters, choice, tree, ambient)
+    emitters = linker.link(group, _names(calls, group), lights)
+    choice = _NO_LIGHTS if lights.choice is None else lights.choice
+    return LightTables(emitters, choice, tree, ambient)

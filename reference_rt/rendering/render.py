@@ -53,7 +53,6 @@ def render(
     tables: SceneTables | None = None,
     progress: Progress | None = None,
     compiling: Report | None = None,
-    specialised: bool | None = None,
     time_limit: float | None = None,
     target_error: float | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
@@ -65,8 +64,7 @@ def render(
     the scene's own.  threads: default all cores; their number changes no bit.  tables: the scene's
     tables, if they are built already.  progress: called as the render goes on;  compiling: called
     in its place while kernels are compiled, with the number of those that are, and of all.
-    specialised: whether kernels are compiled for this kind of scene, for the highest speed, or
-    linked; None: see `kernels`; no bit changes.  Ctrl-C stops it within a tile.
+    Ctrl-C stops it within a tile.
 
     time_limit: seconds after which it ends, with the samples that there are by then;
     target_error: relative standard error (see `noise`) at which it ends;  checkpoint: a folder
@@ -87,7 +85,6 @@ def render(
         threads=threads,
         tables=tables,
         compiling=compiling or (lambda done, total: say("compile", done / total)),
-        specialised=specialised,
         limits=limits,
         workers=None if workers is None else lambda: Processes(workers),
         storage=None if checkpoint is None else Storage(Path(checkpoint)),
@@ -128,14 +125,13 @@ class Session:
         threads: int | None = None,
         tables: SceneTables | None = None,
         compiling: Report | None = None,
-        specialised: bool | None = None,
-        limits: Limits | None = None,
+            limits: Limits | None = None,
         storage: Storage | None = None,
         memory: int | None = None,
         workers: Callable[[], Workers] | None = None,
         at_once: bool = False,
     ) -> None:
-        """threads, tables, compiling, specialised: see `render.render`;  limits: what ends it
+        """threads, tables, compiling: see `render.render`;  limits: what ends it
         early;  memory: bytes that this process may take; None: as much as it needs, with all
         pixels in memory;  workers: opens what computes it in place of this process;  at_once: see
         `Loop`.  Raises SceneError, UsageError, WorkersError."""
@@ -143,7 +139,7 @@ class Session:
         threads = threads or os.cpu_count() or 1
         prepared: Prepared | None = None
         if workers is None:
-            prepared = Prepared(scene, threads, tables, compiling, specialised)
+            prepared = Prepared(scene, threads, tables, compiling)
             tables, self.seconds = prepared.tables, dict(prepared.seconds)
         else:
             began = time.perf_counter()
@@ -176,15 +172,11 @@ class Session:
         self.loop = Loop(self.frame, self._executor, spp, limits or Limits(), saving, at_once)
 
     def __enter__(self) -> Self:
-        if self._prepared is not None:
-            self._prepared.running.__enter__()
         return self
 
     def __exit__(self, *error: Any) -> None:
         self._executor.close()
         self.frame.close()
-        if self._prepared is not None:
-            self._prepared.running.__exit__(*error)
 
     def run(self, say: Progress, watch: Callable[[], None] = lambda: None) -> None:
         """Render; calls say("render", fraction) and `watch` meanwhile.  Raises what they raise."""
@@ -192,7 +184,6 @@ class Session:
 
         def look() -> None:
             say("render", self.loop.fraction)
-            self._executor.progress(self.loop.fraction)
             watch()
 
         try:

@@ -13,15 +13,18 @@ import numpy as np
 
 from reference_rt import sampling
 from reference_rt.accel.geometry import closest_hit, traversal_cost
-from reference_rt.cameras import LENS_CENTRE, VIEWS, camera_ray, lens_sample
+from reference_rt.cameras import LENS_CENTRE, camera_ray
 from reference_rt.cameras.film import Stratum, film_offset, no_stratum, stratum_of
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import (
     BLOCK,
     HIT_FLOATS,
     HIT_INTEGERS,
+    POINT_FLOATS,
+    POINT_INTEGERS,
     RAY_FLOATS,
     HitBlock,
+    PointBlock,
     Ray,
     RayBlock,
     put_ray,
@@ -31,12 +34,11 @@ from reference_rt.core.vec3 import Vec3, row
 from reference_rt.integrators import radiances
 from reference_rt.integrators.path import STATE_FLOATS, VECTOR_FLOATS, Scratch, prepare
 from reference_rt.integrators.ray_cast import cast
-from reference_rt.integrators.scene_tables import SceneTables, surface
+from reference_rt.integrators.scene_tables import KernelScene, surface
 from reference_rt.integrators.shading import texture_place
 from reference_rt.jit.kernel import by_class, entry_kernel, kernel, local_floats, local_integers
-from reference_rt.jit.links import Link
-from reference_rt.lights import sky_floats
-from reference_rt.materials import scratch_floats
+from reference_rt.lights import LIGHT_FLOATS, LIGHT_INTEGERS, LightBlock
+from reference_rt.materials import SCATTER_FLOATS, SCATTER_INTEGERS, ScatterBlock, scratch_floats
 from reference_rt.sampling import (
     PAIR_FLOATS,
     PAIR_INTEGERS,
@@ -65,9 +67,19 @@ class GivenRays(NamedTuple):
     d: FloatArray
 
 
+class View(NamedTuple):
+    """Where rays come from.  link: a camera's view behind a link, in plain Python itself;
+    has_lens: whether lens points are drawn;  given: the rays in place of a camera's, of length 0
+    for a camera."""
+
+    link: Any
+    has_lens: int
+    given: GivenRays
+
+
 @kernel
-def _given_ray(
-    rays: GivenRays,
+def _film_ray(
+    view: View,
     film_filter: Any,
     stratum: Stratum,
     sampler: Any,
@@ -75,84 +87,20 @@ def _given_ray(
     x: int,
     y: int,
 ) -> FilmRay:
-    return FilmRay(Ray(row(rays.o, x), row(rays.d, x), math.inf), 1.0)
-
-
-@kernel
-def _camera_film_ray(
-    view: Any,
-    film_filter: Any,
-    stratum: Stratum,
-    sampler: Any,
-    shape: tuple[int, int],
-    x: int,
-    y: int,
-) -> FilmRay:
+    given = view.given
+    if len(given.o) > 0:
+        return FilmRay(Ray(row(given.o, x), row(given.d, x), math.inf), 1.0)
     width, height = shape
     u0, u1 = draw_pair(sampler, sampling.FILM)
     u0 = stratum.part_x[0] + stratum.part_x[1] * u0
     u1 = stratum.part_y[0] + stratum.part_y[1] * u1
     dx, weight_x = film_offset(film_filter, u0)
     dy, weight_y = film_offset(film_filter, u1)
-    lens = _lens_of(view, sampler)
-    ray = camera_ray(_view_of(view), (x + 0.5 + dx) / width, (y + 0.5 + dy) / height, lens)
-    return FilmRay(ray, weight_x * weight_y * stratum.weight)
-
-
-class LinkedView(NamedTuple):
-    """A camera's view behind a link;  has_lens: whether lens points are drawn;  given: the rays in
-    place of a camera's, of length 0 for a camera."""
-
-    link: Link
-    has_lens: int
-    given: GivenRays
-
-
-@kernel
-def _linked_film_ray(
-    view: LinkedView,
-    film_filter: Link,
-    stratum: Stratum,
-    sampler: Any,
-    shape: tuple[int, int],
-    x: int,
-    y: int,
-) -> FilmRay:
-    if len(view.given.o) > 0:
-        return _given_ray(view.given, film_filter, stratum, sampler, shape, x, y)
-    return _camera_film_ray(view, film_filter, stratum, sampler, shape, x, y)
-
-
-@kernel
-def _linked_lens(view: LinkedView, sampler: Any) -> tuple[float, float]:
+    lens = LENS_CENTRE
     if view.has_lens != 0:
-        u0, u1 = draw_pair(sampler, sampling.LENS)
-        return u0, u1
-    return LENS_CENTRE
-
-
-@kernel
-def _own_lens(view: Any, sampler: Any) -> tuple[float, float]:
-    x, y = lens_sample(view, sampler)
-    return x, y
-
-
-@kernel
-def _itself(view: Any) -> Any:
-    return view
-
-
-@kernel
-def _linked_view(view: LinkedView) -> Link:
-    return view.link
-
-
-_view_of = by_class("view_of", dict.fromkeys(VIEWS, _itself) | {LinkedView: _linked_view})
-_lens_of = by_class("lens_of", dict.fromkeys(VIEWS, _own_lens) | {LinkedView: _linked_lens})
-_film_ray = by_class(
-    "film_ray",
-    dict.fromkeys(VIEWS, _camera_film_ray) | {LinkedView: _linked_film_ray, GivenRays: _given_ray},
-)
+        lens = draw_pair(sampler, sampling.LENS)
+    ray = camera_ray(view.link, (x + 0.5 + dx) / width, (y + 0.5 + dy) / height, lens)
+    return FilmRay(ray, weight_x * weight_y * stratum.weight)
 
 
 @kernel
@@ -176,31 +124,33 @@ _stratum = by_class(
 @entry_kernel
 def render_tile(
     integrator: Any,
-    scene: SceneTables,
-    view: Any,
+    scene: KernelScene,
+    view: View,
     film_filter: Any,
     sampler_setup: Any,
     shape: tuple[int, int],
     out: FloatArray,
-    m2: FloatArray | None,
+    m2: FloatArray,
     begin: int,
     end: int,
     first: int,
     last: int,
 ) -> None:
     """Radiance: its sum over samples in out (n, 3), and the sum of squared deviations from the mean
-    in m2 (n, 3), if any."""
+    in m2 (n, 3), of length 0 if it is not wanted."""
     scratch = Scratch(
         rays=RayBlock(local_floats(RAY_FLOATS)),
         totals=local_floats(VECTOR_FLOATS),
         shadows=RayBlock(local_floats(RAY_FLOATS)),
-        lights=local_floats(VECTOR_FLOATS),
-        lit=local_integers(BLOCK),
+        arriving=local_floats(VECTOR_FLOATS),
+        of=local_integers(BLOCK),
         hits=HitBlock(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS)),
         states=local_floats(STATE_FLOATS),
         samples=local_integers(BLOCK),
         kept=local_floats(scratch_floats(scene.materials)),
-        sky=local_floats(sky_floats(scene.lights)),
+        points=PointBlock(local_floats(POINT_FLOATS), local_integers(POINT_INTEGERS)),
+        lit=LightBlock(local_floats(LIGHT_FLOATS), local_integers(LIGHT_INTEGERS)),
+        scattered=ScatterBlock(local_floats(SCATTER_FLOATS), local_integers(SCATTER_INTEGERS)),
     )
     weights = local_floats(BLOCK)
     samplers = Samplers(
@@ -234,12 +184,10 @@ def render_tile(
 
 
 @kernel
-def _add_to_m2(m2: FloatArray | None, i: int, sample: int, one: Vec3, total: Vec3) -> None:
+def _add_to_m2(m2: FloatArray, i: int, sample: int, one: Vec3, total: Vec3) -> None:
     """Update row i of M2, the sum of squared deviations from the mean, with sample number `sample`,
     whose value is `one`; total: the sum including it.  Youngs & Cramer 1971: only squares are
     added, so that nothing cancels."""
-    if m2 is None:
-        return
     if len(m2) == 0:
         return
     if sample > 0:
@@ -253,8 +201,8 @@ def _add_to_m2(m2: FloatArray | None, i: int, sample: int, one: Vec3, total: Vec
 
 @entry_kernel
 def first_hits_tile(
-    scene: SceneTables,
-    view: Any,
+    scene: KernelScene,
+    view: View,
     film_filter: Any,
     sampler_setup: Any,
     shape: tuple[int, int],
@@ -291,8 +239,8 @@ def first_hits_tile(
 
 @entry_kernel
 def aov_tile(
-    scene: SceneTables,
-    view: Any,
+    scene: KernelScene,
+    view: View,
     shape: tuple[int, int],
     out: FloatArray,
     begin: int,
@@ -305,7 +253,7 @@ def aov_tile(
     width, height = shape
     for pixel in range(begin, end):
         y, x = pixel // width, pixel % width
-        ray = camera_ray(_view_of(view), (x + 0.5) / width, (y + 0.5) / height, LENS_CENTRE)
+        ray = camera_ray(view.link, (x + 0.5) / width, (y + 0.5) / height, LENS_CENTRE)
         found = cast(scene, ray)
         i = pixel - begin
         out[i, 0], out[i, 1], out[i, 2] = found.colour
@@ -316,8 +264,8 @@ def aov_tile(
 
 @entry_kernel
 def cost_tile(
-    scene: SceneTables,
-    view: Any,
+    scene: KernelScene,
+    view: View,
     shape: tuple[int, int],
     out: FloatArray,
     begin: int,
@@ -329,6 +277,6 @@ def cost_tile(
     width, height = shape
     for pixel in range(begin, end):
         y, x = pixel // width, pixel % width
-        ray = camera_ray(_view_of(view), (x + 0.5) / width, (y + 0.5) / height, LENS_CENTRE)
+        ray = camera_ray(view.link, (x + 0.5) / width, (y + 0.5) / height, LENS_CENTRE)
         found = traversal_cost(scene.geometry, ray)
         out[pixel - begin, 0], out[pixel - begin, 1] = found.steps, found.tests

@@ -1,12 +1,12 @@
-"""The finite set of all linked kernels, to be compiled ahead of time.
+"""The finite set of all kernels, to be compiled ahead of time.
 
-Linked kernels (`kernels.py`) are compiled for types of tables, not for scenes, so that a few small
+Kernels (`kernels.py`) are compiled for types of tables, not for scenes, so that a few small
 scenes which together have every type reach all of them.  These scenes are never rendered: their
 tables are linked, and what the linker asks for is collected.  To build the tables compiles the few
 kernels that build hierarchies and light trees.
 
 To add kernels of another kind, such as those of a query: a function that returns the calls of one
-scene, and its place in `linked_calls`.
+scene, and its place in `all_calls`.
 """
 
 from collections.abc import Iterable, Iterator
@@ -40,7 +40,7 @@ from reference_rt.materials import (
     TwoSided,
 )
 from reference_rt.rendering.accumulation import Job, jobs_of
-from reference_rt.rendering.kernels import Linked, Specialised, cost
+from reference_rt.rendering.kernels import Linked, cost
 from reference_rt.rendering.linking import EMPTY_SCENE, geometry_of
 from reference_rt.rendering.query.bsdf import scatter_kernel
 from reference_rt.rendering.query.crossings import SOLIDS, crossings_kernel
@@ -76,8 +76,8 @@ from reference_rt.textures import AnyTexture, Product
 from reference_rt.util.files import temporary_folder
 
 
-def linked_calls() -> list[Call]:
-    """All linked kernels and the scanner of .obj files, without duplicates, those that take longest
+def all_calls() -> list[Call]:
+    """All kernels and the scanner of .obj files, without duplicates, those that take longest
     to compile first."""
     found: dict[Call, None] = {scan_call(): None}
     for scene in scenes():
@@ -87,13 +87,8 @@ def linked_calls() -> list[Call]:
 
 
 def picture_calls(scene: BuiltScene) -> list[Call]:
-    """The linked kernels of a scene's picture."""
+    """The kernels of a scene's picture."""
     return Linked(*_picture(scene)).calls
-
-
-def specialised_calls(scene: BuiltScene) -> list[Call]:
-    """The specialised kernels of a scene's picture."""
-    return Specialised(*_picture(scene)).calls
 
 
 def _picture(scene: BuiltScene) -> tuple[list[Job], SceneTables, Any, Any]:
@@ -108,7 +103,7 @@ _INTEGRATORS = PathTracing(), Direct(light_samples=2), Whitted(), RayCast()
 
 
 def _pictures(scene: BuiltScene) -> Iterator[Call]:
-    """The linked kernels of its pictures by all integrators, with its sampler where that fits."""
+    """The kernels of its pictures by all integrators, with its sampler where that fits."""
     for integrator in _INTEGRATORS:
         fits = integrator.deterministic or not isinstance(scene.sampler, Grid)
         samplers = [scene.sampler if fits else None]
@@ -127,7 +122,7 @@ _RAYS = _VECTORS, _VECTORS
 
 
 def query_calls(scene: BuiltScene) -> list[Call]:
-    """The linked kernels that queries of a scene need, besides those of its pictures."""
+    """The kernels that queries of a scene need, besides those of its pictures."""
     linker, geometry = Linker(), scene.tables.geometry
     wanted = [ONE_BY_ONE, BLOCKS, CROSSING, OCCLUDED, OCCLUDED_BY_BLOCKS, SURFACES]
     if geometry.solids is not None:  # else the operation does not compile

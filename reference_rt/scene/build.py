@@ -1,9 +1,10 @@
 """Scene -> SceneTables: the only place that makes a scene's arrays.
 
-Every array is C-contiguous and writable, and has the same type in all scenes, so that scenes with
-the same features have the same Numba types and share compiled kernels.  A feature that the scene
-lacks is None, and its branches are removed when the kernels are compiled.
+Every array is C-contiguous and writable, and has the same type in all scenes, so that tables of a type
+have the same Numba type and share compiled kernels.  A table that the scene lacks is None.
 """
+
+from typing import Any, Self
 
 import numpy as np
 from pydantic import PrivateAttr
@@ -21,14 +22,32 @@ from reference_rt.shapes.meshes.triangle_table import shared
 class BuiltScene(SceneModel):
     """A description, together with the tables that are built from it."""
 
-    _tables: SceneTables | None = PrivateAttr(default=None)
+    _built: list[SceneTables] = PrivateAttr(default_factory=list)
 
     @property
     def tables(self) -> SceneTables:
         """The kernels' tables, built on first use.  Raises SceneError for unusable files."""
-        if self._tables is None:
-            self._tables = build_tables(self)
-        return self._tables
+        if not self._built:
+            self._built.append(build_tables(self))
+        return self._built[0]
+
+    def changed(self, **parts: Any) -> Self:
+        """A copy of the scene with other parts (film=..., sampler=...), checked again.  It shares
+        the tables if these do not depend on the parts."""
+        scene = super().changed(**parts)
+        if parts.keys() <= _NOT_IN_TABLES:
+            scene._built = self._built
+        return scene
+
+    def without_tables(self) -> Self:
+        """A copy whose tables are not built."""
+        scene = self.changed()
+        scene._built = []
+        return scene
+
+
+_NOT_IN_TABLES = {"camera", "film", "sampler"}
+"""The parts of a scene on which its tables do not depend."""
 
 
 def build_tables(scene: SceneModel) -> SceneTables:

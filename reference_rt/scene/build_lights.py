@@ -78,7 +78,9 @@ def light_tables(scene: SceneModel, geometry: Geometry, palette: Palette) -> Lig
         choice=choice,
         tree=None,
     )
-    return lights._replace(tree=_tree(lights, geometry, power))
+    if (tree := _tree(lights, geometry, power)) is None and choice is not None:
+        lights = lights._replace(choice=choice._replace(bounded=np.zeros(1)))
+    return lights._replace(tree=tree)
 
 
 def scene_radius(geometry: Geometry) -> float:
@@ -107,8 +109,7 @@ def _choice(kind: Any, row: Any, weight: FloatArray) -> LightSampler | None:
 
 def _choice_by(kind: Any, row: Any, probability: FloatArray) -> LightSampler:
     bounded = probability[np.isin(kind, _PLACED)].sum()
-    cumulative = np.cumsum(probability) if len(probability) > 1 else None
-    return LightSampler(kind, row, probability, cumulative, np.array([bounded]))
+    return LightSampler(kind, row, probability, np.cumsum(probability), np.array([bounded]))
 
 
 def _mostly_others(choice: LightSampler) -> LightSampler:

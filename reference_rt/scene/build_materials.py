@@ -57,16 +57,15 @@ def material_tables(scene: SceneModel, palette: Palette, default: bool) -> Mater
         found_traits.append(traits(paths, materials))
     smooth, uses_u_lobe, behind, oriented = np.ascontiguousarray(np.array(found_traits, np.int64).T)
     asks = np.array([uses_textures(name, materials) for name in materials], np.int64)
-    is_one_table = len(leaves.parts) == 1 and set(kinds) == leaves.parts.keys()
     return Materials(
-        kind=None if is_one_table else np.array(kinds),
-        row=None if is_one_table and rows == list(range(len(rows))) else np.array(rows),
-        smooth=None if smooth.all() else smooth,
-        uses_u_lobe=uses_u_lobe if uses_u_lobe.any() else None,
-        behind=behind if behind.any() else None,
+        kind=np.array(kinds),
+        row=np.array(rows),
+        smooth=smooth,
+        uses_u_lobe=uses_u_lobe,
+        behind=behind,
         shown=join(shown),
-        oriented=oriented if oriented.any() else None,
-        asks=asks if asks.any() and not asks.all() else None,
+        oriented=oriented,
+        asks=asks,
         textured=textured_table(materials, palette),
         flat_leaves=flat_leaves.tables(),
         leaves=leaves.tables(),

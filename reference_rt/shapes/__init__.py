@@ -26,7 +26,6 @@ world coordinates and scene units, for row i of the table or the row of a hit:
 To add a shape: its file, and its lines in `tables.py`.  Step by step: docs/extending.md.
 """
 
-from reference_rt.shapes.brute_force import completed as completed
 from reference_rt.shapes.brute_force import nearest as nearest
 from reference_rt.shapes.brute_force import nearest_of_rays as nearest_of_rays
 from reference_rt.shapes.dispatch import colour as colour
@@ -39,6 +38,7 @@ from reference_rt.shapes.dispatch import sample as sample
 from reference_rt.shapes.dispatch import sample_fixed as sample_fixed
 from reference_rt.shapes.dispatch import spans as spans
 from reference_rt.shapes.dispatch import surface as surface
+from reference_rt.shapes.dispatch import surfaces as surfaces
 from reference_rt.shapes.dispatch import tangents as tangents
 from reference_rt.shapes.dispatch import uv as uv
 from reference_rt.shapes.shape import Shape as Shape

@@ -9,7 +9,19 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, miss
+from reference_rt.core.ray import (
+    Crossing,
+    Hit,
+    HitBlock,
+    PointBlock,
+    Ray,
+    RayBlock,
+    SurfacePoint,
+    hit_of,
+    miss,
+    put_point,
+    ray_of,
+)
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
 from reference_rt.shapes.meshes.watertight import Shear
@@ -42,6 +54,22 @@ def surface(shapes: Shapes, ray: Ray, hit: Hit) -> SurfacePoint:
     """The surface point at a hit of a primitive."""
     nothing = Vec3(0.0, 0.0, 0.0)
     return SurfacePoint(nothing, nothing, nothing, 0.0, -1, -1)
+
+
+@kernel
+def _surfaces(
+    table: Any, kind: int, rays: RayBlock, hits: HitBlock, n: int, points: PointBlock
+) -> None:
+    for j in range(n):
+        if hits.codes[j] == kind:
+            put_point(points, j, surface(table, ray_of(rays, j), hit_of(hits, j)))
+
+
+@by_code(lambda module: _surfaces)
+def surfaces(
+    shapes: Shapes, kind: int, rays: RayBlock, hits: HitBlock, n: int, points: PointBlock
+) -> None:
+    """The surface points of those of a block's first n hits that are on shapes of one type."""
 
 
 @by_code("uv", code="hit.kind")

@@ -68,5 +68,5 @@ TRIANGLE, DISK, QUADRIC = CODES[triangle], CODES[disk], CODES[quadrics]
 
 declare(Shapes, LINK)
 
-by_code = ByCode((code, field, module) for code, field, _, module in TABLES)
+by_code = ByCode(Shapes)
 """Decorates kernels that choose among the shapes; see `jit/by_code.py`."""

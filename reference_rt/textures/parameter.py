@@ -83,17 +83,17 @@ def texture_names(description: Description) -> dict[tuple[str | int, ...], str]:
 
 class Colours(NamedTuple):
     """A column of colours for n materials: value (n, 3);  texture (n,): index of the texture that
-    replaces the value, -1 for none; None where no material has a texture."""
+    replaces the value, -1 for none."""
 
     value: FloatArray
-    texture: IntArray | None
+    texture: IntArray
 
 
 class Numbers(NamedTuple):
     """A column of numbers, as `Colours`: value (n,)."""
 
     value: FloatArray
-    texture: IntArray | None
+    texture: IntArray
 
 
 class Palette:
@@ -136,17 +136,11 @@ NO_TEXTURES = Palette({}, ())
 
 
 def join(parts: Sequence[Any]) -> Any:
-    """Concatenates tables of one class, nested tables too.
-
-    Where no parameter of a column has a texture, its `texture` becomes None.
-    """
+    """Concatenates tables of one class, nested tables too."""
     first = parts[0]
     if not isinstance(first, tuple):
         return np.ascontiguousarray(np.concatenate(parts))
-    columns = [join(column) for column in zip(*parts, strict=True)]
-    if isinstance(first, Colours | Numbers) and (columns[1] < 0).all():
-        columns[1] = None
-    return type(first)(*columns)
+    return type(first)(*(join(column) for column in zip(*parts, strict=True)))
 
 
 def joined(module: Any, tables: Sequence[Any]) -> Any:
@@ -157,28 +151,14 @@ def joined(module: Any, tables: Sequence[Any]) -> Any:
 @kernel
 def colour_at(colours: Colours, i: int, at: At) -> Vec3:
     """The colour of row i at a point of a surface."""
-    return _colour_at(colours.texture, colours.value, i, at)
-
-
-@kernel
-def _colour_at(texture: IntArray | None, value: FloatArray, i: int, at: At) -> Vec3:
-    if texture is None:
-        return row(value, i)
-    if texture[i] < 0:
-        return row(value, i)
-    return lookup(texture[i], at)
+    if colours.texture[i] < 0:
+        return row(colours.value, i)
+    return lookup(colours.texture[i], at)
 
 
 @kernel
 def number_at(numbers: Numbers, i: int, at: At) -> float:
     """The number of row i at a point of a surface: for a texture its luminance."""
-    return _number_at(numbers.texture, numbers.value, i, at)
-
-
-@kernel
-def _number_at(texture: IntArray | None, value: FloatArray, i: int, at: At) -> float:
-    if texture is None:
-        return float(value[i])
-    if texture[i] < 0:
-        return float(value[i])
-    return luminance(lookup(texture[i], at))
+    if numbers.texture[i] < 0:
+        return float(numbers.value[i])
+    return luminance(lookup(numbers.texture[i], at))

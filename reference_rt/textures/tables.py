@@ -41,4 +41,4 @@ TABLES: tuple[tuple[int, str, Any, Any], ...] = tuple(
 _CODES = {module: code for code, _, _, module in TABLES}
 CHECKER, BITMAP, PRODUCT = _CODES[checker], _CODES[bitmap], _CODES[product]
 
-by_code = ByCode((code, field, module) for code, field, _, module in TABLES)
+by_code = ByCode(Textures)

@@ -69,8 +69,6 @@ def _texture_coordinates(
 ) -> At:
     """The texture coordinates at a point q of light i."""
     none = Vec3(-1.0, -1.0, -1.0)
-    if textures is None:
-        return At(textures, 0.0, 0.0, none)
     if is_absent(textures):
         return At(textures, 0.0, 0.0, none)
     hit = Hit(1.0, areas.kind[i], areas.row[i], q.u, q.v, -1)
@@ -85,14 +83,12 @@ def density(areas: Areas, i: int, shapes: Shapes, p: Vec3, q: SurfacePoint) -> f
 
 
 @kernel
-def emitted(areas: Areas | None, q: SurfacePoint, at: At, w: Vec3) -> Vec3:
+def emitted(areas: Areas, q: SurfacePoint, at: At, w: Vec3) -> Vec3:
     """The radiance that the surface at `q` emits towards `w`.
 
     The geometric normal decides which side is the front: a shading normal does not change where
     light comes from.  Mitsuba uses the shading normal.
     """
-    if areas is None:
-        return Vec3(0.0, 0.0, 0.0)
     if q.light < 0 or dot(q.n, w) <= 0.0:
         return Vec3(0.0, 0.0, 0.0)
     return colour_at(areas.radiance, q.light, at)

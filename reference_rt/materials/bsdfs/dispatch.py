@@ -8,34 +8,26 @@ mirrors and glass have `branches` alone, most others have none.
 
 from typing import Any
 
-from reference_rt.core.vec3 import Vec3
+from reference_rt.core.arrays import FloatArray
+from reference_rt.core.ray import BLOCK, PointBlock, RayBlock, vector_of
+from reference_rt.core.vec3 import Vec3, is_black, to_local
 from reference_rt.jit.kernel import kernel
 from reference_rt.materials.bsdfs.tables import CLEAR, TABLES, Leaves, by_code
 from reference_rt.materials.material import (
     NO_BRANCHES,
     Branches,
     BsdfSample,
+    ScatterBlock,
     Scattered,
+    asked_in,
+    put_scattered,
     sample_branch,
     straight_on,
 )
-from reference_rt.textures import At
+from reference_rt.materials.textured import Textured, evaluate_textures
+from reference_rt.textures import At, Textures
 
-
-@kernel
-def _code(code: int, table: Any, last: int) -> int:
-    return code
-
-
-_last = by_code.in_turn(_code)
-_LAST = len(TABLES) - 1
-
-
-@kernel
-def only(leaves: Leaves) -> int:
-    """The code of the only table, for scenes with one: a constant, so that branches vanish."""
-    code: int = _last(leaves, _LAST)
-    return code
+KINDS = len(TABLES)
 
 
 @by_code("eval_pdf")
@@ -63,3 +55,45 @@ def sample(
 def ambient(leaves: Leaves, kind: int, i: int, at: At) -> Vec3:
     """The ambient reflectance k_a of the Phong model; black for others."""
     return Vec3(0.0, 0.0, 0.0)
+
+
+@kernel
+def _scatter(
+    table: Any,
+    kind: int,
+    block: ScatterBlock,
+    rays: RayBlock,
+    points: PointBlock,
+    textured: Textured,
+    textures: Textures | None,
+    kept: FloatArray,
+    n: int,
+) -> None:
+    for j in range(n):
+        if block.codes[j] != kind:
+            continue
+        asked, i = asked_in(block, j, vector_of(points.numbers, 6, j)), block.codes[BLOCK + j]
+        wo = to_local(asked.frame, -vector_of(rays.numbers, 3, j))
+        place = At(textures, asked.u, asked.v, asked.colour)
+        at = evaluate_textures(textured, points.codes[j], place, kept)
+        lit = Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
+        if not is_black(asked.wi):
+            lit = eval_pdf(table, kind, i, at, wo, to_local(asked.frame, asked.wi))
+        drawn = sample(table, kind, i, at, wo, asked.u_lobe, asked.u0, asked.u1)
+        put_scattered(block, j, asked.frame, lit, drawn)
+
+
+@by_code(lambda module: _scatter)
+def scatter(
+    leaves: Leaves,
+    kind: int,
+    block: ScatterBlock,
+    rays: RayBlock,
+    points: PointBlock,
+    textured: Textured,
+    textures: Textures | None,
+    kept: FloatArray,
+    n: int,
+) -> None:
+    """`eval_pdf` towards the light samples, and `sample`, for those of the first n paths that are
+    at a material of one type."""

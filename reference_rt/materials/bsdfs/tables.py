@@ -62,7 +62,7 @@ class Leaves(NamedTuple):
     mirrors: Annotated[mirror.Mirrors | None, mirror]
     dielectrics: Annotated[dielectric.Transparents | None, dielectric]
     conductors: Annotated[conductor.Conductors | None, conductor]
-    thin_dielectrics: Annotated[dielectric.Transparents | None, thin_dielectric]
+    thin_dielectrics: Annotated[thin_dielectric.Panes | None, thin_dielectric]
     rough_conductors: Annotated[rough_conductor.RoughConductors | None, rough_conductor]
     rough_dielectrics: Annotated[rough_dielectric.RoughDielectrics | None, rough_dielectric]
     plastics: Annotated[plastic.Plastics | None, plastic]
@@ -85,4 +85,4 @@ CLEAR, BLACK = 100, 101
 
 declare(Leaves, LINK)
 
-by_code = ByCode((code, field, module) for code, field, _, _, module in TABLES)
+by_code = ByCode(Leaves)

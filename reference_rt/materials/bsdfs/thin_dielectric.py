@@ -1,14 +1,15 @@
 """Thin dielectric: a pane of glass as one surface, with all reflections between its faces."""
 
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, NamedTuple
 
+from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Positive
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
-from reference_rt.materials.bsdfs.dielectric import Transparent, Transparents
+from reference_rt.materials.bsdfs.dielectric import Transparent
 from reference_rt.materials.material import Branches
 from reference_rt.materials.microfacet.fresnel import fresnel
-from reference_rt.textures import At, ReflectanceParameter, colour_at
+from reference_rt.textures import At, Colours, Palette, ReflectanceParameter, colour_at
 
 
 class ThinDielectric(Transparent):
@@ -24,9 +25,20 @@ class ThinDielectric(Transparent):
     """A factor of the light that passes: linear sRGB from 0 to 1, or a texture.  The default, 1, is
     physical."""
 
+    def tabulate(self, palette: Palette) -> "Panes":
+        return Panes(**self.columns(palette))
+
+
+class Panes(NamedTuple):
+    """As `Transparents`, of n panes."""
+
+    eta: FloatArray
+    reflectance: Colours
+    transmittance: Colours
+
 
 @kernel
-def branches(panes: Transparents, i: int, at: At, wo: Vec3) -> Branches:
+def branches(panes: Panes, i: int, at: At, wo: Vec3) -> Branches:
     """With R the reflectance of one face, the two together reflect R + T R T + T R R R T + ... =
     2 R / (1 + R).  The rest, T / (1 + R), passes undeviated, its radiance unchanged (PBR 4ed,
     9.5.3)."""

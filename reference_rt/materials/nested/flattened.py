@@ -149,8 +149,6 @@ flattened_materials = Linkable()
 @kernel
 def most(flat_leaves: FlattenedMaterials | None) -> int:
     """The largest number of flattened leaves of any material."""
-    if flat_leaves is None:
-        return 0
     if is_absent(flat_leaves):
         return 0
     return _most(flat_leaves)
@@ -171,8 +169,6 @@ def prepare(flat_leaves: FlattenedMaterials | None, shading: Shading, at: At) ->
     They depend on the point and on wo, not on wi: evaluated once per hit they serve all calls of
     `both`, `sample` and `branches`, and their code is compiled once.
     """
-    if flat_leaves is None:
-        return
     if is_absent(flat_leaves):
         return
     textures: Any = at.textures

@@ -141,10 +141,10 @@ class Bsdf(metaclass=Brief):
 
         def link(linker: Linker) -> Any:
             calls = calls_of(scatter_kernel)
-            of_materials = linked_materials(linker, materials, calls, textures is not None)
+            of_materials = linked_materials(linker, materials, calls)
             return of_materials, linked_textures(linker, textures, calls)
 
-        return linked(self._tables, "bsdf", link, (materials, textures))
+        return linked(self._tables, "bsdf", link)
 
     def evaluate(
         self,

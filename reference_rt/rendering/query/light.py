@@ -15,11 +15,11 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Ray, scaled
 from reference_rt.core.vec3 import row
 from reference_rt.integrators.direct_light import direct
-from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.integrators.scene_tables import KernelScene, SceneTables
 from reference_rt.integrators.shading import shade
 from reference_rt.jit.kernel import entry_kernel, local_floats
 from reference_rt.jit.links import Linker
-from reference_rt.lights import TABLES, Constant, EnvironmentMap, Lights
+from reference_rt.lights import TABLES, Constant, EnvironmentMap, LightTables
 from reference_rt.materials import scratch_floats
 from reference_rt.rendering.linking import calls_of, linked_lights, linked_shapes, linked_textures
 from reference_rt.rendering.query.hits import BoolArray
@@ -88,7 +88,7 @@ class DirectLight(metaclass=Brief):
 
 @entry_kernel
 def sample_kernel(
-    lights: Lights,
+    lights: LightTables,
     shapes: Shapes,
     textures: Textures | None,
     p: FloatArray,
@@ -120,7 +120,7 @@ def sample_kernel(
 @entry_kernel
 def pdf_kernel(
     geometry: Geometry,
-    lights: Lights,
+    lights: LightTables,
     shapes: Shapes,
     p: FloatArray,
     n: FloatArray,
@@ -134,7 +134,7 @@ def pdf_kernel(
         if not valid:
             continue
         if found.codes[i, 0] < 0:
-            out[i] = any_light.environment_pdf(None, lights, ray.o, row(n, i), ray.d)
+            out[i] = any_light.environment_pdf(lights, ray.o, row(n, i), ray.d)
             continue
         q = surface(geometry, ray, hit_of(found, i))
         out[i] = any_light.area_pdf(lights, shapes, ray.o, row(n, i), q)
@@ -142,7 +142,7 @@ def pdf_kernel(
 
 @entry_kernel
 def direct_kernel(
-    scene: SceneTables, o: FloatArray, d: FloatArray, k: int, u: float, v: float, out: FloatArray
+    scene: KernelScene, o: FloatArray, d: FloatArray, k: int, u: float, v: float, out: FloatArray
 ) -> None:
     kept = local_floats(scratch_floats(scene.materials))
     for i in range(len(o)):
@@ -204,7 +204,7 @@ def _linked_lights(scene: SceneTables) -> Linked:
             linked_textures(linker, textures, calls),
         )
 
-    return linked(scene, "lights", link, (lights, shapes, textures))
+    return linked(scene, "lights", link)
 
 
 def sample_lights(

@@ -1,16 +1,9 @@
-"""A scene's tables behind links, as the kernels of queries take them (see `jit/links.py`).
-
-Linked kernels are compiled once for all scenes.  Specialised ones, with everything inlined, take
-3 to 6 s to compile for each kind of scene and save 0 to 35 ns a ray of 50 to 450 (measured): that
-pays after 10^8 rays, so queries have none.
-"""
+"""A scene's tables behind links, as the kernels of queries take them (see `jit/links.py`)."""
 
 import os
 import threading
 from collections.abc import Callable
 from typing import Any
-
-import numba
 
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.links import Linker
@@ -25,7 +18,7 @@ memory."""
 class Linked:
     """Tables behind links, which are valid as long as this object lives."""
 
-    def __init__(self, tables: Any, linker: Linker | None) -> None:
+    def __init__(self, tables: Any, linker: Linker) -> None:
         self.tables, self._linker = tables, linker
 
 
@@ -36,13 +29,8 @@ _kept: dict[int, tuple[SceneTables, dict[Any, Linked]]] = {}
 scenes, which are kept so that no other scene can have the same."""
 
 
-def linked(
-    scene: SceneTables, purpose: Any, link: Callable[[Linker], Any], unlinked: Any
-) -> Linked:
-    """What `link` makes of the scene, with all its operations compiled: once for each purpose.
-    Plain Python links nothing and gets the tables `unlinked`."""
-    if numba.config.DISABLE_JIT:
-        return Linked(unlinked, None)
+def linked(scene: SceneTables, purpose: Any, link: Callable[[Linker], Any]) -> Linked:
+    """What `link` makes of the scene, with all its operations compiled: once for each purpose."""
     of_scene = _kept.get(id(scene))
     if of_scene is not None and purpose in of_scene[1]:
         return of_scene[1][purpose]
@@ -62,9 +50,9 @@ def linked(
 def link_to_geometry(scene: SceneTables, *operations: str) -> Linked:
     """The scene's geometry behind a link that has these operations."""
     geometry = scene.geometry
-    return linked(scene, operations, lambda made: geometry_of(made, geometry, operations), geometry)
+    return linked(scene, operations, lambda made: geometry_of(made, geometry, operations))
 
 
 def link_to_scene(scene: SceneTables, kernel: Any) -> Linked:
     """The scene as a kernel takes it."""
-    return linked(scene, kernel, lambda made: linked_scene(made, scene, calls_of(kernel)), scene)
+    return linked(scene, kernel, lambda made: linked_scene(made, scene, calls_of(kernel)))

@@ -16,10 +16,10 @@ from reference_rt.core.ray import UNIT_ROUNDOFF, Ray
 from reference_rt.core.vec3 import row
 from reference_rt.integrators import AnyIntegrator, Path, RayCast, setup_of
 from reference_rt.integrators.ray_cast import cast
-from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.integrators.scene_tables import KernelScene, SceneTables
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.rendering.accumulation import mean_and_variance, radiance_job
-from reference_rt.rendering.kernels import Running
+from reference_rt.rendering.kernels import Linked
 from reference_rt.rendering.query.links import link_to_scene
 from reference_rt.rendering.query.rays import Rays, in_blocks, rays_of, shaped
 from reference_rt.rendering.tiles import GivenRays
@@ -38,7 +38,7 @@ class Radiance(NamedTuple):
 
 
 @entry_kernel
-def cast_kernel(scene: SceneTables, o: FloatArray, d: FloatArray, out: FloatArray) -> None:
+def cast_kernel(scene: KernelScene, o: FloatArray, d: FloatArray, out: FloatArray) -> None:
     for i in range(len(o)):
         found = cast(scene, Ray(row(o, i), row(d, i), math.inf))
         out[i, 0], out[i, 1], out[i, 2] = found.colour
@@ -145,13 +145,13 @@ def estimate(
     threads = threads or os.cpu_count() or 1
     if n > 0:
         job = radiance_job(setup, sampler, (n, 1), has_variance=True)
-        with Running([job], tables, GivenRays(o, d), BoxFilter().setup(), threads) as running:
-            kernel = running.run(0)
+        linked = Linked([job], tables, GivenRays(o, d), BoxFilter().setup())
+        (kernel,) = linked.compile(threads)
 
-            def add(begin: int, end: int, first: int, last: int) -> None:
-                kernel({name: a[begin:end] for name, a in sums.items()}, begin, end, first, last)
+        def add(begin: int, end: int, first: int, last: int) -> None:
+            kernel({name: a[begin:end] for name, a in sums.items()}, begin, end, first, last)
 
-            run_tiles(add, n, spp, threads)
+        run_tiles(add, n, spp, threads)
     mean, variance = mean_and_variance(sums, spp)
     if spp == 1:
         variance[:] = math.inf
