@@ -234,7 +234,7 @@ def _own_file(scene: Scene, budget: Budget) -> Any:
 
 
 def _left_out(scene: Scene, tables: SceneTables) -> tuple[str, ...]:
-    """The features that are specialised away because the scene lacks them, grouped by reason."""
+    """The features that are left out because the scene lacks them, grouped by reason."""
     by_reason: dict[str, list[str]] = {}
     for what, why in explain(scene, tables)[1]:
         by_reason.setdefault(why, []).append(what)

@@ -375,7 +375,7 @@ def write_results(
                     "cause": {"name", "evidence", "explained"} or null,
                     "worst": [{"x", "y", "width", "height", "what"}],
                     "seconds": {side: {step: seconds}}, "notes": [...],
-                    "left_out": [features that were specialised away, and why],
+                    "left_out": [features that were left out, and why],
                     "again": command that runs this case alone}]}
 
     Strict JSON (RFC 8259): NaN and the infinities become null, so a null number means "undefined or

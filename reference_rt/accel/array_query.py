@@ -22,7 +22,6 @@ from reference_rt.core.ray import (
     RayBlock,
     hit_of,
     put_ray,
-    ray_of,
     scaled,
 )
 from reference_rt.core.vec3 import max_abs, row

@@ -36,7 +36,7 @@ from reference_rt.core.ray import (
     put_hit,
     ray_of,
 )
-from reference_rt.jit.kernel import entry_kernel, kernel, local_floats, local_uint32
+from reference_rt.jit.kernel import kernel, local_floats, local_uint32
 from reference_rt.jit.simd import (
     VECTOR_WIDTH,
     larger,

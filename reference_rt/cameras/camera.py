@@ -11,7 +11,6 @@ from reference_rt.core.model import Description, Direction, Positive, Vector
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3, length
 from reference_rt.jit.kernel import kernel
-from reference_rt.sampling import Sample
 
 LENS_CENTRE = (0.5, 0.5)
 """The lens sample of the centre of any lens."""

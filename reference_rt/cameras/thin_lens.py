@@ -11,9 +11,7 @@ from reference_rt.core.model import Examples, Positive
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
-from reference_rt.sampling import LENS, Sample, draw_pair
 from reference_rt.sampling.warp import concentric_disk
-
 
 HAS_LENS = True
 

@@ -18,7 +18,6 @@ from reference_rt.cli.limits import in_words, limits_of
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import Signature, is_compiled
-from reference_rt.jit.parallel_compile import Call
 from reference_rt.lights import Lights
 from reference_rt.lights.emitters.environment_map import EnvironmentMaps
 from reference_rt.materials.bsdfs.tables import TABLES as MATERIAL_TABLES

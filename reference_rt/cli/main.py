@@ -241,7 +241,10 @@ def explain(
 def warm_up(
     scenes: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[SCENE]...", help="Whose kernels are compiled, too, if its tables are of rare types."),
+        typer.Argument(
+            metavar="[SCENE]...",
+            help="Whose kernels are compiled, too, if its tables are of rare types.",
+        ),
     ] = None,
     threads: Threads = None,
 ) -> None:

@@ -31,7 +31,11 @@ from reference_rt.core.ray import (
     ray_of,
 )
 from reference_rt.core.vec3 import Vec3, is_black, to_local, to_world
-from reference_rt.integrators.direct_light import light_selection_normal, pass_lamps, power_heuristic
+from reference_rt.integrators.direct_light import (
+    light_selection_normal,
+    pass_lamps,
+    power_heuristic,
+)
 from reference_rt.integrators.path import (
     LIGHT_SAMPLING,
     UNLIMITED,

@@ -106,9 +106,7 @@ def unshadowed(scene: KernelScene, shading: Shading, light: LightSample) -> Dire
 
 
 @kernel
-def fixed_lights(
-    scene: KernelScene, shading: Shading, u0: float, u1: float
-) -> Vec3:
+def fixed_lights(scene: KernelScene, shading: Shading, u0: float, u1: float) -> Vec3:
     """Direct light without random numbers: of every point, spot and directional light, and of the
     point (u0, u1) of every area light."""
     total, choice = Vec3(0.0, 0.0, 0.0), scene.lights.choice

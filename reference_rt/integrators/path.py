@@ -66,8 +66,8 @@ from reference_rt.lights import (
     LightSample,
     Pick,
     ask_for_light,
+    ask_for_no_light,
     background_in,
-    direction_of,
     light_of,
     picked_in,
     shadow_ray,
@@ -77,9 +77,12 @@ from reference_rt.materials import (
     BsdfSample,
     ScatterBlock,
     Scattered,
+    asked_in,
+    direction_towards,
     drawn_in,
     lit_in,
     put_asked,
+    put_place,
     put_scattered,
 )
 from reference_rt.materials.textured import evaluate_textures
@@ -268,9 +271,9 @@ def radiances(
         _emission(path, scene, depth, n, scratch)
         if depth + 1 >= path.max_depth:
             break
-        _pick_lights(scene, samplers, depth, n, scratch)
+        _ask(scene, samplers, depth, n, scratch)
         any_light.samples(scene.lights, lit, scene.shapes, scene.textures, points, n)
-        _scatter(scene, samplers, depth, n, scratch)
+        _scatter(scene, n, scratch)
         n = _next_edges(path, scene, samplers, depth, n, scratch)
 
 
@@ -294,63 +297,58 @@ def _emission(path: PathSetup, scene: KernelScene, depth: int, n: int, scratch: 
 
 
 @kernel
-def _pick_lights(
-    scene: KernelScene, samplers: Samplers, depth: int, n: int, scratch: Scratch
-) -> None:
-    """Picks a light for each surface.  Random numbers that decide nothing are not drawn."""
-    count, dimension = any_light.count(scene.lights), sampling.PER_BOUNCE * depth
+def _ask(scene: KernelScene, samplers: Samplers, depth: int, n: int, scratch: Scratch) -> None:
+    """What is asked of lights and materials at each surface.  Random numbers that decide nothing
+    are not drawn."""
+    materials, lights, hits = scene.materials, scene.lights, scratch.hits
+    is_flattened = any_material.are_flattened(materials)
+    count, dimension = any_light.count(lights), sampling.PER_BOUNCE * depth
     for j in range(n):
-        scratch.lit.codes[j] = -1
-        if scratch.hits.codes[j] < 0 or count == 0:
+        ask_for_no_light(scratch.lit, j)
+        scratch.scattered.codes[j] = -1
+        if hits.codes[j] < 0:
             continue
-        point, u_pick = point_of(scratch.points, j), 0.5
-        if not any_material.is_smooth(scene.materials, point.material):
+        ray, point, hit = ray_of(scratch.rays, j), point_of(scratch.points, j), hit_of(hits, j)
+        m, sampler = point.material, sampler_of(samplers, scratch.samples[j])
+        if not (is_flattened or any_material.scatters(materials, m)):
             continue
-        sampler = sampler_of(samplers, scratch.samples[j])
-        if count > 1:
-            u_pick, _ = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
-        normal = light_selection_normal(scene, point)
-        picked = any_light.pick(scene.lights, point.p, normal, u_pick)
-        if picked.probability > 0.0:
-            u0, u1 = draw_pair(sampler, dimension + sampling.LIGHT_POINT)
-            ask_for_light(scene.lights, scratch.lit, j, picked, u0, u1)
+        is_smooth, u_pick, u_lobe = any_material.is_smooth(materials, m), 0.5, 0.5
+        if any_material.uses_u_lobe(materials, m) or (is_smooth and count > 1):
+            u_pick, u_lobe = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
+        if is_smooth:
+            normal = light_selection_normal(scene, point)
+            picked = any_light.pick(lights, point.p, normal, u_pick)
+            if picked.probability > 0.0:
+                u0, u1 = draw_pair(sampler, dimension + sampling.LIGHT_POINT)
+                ask_for_light(lights, scratch.lit, j, picked, u0, u1)
+        u0, u1 = draw_pair(sampler, dimension + sampling.BSDF_DIRECTION)
+        frame, _ = frame_at(materials, scene.geometry, ray, hit, point)
+        asked = Asked(frame, u_lobe, u0, u1)
+        kind, i = (0, 0) if is_flattened else (materials.kind[m], materials.row[m])
+        put_asked(scratch.scattered, j, kind, i, asked)
+        if any_material.uses_textures(materials, m):
+            put_place(scratch.scattered, j, place(scene, m, ray, hit))
 
 
 @kernel
-def _scatter(
-    scene: KernelScene, samplers: Samplers, depth: int, n: int, scratch: Scratch
-) -> None:
+def _scatter(scene: KernelScene, n: int, scratch: Scratch) -> None:
     """What the materials scatter: the light samples, and the paths themselves."""
     materials, rays, hits, points = scene.materials, scratch.rays, scratch.hits, scratch.points
-    block, dimension = scratch.scattered, sampling.PER_BOUNCE * depth
-    is_flattened = any_material.are_flattened(materials)
+    block, lit = scratch.scattered, scratch.lit
+    if not any_material.are_flattened(materials):
+        textures, kept = scene.textures, scratch.kept
+        any_material.scatter(materials, block, rays, points, lit.numbers, textures, kept, n)
+        return
     for j in range(n):
-        block.codes[j] = -1
-        if hits.codes[j] < 0:
-            continue
-        ray, point, hit = ray_of(rays, j), point_of(points, j), hit_of(hits, j)
-        m, sampler, u_lobe = point.material, sampler_of(samplers, scratch.samples[j]), 0.5
-        if not (is_flattened or any_material.scatters(materials, m)):
-            continue
-        if any_material.uses_u_lobe(materials, m):
-            _, u_lobe = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
-        u0, u1 = draw_pair(sampler, dimension + sampling.BSDF_DIRECTION)
-        wi = direction_of(scratch.lit, j)
-        if is_flattened:
-            shading = shade_point(scene, ray, hit, point, scratch.kept)
-            sent = Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
+        if block.codes[j] >= 0:
+            point, ray = point_of(points, j), ray_of(rays, j)
+            shading = shade_point(scene, ray, hit_of(hits, j), point, scratch.kept)
+            wi, sent = direction_towards(lit.numbers, j), Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
             if not is_black(wi):
                 sent = any_material.eval_pdf(materials, shading, to_local(shading.frame, wi))
-            drawn = any_material.sample(materials, shading, u_lobe, u0, u1)
-            block.codes[j] = 0
+            u = asked_in(block, j, point.ns)
+            drawn = any_material.sample(materials, shading, u.u_lobe, u.u0, u.u1)
             put_scattered(block, j, shading.frame, sent, drawn)
-        else:
-            frame, _ = frame_at(materials, scene.geometry, ray, hit, point)
-            at = place(scene, m, ray, hit)
-            asked = Asked(frame, wi, u_lobe, u0, u1, at.u, at.v, at.colour)
-            put_asked(block, j, materials.kind[m], materials.row[m], asked)
-    if not is_flattened:
-        any_material.scatter(materials, block, rays, points, scene.textures, scratch.kept, n)
 
 
 @kernel

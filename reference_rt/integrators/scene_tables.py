@@ -1,6 +1,7 @@
-"""`SceneTables`: the arrays of a scene, which `reference_rt.scene.build` makes; `KernelScene`: the same
-as kernels take them."""
+"""`SceneTables`: the arrays of a scene, which `reference_rt.scene.build` makes; `KernelScene`: the
+same as kernels take them."""
 
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from reference_rt import shapes as any_shape
@@ -20,17 +21,27 @@ from reference_rt.core.ray import (
 from reference_rt.jit.kernel import kernel
 from reference_rt.lights import Lights, LightTables
 from reference_rt.materials import Materials
-from reference_rt.shapes import TABLES, Shapes
+from reference_rt.shapes import TABLES
 from reference_rt.textures import Textures
 
 
-class SceneTables(NamedTuple):
-    """All arrays of a scene; None for what it lacks."""
+@dataclass(frozen=True, eq=False)
+class SceneTables:
+    """All arrays of a scene; None for what it lacks.  links: by purpose, what was made of them for
+    kernels (`rendering/kept_links.py`)."""
 
     geometry: Geometry
     materials: Materials
     lights: Lights
     textures: Textures | None
+    links: dict[Any, Any] = field(init=False, default_factory=dict, repr=False)
+
+    @property
+    def parts(self) -> tuple[Any, ...]:
+        return self.geometry, self.materials, self.lights, self.textures
+
+    def __reduce__(self) -> Any:
+        return SceneTables, self.parts  # links hold addresses of this process
 
 
 class KernelScene(NamedTuple):

@@ -19,9 +19,9 @@ becomes, for scenes of spheres and boxes,
             return boxes(shapes.boxes, ray, hit)  # box.uv
         return otherwise(shapes, ray, hit)  # the function as it was decorated
 
-Compiled code and plain Python run this text, and tracebacks show it.  Given the table of one type in
-place of all tables, as a kernel for one type has it, the kernel of that type is called: so the same
-text serves all types in a loop over a block of paths.
+Compiled code and plain Python run this text, and tracebacks show it.  Given the table of one type
+in place of all tables, as a kernel for one type has it, the kernel of that type is called: so the
+same text serves all types in a loop over a block of paths.
 
 For a link to tables (`links.py`) the text depends on no scene.  A list has, for each code, the
 address of the table and the function pointers of the operations, 32 words (`STRIDE`) in all, of

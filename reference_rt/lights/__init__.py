@@ -44,11 +44,11 @@ from reference_rt.lights.emitters.constant import Environment as Environment
 from reference_rt.lights.emitters.environment_map import EnvironmentMaps as EnvironmentMaps
 from reference_rt.lights.light import LIGHT_FLOATS as LIGHT_FLOATS
 from reference_rt.lights.light import LIGHT_INTEGERS as LIGHT_INTEGERS
+from reference_rt.lights.light import Background as Background
 from reference_rt.lights.light import LightBlock as LightBlock
 from reference_rt.lights.light import LightSample as LightSample
-from reference_rt.lights.light import Background as Background
+from reference_rt.lights.light import ask_for_no_light as ask_for_no_light
 from reference_rt.lights.light import background_in as background_in
-from reference_rt.lights.light import direction_of as direction_of
 from reference_rt.lights.light import light_of as light_of
 from reference_rt.lights.light import shadow_ray as shadow_ray
 from reference_rt.lights.selection.choice import LightSampler as LightSampler

@@ -110,7 +110,13 @@ def count(lights: LightTables) -> int:
 
 @kernel
 def sample_one(
-    lights: LightTables, k: int, shapes: Shapes, textures: Textures | None, p: Vec3, u0: float, u1: float
+    lights: LightTables,
+    k: int,
+    shapes: Shapes,
+    textures: Textures | None,
+    p: Vec3,
+    u0: float,
+    u1: float,
 ) -> LightSample:
     """A sample of the light from entry k at `p`; its pdf is without the probability of k."""
     kind, i = lights.choice.kind[k], lights.choice.row[k]

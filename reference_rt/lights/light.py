@@ -101,11 +101,9 @@ def light_of(lit: LightBlock, j: int) -> LightSample:
 
 
 @kernel
-def direction_of(lit: LightBlock, j: int) -> Vec3:
-    """The direction of light sample j; 0 if there is none, or nothing arrives."""
-    if lit.codes[j] < 0 or lit.numbers[6 * BLOCK + j] == 0.0:
-        return Vec3(0.0, 0.0, 0.0)
-    return vector_of(lit.numbers, 0, j)
+def ask_for_no_light(lit: LightBlock, j: int) -> None:
+    """Path j has no light sample, unless it asks for one: its pdf is 0."""
+    lit.codes[j], lit.numbers[6 * BLOCK + j] = -1, 0.0
 
 
 class Background(NamedTuple):

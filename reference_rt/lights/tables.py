@@ -27,8 +27,8 @@ from reference_rt.lights.emitters.constant import Ambient as Ambient
 from reference_rt.lights.emitters.constant import Constant as Constant
 from reference_rt.lights.emitters.constant import Environment
 from reference_rt.lights.emitters.directional import Directional as Directional
-from reference_rt.lights.emitters.environment_map import EnvironmentMaps
 from reference_rt.lights.emitters.environment_map import EnvironmentMap as EnvironmentMap
+from reference_rt.lights.emitters.environment_map import EnvironmentMaps
 from reference_rt.lights.emitters.point import Point as Point
 from reference_rt.lights.emitters.projector import Projector as Projector
 from reference_rt.lights.emitters.spot import Spot as Spot
@@ -53,9 +53,7 @@ _sample_of = _of_environment("sample")
 
 
 @kernel
-def _one_by_one(
-    environment: Any, rays: RayBlock, hits: HitBlock, n: int, lit: LightBlock
-) -> None:
+def _one_by_one(environment: Any, rays: RayBlock, hits: HitBlock, n: int, lit: LightBlock) -> None:
     for j in range(n):
         if hits.codes[j] < 0:
             d = vector_of(rays.numbers, 3, j)

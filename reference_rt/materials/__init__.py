@@ -54,9 +54,12 @@ from reference_rt.materials.material import Material as Material
 from reference_rt.materials.material import ScatterBlock as ScatterBlock
 from reference_rt.materials.material import Scattered as Scattered
 from reference_rt.materials.material import Shading as Shading
+from reference_rt.materials.material import asked_in as asked_in
+from reference_rt.materials.material import direction_towards as direction_towards
 from reference_rt.materials.material import drawn_in as drawn_in
 from reference_rt.materials.material import lit_in as lit_in
 from reference_rt.materials.material import put_asked as put_asked
+from reference_rt.materials.material import put_place as put_place
 from reference_rt.materials.material import put_scattered as put_scattered
 from reference_rt.materials.nested.tilted import Bump as Bump
 from reference_rt.materials.nested.tilted import NormalMap as NormalMap

@@ -5,7 +5,7 @@ A material that is made of others (mask, blend, bump, ...) is a list of layers, 
 weight and a frame (`nested/flattened.py`).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import PointBlock, RayBlock
@@ -13,11 +13,9 @@ from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.links import is_absent
 from reference_rt.materials.bsdfs import dispatch as bsdf
-from reference_rt.materials.bsdfs.tables import Leaves
 from reference_rt.materials.material import Branches, BsdfSample, ScatterBlock, Scattered, Shading
 from reference_rt.materials.nested import flattened
 from reference_rt.materials.nested.flattened import (
-    FlattenedMaterials,
     ambient_nested,
     branches_nested,
     eval_pdf_nested,
@@ -54,8 +52,8 @@ class Materials(NamedTuple):
     oriented: IntArray
     asks: IntArray
     textured: Textured
-    flat_leaves: FlattenedMaterials | None
-    leaves: Leaves
+    flat_leaves: Any
+    leaves: Any
 
 
 @kernel
@@ -123,16 +121,17 @@ def scatter(
     block: ScatterBlock,
     rays: RayBlock,
     points: PointBlock,
+    light: FloatArray,
     textures: Textures | None,
     kept: FloatArray,
     n: int,
 ) -> None:
     """`eval_pdf` towards the light samples, and `sample`, for those of the first n paths for which
     this is asked (`put_asked`), of materials that are no lists of layers.  Read it with `lit_in`
-    and `drawn_in`."""
+    and `drawn_in`.  light: see `direction_towards`."""
     leaves, textured = materials.leaves, materials.textured
     for kind in range(bsdf.KINDS):
-        bsdf.scatter(leaves, kind, block, rays, points, textured, textures, kept, n)
+        bsdf.scatter(leaves, kind, block, rays, points, light, textured, textures, kept, n)
 
 
 @kernel
@@ -193,15 +192,3 @@ def branches(materials: Materials, shading: Shading, k: int) -> Branches:
         kind, i = materials.kind[m], materials.row[m]
         return bsdf.branches(materials.leaves, kind, i, shading.at, shading.wo)
     return branches_nested(materials.flat_leaves, materials.leaves, shading, k)
-
-
-@kernel
-def are_flattened(materials: Materials) -> bool:
-    """Whether any material is made of others: then all have lists of layers."""
-    return not is_absent(materials.flat_leaves)
-
-
-@kernel
-def scatters(materials: Materials, m: int) -> bool:
-    """Whether a material that is not made of others has a table: it scatters anything."""
-    return bool(materials.kind[m] < bsdf.KINDS)

@@ -156,15 +156,15 @@ class Shading(NamedTuple):
     flat_leaves: FloatArray
 
 
-SCATTER_FLOATS, SCATTER_INTEGERS = 30 * BLOCK, 2 * BLOCK
+SCATTER_FLOATS, SCATTER_INTEGERS = 27 * BLOCK, 2 * BLOCK
 
 
 class ScatterBlock(NamedTuple):
     """What materials scatter of up to BLOCK paths, as SoA.
 
-    numbers (SCATTER_FLOATS,): columns of `Asked`, but for the frame's n;  of the answer value and
-    density towards the light, and of the `BsdfSample`.  codes (SCATTER_INTEGERS,): table of all
-    materials, -1 where none scatters, then row.
+    numbers (SCATTER_FLOATS,): columns of `Asked`, but for the frame's n, and of the place for
+    texture lookups;  of the answer value and density towards the light, and of the `BsdfSample`.
+    codes (SCATTER_INTEGERS,): table of all materials, -1 where none scatters, then row.
     """
 
     numbers: FloatArray
@@ -172,41 +172,53 @@ class ScatterBlock(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """What is asked of a material.  frame: the shading frame;  wi: the unit direction, in the
-    world, of a light sample, 0 for none;  u_lobe, u0, u1: numbers for `sample`;  u, v, colour: the
-    place for texture lookups, see `At`."""
+    """What is asked of a material.  frame: the shading frame;  u_lobe, u0, u1: numbers for
+    `sample`."""
 
     frame: Frame
-    wi: Vec3
     u_lobe: float
     u0: float
     u1: float
-    u: float
-    v: float
-    colour: Vec3
 
 
 @kernel
 def put_asked(block: ScatterBlock, j: int, kind: int, i: int, asked: Asked) -> None:
     """Path j is scattered by row i of a kind of materials."""
-    numbers = block.numbers
     block.codes[j], block.codes[BLOCK + j] = kind, i
-    put_vector(numbers, 0, j, asked.frame.s)
-    put_vector(numbers, 3, j, asked.frame.t)
-    put_vector(numbers, 6, j, Vec3(asked.u_lobe, asked.u0, asked.u1))
-    numbers[9 * BLOCK + j], numbers[10 * BLOCK + j] = asked.u, asked.v
-    put_vector(numbers, 11, j, asked.colour)
-    put_vector(numbers, 27, j, asked.wi)
+    put_vector(block.numbers, 0, j, asked.frame.s)
+    put_vector(block.numbers, 3, j, asked.frame.t)
+    put_vector(block.numbers, 6, j, Vec3(asked.u_lobe, asked.u0, asked.u1))
 
 
 @kernel
 def asked_in(block: ScatterBlock, j: int, n: Vec3) -> Asked:
     """What is asked for path j.  n: the normal of the frame."""
+    numbers, u = block.numbers, vector_of(block.numbers, 6, j)
+    frame = Frame(vector_of(numbers, 0, j), vector_of(numbers, 3, j), n)
+    return Asked(frame, u.x, u.y, u.z)
+
+
+@kernel
+def put_place(block: ScatterBlock, j: int, at: At) -> None:
+    """The place for path j's texture lookups; of materials without textures none is stored."""
+    block.numbers[9 * BLOCK + j], block.numbers[10 * BLOCK + j] = at.u, at.v
+    put_vector(block.numbers, 11, j, at.colour)
+
+
+@kernel
+def place_in(block: ScatterBlock, j: int, textures: Any) -> At:
     numbers = block.numbers
-    frame, u = Frame(vector_of(numbers, 0, j), vector_of(numbers, 3, j), n), vector_of(numbers, 6, j)
-    at_u, at_v = numbers[9 * BLOCK + j], numbers[10 * BLOCK + j]
-    wi, colour = vector_of(numbers, 27, j), vector_of(numbers, 11, j)
-    return Asked(frame, wi, u.x, u.y, u.z, at_u, at_v, colour)
+    u, v = numbers[9 * BLOCK + j], numbers[10 * BLOCK + j]
+    return At(textures, u, v, vector_of(numbers, 11, j))
+
+
+@kernel
+def direction_towards(light: FloatArray, j: int) -> Vec3:
+    """The unit direction, in the world, of path j's light sample; 0 where nothing arrives.  light:
+    columns of directions, in the first three, and of their pdfs, in the seventh."""
+    if light[6 * BLOCK + j] == 0.0:
+        return Vec3(0.0, 0.0, 0.0)
+    return vector_of(light, 0, j)
 
 
 @kernel

@@ -44,8 +44,9 @@ class Job:
     """A kernel of `tiles`.
 
     setup: the class of its integrator's setup, None for others;  arguments: from the scene, the
-    view and the filter, as kernels take them, to the kernel's arguments before its sums;  sums: the names of these, "" for one that is absent;  columns: of a kernel that computes
-    values, once for each pixel, instead of adding up samples: by name, the columns that are stored.
+    view and the filter, as kernels take them, to the kernel's arguments before its sums;  sums: the
+    names of these, "" for one that is absent;  columns: of a kernel that computes values, once for
+    each pixel, instead of adding up samples: by name, the columns that are stored.
     """
 
     kernel: Any

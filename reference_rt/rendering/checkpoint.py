@@ -143,7 +143,7 @@ def render_digest(scene: BuiltScene, tables: SceneTables) -> bytes:
     ]
     digest = hashlib.blake2b(sources_digest(), digest_size=32)
     digest.update(json.dumps(description, sort_keys=True).encode())
-    for part in _parts(tables):
+    for part in _parts(tables.parts):
         digest.update(part)
     return digest.digest()
 

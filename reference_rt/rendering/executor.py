@@ -20,7 +20,7 @@ from reference_rt.jit.parallel_compile import Report
 from reference_rt.rendering import units
 from reference_rt.rendering.accumulation import Sums, add_samples, jobs_of, widths_of
 from reference_rt.rendering.checkpoint import render_digest, sources_digest
-from reference_rt.rendering.kernels import Linked, compile_ahead
+from reference_rt.rendering.kernels import compile_ahead, kernels_for
 from reference_rt.rendering.noise import statistics
 from reference_rt.rendering.units import Unit, tiles_of
 from reference_rt.scene.build import BuiltScene
@@ -99,8 +99,8 @@ class Prepared:
         with compile_ahead(self.jobs, threads) as ahead:
             self.tables = build_and_check(scene, tables)
             clock.append(time.perf_counter())
-            linked = Linked(self.jobs, self.tables, view, film.filter.setup())
-            self._kernels = linked.compile(threads, compiling, ahead)
+            given = self.tables, view, film.filter.setup()
+            self._kernels = kernels_for(self.jobs, *given, threads, compiling, ahead)
         clock.append(time.perf_counter())
         self.seconds = dict(zip(("tables", "compile"), np.diff(clock).tolist(), strict=True))
 
@@ -164,6 +164,7 @@ result are nothing."""
 
 _MOST_SCENES = 2
 """Scenes that a worker keeps: one that is being finished, and the next."""
+
 
 class RemoteScene(NamedTuple):
     """A scene for workers.  digest: of the render (`render_digest`);  sources: of this package;

@@ -16,6 +16,7 @@ from reference_rt.jit.kernel import precompile, signature_of
 from reference_rt.jit.links import Link, Linker
 from reference_rt.jit.parallel_compile import Ahead, Call, Report, precompile_all
 from reference_rt.rendering.accumulation import Job
+from reference_rt.rendering.kept_links import linked
 from reference_rt.rendering.linking import (
     EMPTY_SCENE,
     EMPTY_VIEW,
@@ -39,47 +40,74 @@ def _call(job: Job, arguments: tuple[Any, ...]) -> Call:
     return job.kernel, signature_of(*arguments, *job.empty(), 0, 0, 0, 0)
 
 
-class Linked:
-    """The kernels of some jobs, with their arguments.  calls: those to be compiled, the jobs' own
-    first."""
+def calls_for(jobs: Sequence[Job], tables: SceneTables, view: Any, film_filter: Any) -> list[Call]:
+    """The kernels of some jobs, to be compiled: the jobs' own, then those behind links."""
+    linker, given = _Given(jobs, view, film_filter), Linker()
+    for job in jobs:
+        linked_scene(given, tables, calls_of(job.kernel, job.setup))
+    return [*linker.calls, *sorted(given.calls, key=cost, reverse=True)]
 
-    def __init__(
-        self, jobs: Sequence[Job], tables: SceneTables, view: Any, film_filter: Any
-    ) -> None:
-        self._linker = linker = Linker()
-        self._jobs, self._arguments = jobs, list[tuple[Any, ...]]()
-        self.calls: list[Call] = []
-        for job in jobs:
-            given = job.arguments(
-                linked_scene(linker, tables, calls_of(job.kernel, job.setup)),
-                linked_view(linker, view),
-                linked_filter(linker, film_filter),
-            )
-            self._arguments.append(given)
-            self.calls.append(_call(job, given))
-        self.calls += sorted(linker.calls, key=cost, reverse=True)
 
-    def compile(
-        self, threads: int, say: Report | None = None, ahead: Ahead | None = None
-    ) -> list[Callable[..., None]]:
-        """The jobs' kernels, as functions of (sums, begin, end, first, last);  sums: arrays by
-        name, see `accumulation.Job`.  They are valid as long as this lives.  say, ahead: see
-        `precompile_all`."""
-        precompile_all(self.calls, threads, say, ahead)
-        self._linker.resolve()
-        own = zip(self._jobs, self.calls, self._arguments, strict=False)
-        return [self._bound(job, precompile(*call), given) for job, call, given in own]
+class _Given:
+    """What jobs are given besides the scene.  calls: the jobs' kernels, and those behind links."""
 
-    def _bound(
-        self, job: Job, kernel: Callable[..., Any], arguments: tuple[Any, ...]
-    ) -> Callable[..., None]:
-        linked = self  # which the kernel's arguments point into
+    def __init__(self, jobs: Sequence[Job], view: Any, film_filter: Any) -> None:
+        self.linker = linker = Linker()
+        self.view, self.filter = linked_view(linker, view), linked_filter(linker, film_filter)
+        self.own = [_call(job, job.arguments(EMPTY_SCENE, self.view, self.filter)) for job in jobs]
+        self.calls = [*self.own, *linker.calls]
+
+
+def kernels_for(
+    jobs: Sequence[Job],
+    tables: SceneTables,
+    view: Any,
+    film_filter: Any,
+    threads: int,
+    say: Report | None = None,
+    ahead: Ahead | None = None,
+) -> list[Callable[..., None]]:
+    """The jobs' kernels, compiled, as functions of (sums, begin, end, first, last).
+
+    sums: arrays by name, see `accumulation.Job`;  say, ahead: see `precompile_all`.
+    """
+    given = _Given(jobs, view, film_filter)
+
+    def link(linker: Linker) -> Any:
+        called = [calls_of(job.kernel, job.setup) for job in jobs]
+        return [linked_scene(linker, tables, calls) for calls in called]
+
+    def compile_for(linker: Linker) -> None:
+        calls = [*given.calls, *sorted(linker.calls, key=cost, reverse=True)]
+        precompile_all(calls, threads, say, ahead)
+
+    purpose = tuple((job.kernel, job.setup) for job in jobs)
+    scene = linked(tables, purpose, link, compile_for)
+    precompile_all(given.calls, threads, say, ahead)
+    given.linker.resolve()
+
+    def bound(job: Job, kernel: Callable[..., Any], of_job: Any) -> Callable[..., None]:
+        arguments = job.arguments(of_job, given.view, given.filter)
+        kept = scene, given  # which the arguments point into
 
         def run(sums: Any, *tile: int) -> None:
-            assert linked
+            assert kept
             kernel(*arguments, *job.given(sums), *tile)
 
         return run
+
+    compiled = [precompile(*call) for call in given.own]
+    return [bound(*one) for one in zip(jobs, compiled, scene.tables, strict=True)]
+
+
+def plain_arguments(job: Job, tables: SceneTables, view: Any, film_filter: Any) -> tuple[Any, ...]:
+    """What a job's kernel takes before its sums, for a process that runs it as plain Python."""
+    linker = Linker(is_plain=True)
+    return job.arguments(
+        linked_scene(linker, tables, calls_of(job.kernel, job.setup)),
+        linked_view(linker, view),
+        linked_filter(linker, film_filter),
+    )
 
 
 # ---- how long kernels take to compile ------------------------------------------------------------

@@ -205,9 +205,11 @@ def linked_materials(linker: Linker, materials: Materials, calls: Calls) -> Mate
 def linked_lights(linker: Linker, lights: Lights, calls: Calls) -> LightTables:
     """Lights as kernels take them."""
     group, tree, picked = light_tables.by_code, linker.nothing, _names(calls, light_trees)
-    if lights.tree is not None and picked:
+    choice = _NO_LIGHTS if lights.choice is None else lights.choice
+    if lights.tree is None:
+        choice = choice._replace(bounded=np.zeros(1))
+    elif picked:
         tree = linker.link(light_trees, picked, lights.tree)
     ambient = np.zeros((1, 3)) if lights.ambient is None else lights.ambient
     emitters = linker.link(group, _names(calls, group), lights)
-    choice = _NO_LIGHTS if lights.choice is None else lights.choice
     return LightTables(emitters, choice, tree, ambient)

@@ -41,7 +41,7 @@ from reference_rt.accel import geometry as geometries
 from reference_rt.accel.bvh import CENTER, CHILDREN, child_of, size_of
 from reference_rt.accel.leaf import nearer_primitive, nearest_of_triangle_leaf
 from reference_rt.accel.single_ray import enter
-from reference_rt.core.ray import Ray, at
+from reference_rt.core.ray import Ray, at, hit_of, point_of, ray_of
 from reference_rt.core.vec3 import Vec3, is_black
 from reference_rt.integrators import (
     RayCast,
@@ -53,11 +53,12 @@ from reference_rt.integrators import (
     shading,
     whitted,
 )
-from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.integrators.scene_tables import KernelScene
 from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.rendering import tiles
 from reference_rt.rendering.accumulation import jobs_of
 from reference_rt.rendering.executor import build_and_check
+from reference_rt.rendering.kernels import plain_arguments
 from reference_rt.scene.build import BuiltScene
 from reference_rt.util.processes import tied
 
@@ -72,12 +73,13 @@ def ray_trees(scene: BuiltScene, places: Sequence[tuple[int, int, int]]) -> list
     `rays`, its radiance, the filter_weight, and value, the product of both.  Raises SceneError."""
     film = scene.film
     tables = build_and_check(scene, None)
-    given = tables, scene.camera.setup(film.width, film.height), film.filter.setup()
+    view = scene.camera.setup(film.width, film.height)
+    given = plain_arguments(jobs_of(scene)[0], tables, view, film.filter.setup())
     asked = [((film.width * y + x), sample) for x, y, sample in places]
     is_cast = isinstance(scene.integrator, RayCast)
     done = subprocess.run(
         [sys.executable, "-P", "-c", f"from {__name__} import _answer; _answer()"],
-        input=pickle.dumps((is_cast, jobs_of(scene)[0].arguments(*given), asked)),
+        input=pickle.dumps((is_cast, given, asked)),
         env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(sys.path)},
         stdout=subprocess.PIPE,
         check=True,
@@ -98,7 +100,7 @@ def _answer() -> None:
 
 def _tree(is_cast: bool, arguments: Any, pixel: int, sample: int) -> dict[str, Any]:
     kernel: Any = tiles.aov_tile if is_cast else tiles.render_tile
-    out: Any = [np.zeros((1, 10))] if is_cast else [np.zeros((1, 3)), None]
+    out: Any = [np.zeros((1, 10))] if is_cast else [np.zeros((1, 3)), np.zeros((0, 3))]
     recorder, scene = _Recorder(), arguments[0 if is_cast else 1]
     recorder.run(lambda: kernel(*arguments, *out, pixel, pixel + 1, sample, sample + 1))
     radiance = Vec3(0.0, 0.0, 0.0)
@@ -161,7 +163,8 @@ def _watch(run: Callable[[], object], handlers: Mapping[Any, Callable[[_Return],
 
 
 _WHITTED, _DIRECT = _code(whitted.radiance), _code(direct.radiances)
-_OF_SCATTERED = _code(direct._trace)
+_OF_SCATTERED, _PATHS = _code(direct._trace), _code(path.radiances)
+_OF_PATHS = _code(path._next_edges)
 _WHOLE = Vec3(1.0, 1.0, 1.0)
 
 
@@ -182,14 +185,13 @@ class _Recorder:
 
     def run(self, kernel: Callable[[], object]) -> None:
         keep = {
-            name: functools.partial(self._last.__setitem__, name)
-            for name in ("occluded", "share", "emission", "scatter")
+            name: functools.partial(self._last.__setitem__, name) for name in ("occluded", "share")
         }
         handlers: dict[Any, Callable[[_Return], Any]] = {
-            tiles._camera_film_ray: self._film_ray,
+            tiles._film_ray: self._film_ray,
             shading.shade: self._shade,
             geometries.closest_hit: self._closest_hit,
-            block_query._hit_in_geometry: self._hit_of_block,
+            hit_of: self._hit_of_block,
             scene_tables.surface: self._point,
             geometries.occluded: keep["occluded"],
             any_light.background: self._emission,
@@ -202,8 +204,8 @@ class _Recorder:
             path.environment_emission: self._weighted_emission,
             path.hit_emission: self._weighted_emission,
             path.connect: self._light_sample,
-            path.scatter: keep["scatter"],
-            path._edge: self._edge,
+            scene_tables.surfaces: self._edge,
+            path.go_on: self._scattered,
             block_query.any_hits: self._any_hits,
             ray_cast.cast: self._cast,
         }
@@ -248,10 +250,10 @@ class _Recorder:
 
     def _hit_of_block(self, r: _Return) -> None:
         if r.caller is _DIRECT:
-            self._ray(CAMERA, None, r.own["ray"], _WHOLE, found=r.result)
+            self._ray(CAMERA, None, r.outer["ray"], _WHOLE, found=r.result)
         elif r.caller is _OF_SCATTERED:
             weight = r.outer["state"].throughput
-            self._ray(SCATTERED, 0, r.own["ray"], weight, found=r.result)
+            self._ray(SCATTERED, 0, r.outer["ray"], weight, found=r.result)
 
     def _emission(self, r: _Return) -> None:
         if r.caller in (_WHITTED, _DIRECT):
@@ -291,25 +293,26 @@ class _Recorder:
         self._lights.clear()
 
     def _weighted_emission(self, r: _Return) -> None:
-        if r.caller is not _OF_SCATTERED:
-            self._last["emission"] = r
-            return
         record = self.rays[-1]
-        record["numbers"] = _of_emission(r.own)
+        record["numbers"] |= _of_emission(r.own)
         _add(record, "emitted" if record["found"].kind >= 0 else "background", r.result)
 
     def _edge(self, r: _Return) -> None:
-        own, state = r.own, r.own["state"]
-        kind = CAMERA if own["depth"] == 0 else SCATTERED
-        record = self._ray(kind, self._surface, own["ray"], state.throughput, found=own["hit"])
-        if own["hit"].kind >= 0:
-            record["point"] = own["point"]
-        if (emission := self._last.pop("emission", None)) is not None:
-            record["numbers"] |= _of_emission(emission.own)
-        if (scatter := self._last.pop("scatter", None)) is not None:
-            record["numbers"]["sampled pdf"] = scatter.own["scattered"].pdf
-            record["numbers"] |= {k: scatter.own[k] for k in ("survival",) if k in scatter.own}
-        _add(record, "emitted" if own["hit"].kind >= 0 else "background", r.result.emitted)
+        """The hit of a path's next edge, and its surface point, are known."""
+        if r.caller is not _PATHS:
+            return
+        ray, hit = ray_of(r.own["rays"], 0), hit_of(r.own["hits"], 0)
+        state = path.state_of(r.outer["scratch"], 0)
+        kind = CAMERA if r.outer["depth"] == 0 else SCATTERED
+        record = self._ray(kind, self._surface, ray, state.throughput, found=hit)
+        if hit.kind >= 0:
+            record["point"] = point_of(r.own["points"], 0)
+
+    def _scattered(self, r: _Return) -> None:
+        if r.caller is _OF_PATHS:
+            numbers = self.rays[-1]["numbers"]
+            numbers["sampled pdf"] = r.own["drawn"].pdf
+            numbers |= {k: r.own[k] for k in ("survival",) if k in r.own}
 
     def _cast(self, r: _Return) -> None:
         record = self._ray(CAMERA, None, r.own["ray"], _WHOLE, found=r.own["hit"])
@@ -328,7 +331,7 @@ def _of_light(own: dict[str, Any]) -> dict[str, float]:
         "light": picked.light,
         "selection": picked.probability,
         "light pdf": light.pdf,
-        "bsdf pdf": 0.0 if light.is_delta else own["sample"].bsdf_pdf,
+        "bsdf pdf": 0.0 if light.is_delta else own["scattered"].density,
         "MIS weight": own["weight"],
     }
 
@@ -342,7 +345,7 @@ def _of_emission(own: dict[str, Any]) -> dict[str, float]:
 # ---- what a ray meets ----------------------------------------------------------------------------
 
 
-def _described(record: RayRecord, scene: SceneTables) -> RayRecord:
+def _described(record: RayRecord, scene: KernelScene) -> RayRecord:
     """The ray as it is shown, of numbers, names and tuples."""
     ray, hit = record.pop("ray"), record.pop("found", None)
     point = record.pop("point", None)
@@ -357,7 +360,7 @@ def _described(record: RayRecord, scene: SceneTables) -> RayRecord:
     return record | _met(ray, record["kind"] == SHADOW, scene)
 
 
-def _met(ray: Ray, any_hit: bool, scene: SceneTables) -> dict[str, Any]:
+def _met(ray: Ray, any_hit: bool, scene: KernelScene) -> dict[str, Any]:
     """The `steps` and `tests` of a ray that is traced alone."""
     geometry = scene.geometry
     if geometry.bvh is None:

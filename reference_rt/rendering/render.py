@@ -125,7 +125,7 @@ class Session:
         threads: int | None = None,
         tables: SceneTables | None = None,
         compiling: Report | None = None,
-            limits: Limits | None = None,
+        limits: Limits | None = None,
         storage: Storage | None = None,
         memory: int | None = None,
         workers: Callable[[], Workers] | None = None,

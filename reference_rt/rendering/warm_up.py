@@ -40,7 +40,7 @@ from reference_rt.materials import (
     TwoSided,
 )
 from reference_rt.rendering.accumulation import Job, jobs_of
-from reference_rt.rendering.kernels import Linked, cost
+from reference_rt.rendering.kernels import calls_for, cost
 from reference_rt.rendering.linking import EMPTY_SCENE, geometry_of
 from reference_rt.rendering.query.bsdf import scatter_kernel
 from reference_rt.rendering.query.crossings import SOLIDS, crossings_kernel
@@ -88,7 +88,7 @@ def all_calls() -> list[Call]:
 
 def picture_calls(scene: BuiltScene) -> list[Call]:
     """The kernels of a scene's picture."""
-    return Linked(*_picture(scene)).calls
+    return calls_for(*_picture(scene))
 
 
 def _picture(scene: BuiltScene) -> tuple[list[Job], SceneTables, Any, Any]:

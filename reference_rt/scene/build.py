@@ -1,7 +1,7 @@
 """Scene -> SceneTables: the only place that makes a scene's arrays.
 
-Every array is C-contiguous and writable, and has the same type in all scenes, so that tables of a type
-have the same Numba type and share compiled kernels.  A table that the scene lacks is None.
+Every array is C-contiguous and writable, and has the same type in all scenes, so that tables of a
+type have the same Numba type and share compiled kernels.  A table that the scene lacks is None.
 """
 
 from typing import Any, Self

@@ -78,9 +78,7 @@ def light_tables(scene: SceneModel, geometry: Geometry, palette: Palette) -> Lig
         choice=choice,
         tree=None,
     )
-    if (tree := _tree(lights, geometry, power)) is None and choice is not None:
-        lights = lights._replace(choice=choice._replace(bounded=np.zeros(1)))
-    return lights._replace(tree=tree)
+    return lights._replace(tree=_tree(lights, geometry, power))
 
 
 def scene_radius(geometry: Geometry) -> float:

@@ -51,8 +51,8 @@ def nearest(shapes: Shapes, ray: Ray) -> Hit:
 
 @kernel
 def nearest_of_rays(shapes: Shapes, rays: RayBlock, hits: HitBlock, n: int, any_hit: bool) -> None:
-    """The closest hits of the first n of `rays`.  any_hit: only whether each hits anything, which is
-    the sign of its code."""
+    """The closest hits of the first n of `rays`.  any_hit: only whether each hits anything, which
+    is the sign of its code."""
     for j in range(min(BLOCK, n + VECTOR_WIDTH - 1)):  # lanes without a ray are traced too
         hits.numbers[j], hits.codes[j] = rays.numbers[6 * BLOCK + j], -1
     for kind in SIDE_BY_SIDE:

@@ -1,7 +1,7 @@
 """Two groups of operations, on several tables and on one, and kernels that call them."""
 
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -20,10 +20,8 @@ class Scalers(NamedTuple):
     negative: bool
 
 
-class Tables(NamedTuple):
-    adders: Adders | None
-    scalers: Scalers | None
-    others: Adders | None
+class Others(NamedTuple):
+    numbers: FloatArray
 
 
 @kernel
@@ -37,19 +35,19 @@ def _scale(scalers: Scalers, i: int, x: float) -> float:
     return -scaled if scalers.negative else scaled
 
 
+class Tables(NamedTuple):
+    adders: Annotated[Adders | None, SimpleNamespace(value=_add)]
+    scalers: Annotated[Scalers | None, SimpleNamespace(value=_scale)]
+    others: Annotated[Others | None, SimpleNamespace()]
+
+
 @kernel
 def _count(table: Any) -> int:
     return len(table.numbers)
 
 
-ADDER, SCALER, OTHER = 4, 1, 2
-by_code = ByCode(
-    [
-        (ADDER, "adders", SimpleNamespace(value=_add)),
-        (SCALER, "scalers", SimpleNamespace(value=_scale)),
-        (OTHER, "others", SimpleNamespace()),
-    ]
-)
+ADDER, SCALER, OTHER = range(3)
+by_code = ByCode(Tables)
 
 
 @by_code("value")
@@ -61,6 +59,17 @@ def value(tables: Tables, kind: int, i: int, x: float) -> float:
 @by_code(lambda module: _count)
 def count(tables: Tables, kind: int) -> int:
     return -1
+
+
+@kernel
+def _add_up(table: Any, kind: int, n: int, out: FloatArray) -> None:
+    for k in range(n):
+        out[k] = value(table, kind, k, 0.25)
+
+
+@by_code(lambda module: _add_up)
+def values_of_block(tables: Tables, kind: int, n: int, out: FloatArray) -> None:
+    """One text for all types, which calls an operation on the table of one."""
 
 
 pairs = Linkable()
@@ -96,28 +105,28 @@ def use_pair(pair: Any, out: Any) -> None:
     out[3] = nested(pair, 3.0)
 
 
+def blocks_of(tables: Any, kind: int, out: Any) -> None:
+    values_of_block(tables, kind, 2, out)
+
+
+blocks = entry_kernel(blocks_of)
 values, of_pair = entry_kernel(values_of), entry_kernel(use_pair)
 
-CODES = np.array([ADDER, SCALER, OTHER, -1, 0, 3, 5, 1000, -(2**62), 2**62])
+CODES = np.array([ADDER, SCALER, OTHER, -1, 3, 5, 1000, -(2**62), 2**62])
 
 
 def tables_of(adders, scalers, others):
     return Tables(
         Adders(np.array([1.0, 0.5])) if adders else None,
         Scalers(np.array([7.0, 3.0]), True) if scalers else None,
-        Adders(np.array([9.0])) if others else None,
+        Others(np.array([9.0])) if others else None,
     )
-
-
-def by_codes(tables):
-    fields = {ADDER: "adders", SCALER: "scalers", OTHER: "others"}
-    return {c: t for c, field in fields.items() if (t := getattr(tables, field)) is not None}
 
 
 def linked(group, tables, *wanted):
     """(linker, link) to tables, with all operations or with those `wanted`."""
     linker = Linker()
-    link = linker.link(group.operations, wanted or group.operations, tables)
+    link = linker.link(group, wanted or group.operations, tables)
     for call in linker.calls:
         precompile(*call)
     linker.resolve()

@@ -346,7 +346,7 @@ def _samples_row(name: str, setting: Setting) -> Row:
         def theirs() -> object:
             return mitsuba_scene.picture(counterpart.mi_scene, SPP, next(seeds))
 
-        render(scene, tables=scene.tables, specialised=True), theirs()  # compile
+        render(scene), theirs()  # compile
         times = alternate(
             {"ours": lambda: seconds(ours), mitsuba_variant: lambda: seconds(theirs)},
             say=setting.say,
@@ -377,7 +377,7 @@ def measure_threads(setting: Setting) -> list[Row]:
     def rate(threads: int) -> float:
         return samples / seconds(lambda: render(scene, tables=scene.tables, threads=threads))
 
-    render(scene, tables=scene.tables, specialised=True)  # compile
+    render(scene)  # compile
     rates = alternate({"2 threads": lambda: rate(2), "1 thread": lambda: rate(1)}, say=setting.say)
     return [
         against(

@@ -178,8 +178,7 @@ class Stable:
             return Shot(picture, spp, time.perf_counter() - start)
 
         small = scene.changed(sampler=make(spp=FIRST, seed=first))
-        # From now on the specialised kernels are in the cache, and `shot` uses them.
-        render(small, tables=tables, progress=progress, specialised=True)
+        render(small, tables=tables, progress=progress)  # compile
         return shot
 
 

@@ -1,5 +1,6 @@
 """How much light changes within float32's error of the point on a lamp that has a texture."""
 
+import dataclasses
 from functools import partial
 
 import numpy as np
@@ -93,7 +94,10 @@ def changes_of_lamps(context: LightContext, setup: WhittedSetup) -> tuple[FloatA
         lights = tables.lights._replace(choice=choice._replace(probability=alone))
         around = [
             query.radiance_without_noise(
-                tables._replace(lights=lights), setup._replace(u0=u0, u1=u1), rays.o, rays.d
+                dataclasses.replace(tables, lights=lights),
+                setup._replace(u0=u0, u1=u1),
+                rays.o,
+                rays.d,
             )
             for u0, u1 in [MIDDLE, *_beside(MIDDLE, float(scale.max()), AROUND)]
         ]

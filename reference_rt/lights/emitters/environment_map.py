@@ -323,7 +323,9 @@ def _in_cell_lanes(
 
 
 @kernel
-def backgrounds(table: EnvironmentMaps, rays: RayBlock, hits: HitBlock, n: int, lit: LightBlock) -> None:
+def backgrounds(
+    table: EnvironmentMaps, rays: RayBlock, hits: HitBlock, n: int, lit: LightBlock
+) -> None:
     """`radiance` and `pdf` of those of the first n rays that hit nothing: see `put_background`."""
     numbers, k = local_floats(_FLOATS), 0
     for j in range(n):

@@ -395,7 +395,7 @@ and 0.1 for 16.  A pick takes a third to a half more of the time of a picture.""
 class LightSampler(NamedTuple):
     """All lights in one list: kind (n,) and row (n,) in the tables, the probability (n,) of picking
     it by power and the running sum (n,) of these;  bounded (1,): the probability of picking from
-    the tree, 0 if there is none."""
+    the tree, as kernels take it 0 if there is none."""
 
     kind: IntArray
     row: IntArray
@@ -405,7 +405,7 @@ class LightSampler(NamedTuple):
 
 
 @kernel
-def pick(choice: LightSampler, tree: LightTree | None, p: Vec3, n: Vec3, u: float) -> Pick:
+def pick(choice: LightSampler, tree: Any, p: Vec3, n: Vec3, u: float) -> Pick:
     """A light for a surface at `p` with normal `n`; n = 0 for light from both sides."""
     bounded = choice.bounded[0]
     if u < bounded:
@@ -423,7 +423,7 @@ def _by_power(choice: LightSampler, u: float) -> Pick:
 
 
 @kernel
-def probability(choice: LightSampler, tree: LightTree | None, p: Vec3, n: Vec3, k: int) -> float:
+def probability(choice: LightSampler, tree: Any, p: Vec3, n: Vec3, k: int) -> float:
     """The probability that `pick` returns light k."""
     if len(choice.kind) == 0:
         return 0.0

@@ -20,6 +20,8 @@ from reference_rt.materials.material import (
     ScatterBlock,
     Scattered,
     asked_in,
+    direction_towards,
+    place_in,
     put_scattered,
     sample_branch,
     straight_on,
@@ -64,6 +66,7 @@ def _scatter(
     block: ScatterBlock,
     rays: RayBlock,
     points: PointBlock,
+    light: FloatArray,
     textured: Textured,
     textures: Textures | None,
     kept: FloatArray,
@@ -73,14 +76,14 @@ def _scatter(
         if block.codes[j] != kind:
             continue
         asked, i = asked_in(block, j, vector_of(points.numbers, 6, j)), block.codes[BLOCK + j]
-        wo = to_local(asked.frame, -vector_of(rays.numbers, 3, j))
-        place = At(textures, asked.u, asked.v, asked.colour)
-        at = evaluate_textures(textured, points.codes[j], place, kept)
-        lit = Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
-        if not is_black(asked.wi):
-            lit = eval_pdf(table, kind, i, at, wo, to_local(asked.frame, asked.wi))
+        frame, wi = asked.frame, direction_towards(light, j)
+        wo = to_local(frame, -vector_of(rays.numbers, 3, j))
+        at = evaluate_textures(textured, points.codes[j], place_in(block, j, textures), kept)
+        sent = Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
+        if not is_black(wi):
+            sent = eval_pdf(table, kind, i, at, wo, to_local(frame, wi))
         drawn = sample(table, kind, i, at, wo, asked.u_lobe, asked.u0, asked.u1)
-        put_scattered(block, j, asked.frame, lit, drawn)
+        put_scattered(block, j, frame, sent, drawn)
 
 
 @by_code(lambda module: _scatter)
@@ -90,6 +93,7 @@ def scatter(
     block: ScatterBlock,
     rays: RayBlock,
     points: PointBlock,
+    light: FloatArray,
     textured: Textured,
     textures: Textures | None,
     kept: FloatArray,

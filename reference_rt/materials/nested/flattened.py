@@ -147,7 +147,7 @@ flattened_materials = Linkable()
 
 
 @kernel
-def most(flat_leaves: FlattenedMaterials | None) -> int:
+def most(flat_leaves: Any) -> int:
     """The largest number of flattened leaves of any material."""
     if is_absent(flat_leaves):
         return 0
@@ -163,7 +163,7 @@ def _most(flat_leaves: FlattenedMaterials) -> int:
 
 
 @kernel
-def prepare(flat_leaves: FlattenedMaterials | None, shading: Shading, at: At) -> None:
+def prepare(flat_leaves: Any, shading: Shading, at: At) -> None:
     """Writes the flattened leaves of the material to the scratch buffer `shading.flat_leaves`.
 
     They depend on the point and on wo, not on wi: evaluated once per hit they serve all calls of

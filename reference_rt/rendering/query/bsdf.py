@@ -15,9 +15,9 @@ from reference_rt.jit.kernel import entry_kernel, kernel, local_floats
 from reference_rt.jit.links import Linker
 from reference_rt.materials import Materials, Shading, scratch_floats
 from reference_rt.materials.textured import evaluate_textures, lookup_cache_size
+from reference_rt.rendering.kept_links import Linked, linked
 from reference_rt.rendering.linking import calls_of, linked_materials, linked_textures
 from reference_rt.rendering.query.hits import BoolArray
-from reference_rt.rendering.query.links import Linked, linked
 from reference_rt.rendering.query.rays import (
     broadcast,
     check_in_unit_cube,

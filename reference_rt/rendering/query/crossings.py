@@ -14,8 +14,8 @@ from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import row
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel
+from reference_rt.rendering.kept_links import link_to_geometry
 from reference_rt.rendering.query.hits import Intersections
-from reference_rt.rendering.query.links import link_to_geometry
 from reference_rt.rendering.query.rays import checked_rays, in_blocks, rays_of
 from reference_rt.rendering.query.tracing import (
     CROSSING,

@@ -12,7 +12,7 @@ from reference_rt.accel.geometry import Geometry
 from reference_rt.core.arrays import FloatArray, IdArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel
-from reference_rt.rendering.query.links import link_to_geometry
+from reference_rt.rendering.kept_links import link_to_geometry
 from reference_rt.rendering.query.rays import Rays, checked_rays, in_blocks, rays_of, shaped
 from reference_rt.rendering.query.tracing import (
     BLOCKS,

@@ -21,14 +21,14 @@ from reference_rt.jit.kernel import entry_kernel, local_floats
 from reference_rt.jit.links import Linker
 from reference_rt.lights import TABLES, Constant, EnvironmentMap, LightTables
 from reference_rt.materials import scratch_floats
-from reference_rt.rendering.linking import calls_of, linked_lights, linked_shapes, linked_textures
-from reference_rt.rendering.query.hits import BoolArray
-from reference_rt.rendering.query.links import (
+from reference_rt.rendering.kept_links import (
     Linked,
     link_to_geometry,
     link_to_scene,
     linked,
 )
+from reference_rt.rendering.linking import calls_of, linked_lights, linked_shapes, linked_textures
+from reference_rt.rendering.query.hits import BoolArray
 from reference_rt.rendering.query.rays import (
     broadcast,
     check_in_unit_cube,

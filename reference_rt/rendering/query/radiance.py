@@ -19,8 +19,8 @@ from reference_rt.integrators.ray_cast import cast
 from reference_rt.integrators.scene_tables import KernelScene, SceneTables
 from reference_rt.jit.kernel import entry_kernel
 from reference_rt.rendering.accumulation import mean_and_variance, radiance_job
-from reference_rt.rendering.kernels import Linked
-from reference_rt.rendering.query.links import link_to_scene
+from reference_rt.rendering.kept_links import link_to_scene
+from reference_rt.rendering.kernels import kernels_for
 from reference_rt.rendering.query.rays import Rays, in_blocks, rays_of, shaped
 from reference_rt.rendering.tiles import GivenRays
 from reference_rt.rendering.units import SAMPLES_PER_TILE, Unit, tiles_of
@@ -145,8 +145,8 @@ def estimate(
     threads = threads or os.cpu_count() or 1
     if n > 0:
         job = radiance_job(setup, sampler, (n, 1), has_variance=True)
-        linked = Linked([job], tables, GivenRays(o, d), BoxFilter().setup())
-        (kernel,) = linked.compile(threads)
+        given = tables, GivenRays(o, d), BoxFilter().setup()
+        (kernel,) = kernels_for([job], *given, threads)
 
         def add(begin: int, end: int, first: int, last: int) -> None:
             kernel({name: a[begin:end] for name, a in sums.items()}, begin, end, first, last)

@@ -37,7 +37,7 @@ from reference_rt.core.ray import (
 from reference_rt.core.vec3 import row
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import entry_kernel, kernel, local_floats, local_integers
-from reference_rt.rendering.query.links import Linked, link_to_geometry
+from reference_rt.rendering.kept_links import Linked, link_to_geometry
 
 
 class HitArrays(NamedTuple):

@@ -32,9 +32,7 @@ SEEDS = 8
 
 def by_ours(scene: Scene) -> FloatArray:
     samplers = [scene.resolved_sampler.model_copy(update={"seed": k}) for k in range(SEEDS)]
-    return np.stack(
-        [rt.render(scene.changed(sampler=s), specialised=False).colour for s in samplers]
-    )
+    return np.stack([rt.render(scene.changed(sampler=s)).colour for s in samplers])
 
 
 def by_mitsuba(mi_scene: Any, scene: Scene) -> FloatArray:

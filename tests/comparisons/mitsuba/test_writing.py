@@ -69,7 +69,7 @@ def small(scene: Scene, spp: int = 4) -> Scene:
 
 
 def assert_same_bits(scene: Scene, read: Scene) -> None:
-    ours, theirs = (rt.render(small(one), specialised=False).colour for one in (scene, read))
+    ours, theirs = (rt.render(small(one)).colour for one in (scene, read))
     assert ours.any()
     assert ours.tobytes() == theirs.tobytes()
 
@@ -147,7 +147,7 @@ def test_mitsuba_renders_whitted_scenes_with_our_plugin(name, set_variant, tmp_p
     scene = small(Scene.load(SCENES / f"{name}.yaml"), spp=16)
     _, notes = write_xml(scene, tmp_path / "scene.xml")
     assert any("'whitted'" in note for note in notes)
-    ours = float(np.mean(rt.render(scene, specialised=False).colour))
+    ours = float(np.mean(rt.render(scene).colour))
     mitsuba()
     with set_variant():
         theirs = float(picture(mitsuba().load_file(str(tmp_path / "scene.xml")), 16, 0).mean())

@@ -62,5 +62,5 @@ def test_light_that_grazes_flat_shapes(name: str, seed: int) -> None:
     assert found.status in ("agree", "reference-limited"), found.reason
     # Of planes the camera may see the dark side; slivers, and polygons that cross themselves, are
     # not resolved.
-    lit = render(scene, specialised=False).colour.any()
+    lit = render(scene).colour.any()
     assert wrong.status == "differ" or not lit or name in UNRESOLVED

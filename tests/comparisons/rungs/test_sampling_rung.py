@@ -1,5 +1,7 @@
 """The rung of light samples: scenes of every light agree, and wrong tables of lights are found."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from builders import SCENES
@@ -14,7 +16,7 @@ def _scaled(tables, field, factor):
     values = getattr(choice, field).copy()
     values[0] *= factor
     lights = tables.lights._replace(choice=choice._replace(**{field: values}))
-    return tables._replace(lights=lights)
+    return dataclasses.replace(tables, lights=lights)
 
 
 def _other_leaf(tables):
@@ -23,7 +25,7 @@ def _other_leaf(tables):
     trail = tree.trail.copy()
     trail[[0, -1]] = trail[[-1, 0]]
     tree = tree._replace(trail=trail)
-    return tables._replace(lights=tables.lights._replace(tree=tree))
+    return dataclasses.replace(tables, lights=tables.lights._replace(tree=tree))
 
 
 def _turned_sky(tables):
@@ -31,7 +33,7 @@ def _turned_sky(tables):
     samples are drawn from."""
     sky = tables.lights.environment
     sky = sky._replace(texels=np.roll(sky.texels, 8, axis=1))
-    return tables._replace(lights=tables.lights._replace(environment=sky))
+    return dataclasses.replace(tables, lights=tables.lights._replace(environment=sky))
 
 
 FAULTS = {

@@ -33,9 +33,9 @@ from reference_rt.jit.kernel import entry_kernel, local_floats
 from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.rendering import query
 from reference_rt.rendering.accumulation import jobs_of
+from reference_rt.rendering.kept_links import link_to_geometry
 from reference_rt.rendering.kernels import Running
 from reference_rt.rendering.query import hits, tracing
-from reference_rt.rendering.query.links import link_to_geometry
 from reference_rt.scene import build_hierarchies
 
 KINDS = ("sphere", "rectangle", "box", "triangle")
@@ -377,7 +377,7 @@ def test_one_primitive_and_bounds_that_touch_infinity():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["two kinds", "spheres", "five kinds"])
-def test_brute_force_of_specialised_kernels(name):
+def test_brute_force_of_tables_without_links(name):
     """Rays side by side against one shape, and one ray against shapes side by side."""
     geometry = rt.build_tables(rt.Scene(shapes=tuple(SCENES[name]))).geometry
     assert geometry.bvh is None

@@ -1,5 +1,7 @@
 """Estimators of one number agree: sampling strategies, with and without roulette, `direct`."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from worlds import MATERIALS, at, facing, world, write_sky
@@ -254,7 +256,7 @@ def test_the_light_tree_and_power():
     for k, sampling in enumerate(("both", "lights")):
         path = rt.Path(max_depth=4, sampling=sampling)
         tables = scene.changed(integrator=path).tables
-        by_power = tables._replace(lights=tables.lights._replace(tree=None))
+        by_power = dataclasses.replace(tables, lights=tables.lights._replace(tree=None))
         found = replicates(scene, path, spp, seed=9100 + 100 * k, tables=by_power)
         assert_agree(reference, found, f"by power, {sampling}", 0.01)
 

@@ -12,7 +12,7 @@ from reference_rt.core.ray import put_vector, ray_of
 from reference_rt.integrators.simple_path import radiance
 from reference_rt.rendering import tiles
 from reference_rt.rendering.accumulation import jobs_of
-from reference_rt.rendering.kernels import Running
+from reference_rt.rendering.kernels import kernels_for, plain_arguments
 from reference_rt.sampling import sampler_of
 
 WIDTH, HEIGHT, SPP = 4, 3, 3
@@ -41,13 +41,13 @@ def write_sums(given, out):
             for way, function in (("blocks", tiles.radiances), ("simple", one_by_one)):
                 sums[f"{name} {way}"] = found = np.zeros((WIDTH * HEIGHT, 3))
                 with mock.patch.object(tiles, "radiances", function):
-                    tiles.render_tile(*arguments, found, None, 0, len(found), 0, SPP)
+                    tiles.render_tile(*arguments, found, np.zeros((0, 3)), 0, len(found), 0, SPP)
     np.savez(out, **sums)
 
 
 def in_python(scenes, folder):
     """These sums, by plain Python."""
-    given = {name: jobs_of(scene)[0].arguments(*setup_of(scene)) for name, scene in scenes.items()}
+    given = {name: plain_arguments(jobs_of(one)[0], *setup_of(one)) for name, one in scenes.items()}
     (folder / "given").write_bytes(pickle.dumps(given))
     in_plain_python(__file__, "write_sums", folder / "given", folder / "sums.npz")
     return np.load(folder / "sums.npz")
@@ -68,8 +68,8 @@ def test_paths_of_a_block_are_simple_paths(tmp_path):
     assert different(sums, scenes) == []
     for name, scene in scenes.items():
         compiled = np.zeros((WIDTH * HEIGHT, 3))
-        with Running(jobs_of(scene), *setup_of(scene), 1) as running:
-            running.run(0)({"colour": compiled}, 0, len(compiled), 0, SPP)
+        (kernel, *_) = kernels_for(jobs_of(scene), *setup_of(scene), 1)
+        kernel({"colour": compiled, "m2": np.zeros((len(compiled), 3))}, 0, len(compiled), 0, SPP)
         assert compiled.tobytes() == sums[f"{name} simple"].tobytes(), name
         assert compiled.any()
 

@@ -1,7 +1,7 @@
 """Generated choices: what is refused, and what tracebacks show.  Their values: `test_links`."""
 
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import pytest
 
@@ -9,16 +9,20 @@ from reference_rt.jit.by_code import ByCode
 from reference_rt.jit.kernel import kernel
 
 
-class Tables(NamedTuple):
-    adders: Any
+class Adders(NamedTuple):
+    number: float
 
 
 @kernel
-def _add(adders: Any, x: float) -> float:
-    return adders[0] + x
+def _add(adders: Adders, x: float) -> float:
+    return adders.number + x
 
 
-by_code = ByCode([(4, "adders", SimpleNamespace(value=_add))])
+class Tables(NamedTuple):
+    adders: Annotated[Adders | None, SimpleNamespace(value=_add)]
+
+
+by_code = ByCode(Tables)
 
 
 @by_code("value")

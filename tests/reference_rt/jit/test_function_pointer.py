@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 import pytest
+from reference_rt.jit.function_pointer import call_pointer, pointer_to
 
 from reference_rt import Scene, Sphere
-from reference_rt.jit.function_pointer import call_pointer, pointer_to
 from reference_rt.jit.kernel import entry_kernel, precompile, signature_of
 from reference_rt.rendering import kernels
 from reference_rt.rendering import render as rendering

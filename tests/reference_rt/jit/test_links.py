@@ -13,8 +13,10 @@ from linked_tables import (
     CODES,
     OTHER,
     Adders,
+    Tables,
+    blocks,
+    blocks_of,
     by_code,
-    by_codes,
     linked,
     of_pair,
     pairs,
@@ -37,12 +39,12 @@ def test_all_codes_give_what_they_give_on_tables(present):
     """Of present types, absent ones, those without the kernel, and codes of no type."""
     tables = tables_of(*present)
     through, direct, plain = (np.full((2, len(CODES)), 0.125) for _ in range(3))
-    _, link = linked(by_code, by_codes(tables))
+    _, link = linked(by_code, tables)
     values(link, CODES, through)
     values(tables, CODES, direct)
     values_of(tables, [int(code) for code in CODES], plain)
     assert through.tolist() == direct.tolist() == plain.tolist()
-    assert through[0, 0] == (0.75 if present[0] else -400.25)
+    assert through[0, 0] == (0.75 if present[0] else -0.25)
     assert through[0, 1] == (-0.75 if present[1] else -100.25)
     assert through[1, :3].tolist() == [2 if present[0] else -1, 2 if present[1] else -1,
                                        1 if present[2] else -1]  # fmt: skip
@@ -51,7 +53,7 @@ def test_all_codes_give_what_they_give_on_tables(present):
 @needs_jit
 def test_one_table_is_inlined_or_linked():
     table, out = (0.5, 3.0), [np.zeros(4) for _ in range(3)]
-    _, link = linked(pairs, {0: table})
+    _, link = linked(pairs, table)
     of_pair(link, out[0])
     of_pair(table, out[1])
     use_pair(table, out[2])
@@ -63,7 +65,7 @@ def test_kernels_do_not_depend_on_what_is_linked():
     """One compilation of the caller for all scenes."""
     before = set(values.signatures)
     for present in ((True, False, False), (False, True, True)):
-        _, link = linked(by_code, by_codes(tables_of(*present)))
+        _, link = linked(by_code, tables_of(*present))
         values(link, CODES, np.zeros((2, len(CODES))))
     assert len(set(values.signatures) - before) <= 1
 
@@ -71,14 +73,33 @@ def test_kernels_do_not_depend_on_what_is_linked():
 @needs_jit
 def test_only_what_is_asked_for_is_compiled():
     linker = Linker()
-    tables = by_codes(tables_of(True, True, True))
-    linker.link(by_code.operations, ["count"], tables)
+    tables = tables_of(True, True, True)
+    linker.link(by_code, ["count"], tables)
     assert len(linker.calls) == 3
-    linker.link(by_code.operations, ["value"], {OTHER: tables[OTHER]})  # which has no value
+    linker.link(by_code, ["value"], tables_of(False, False, True))  # which has no value
     assert len(linker.calls) == 3
-    linker.link(by_code.operations, ["count"], tables)  # two lists, one kernel
+    linker.link(by_code, ["count"], tables)  # two lists, one kernel
     assert len(linker.calls) == 3
     assert sum(len(places) for places in linker.calls.values()) == 6
+
+
+@needs_jit
+def test_a_block_is_one_text_for_all_types():
+    """Through a link to all tables, and in plain Python."""
+    tables = tables_of(True, True, True)
+    _, link = linked(by_code, tables)
+    for kind, expected in ((ADDER, [1.25, 0.75]), (SCALER, [-1.75, -0.75]), (OTHER, [-200.25] * 2)):
+        found, plain = np.zeros(2), np.zeros(2)
+        blocks(link, kind, found)
+        blocks_of(tables, kind, plain)
+        assert found.tolist() == plain.tolist() == expected
+
+
+def test_plain_python_takes_the_tables_themselves():
+    linker, tables = Linker(is_plain=True), tables_of(True, False, True)
+    assert linker.link(by_code, by_code.operations, tables) is tables
+    assert (linker.nothing, linker.calls) == (None, {})
+    assert is_absent(linker.nothing)
 
 
 # ---- how long -----------------------------------------------------------------------------------
@@ -89,7 +110,7 @@ def test_only_what_is_asked_for_is_compiled():
 def test_tables_live_as_long_as_the_linker():
     numbers = np.array([1.0, 2.0])
     gone = weakref.ref(numbers)
-    linker, link = linked(by_code, {ADDER: Adders(numbers)})
+    linker, link = linked(by_code, Tables(Adders(numbers), None, None))
     del numbers
     gc.collect()
     assert gone() is not None

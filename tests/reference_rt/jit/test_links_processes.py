@@ -14,8 +14,8 @@ from linked_tables import (
     ADDER,
     OTHER,
     Adders,
+    Tables,
     by_code,
-    by_codes,
     linked,
     of_pair,
     pairs,
@@ -30,14 +30,14 @@ pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is com
 
 def call(case):
     """In a process of its own."""
-    tables, codes = by_codes(tables_of(True, True, True)), np.array([ADDER])
+    tables, codes = tables_of(True, True, True), np.array([ADDER])
     linker = Linker()
     if case == "not resolved":
-        link = linker.link(by_code.operations, ["value", "count"], tables)
+        link = linker.link(by_code, ["value", "count"], tables)
     elif case == "one table":
-        linker, link = linked(pairs, {0: (1.0, 2.0)}, "product")
+        linker, link = linked(pairs, (1.0, 2.0), "product")
     elif case == "out of bounds":
-        linker, link = linked(by_code, {ADDER: Adders(np.zeros(1))})
+        linker, link = linked(by_code, Tables(Adders(np.zeros(1)), None, None))
     else:
         linker, link = linked(by_code, tables, "count")
     if case == "a type without the kernel":  # whose call is the function's own body

@@ -1,8 +1,8 @@
-"""Linked and specialised kernels: the same bits, and linking asks for all that is called."""
+"""Linking asks for all that is called; tables and links are made once."""
 
-import functools
+import dataclasses
 import os
-import signal
+import pickle
 import subprocess
 import sys
 import warnings
@@ -13,13 +13,14 @@ import numba
 import numpy as np
 import pytest
 from builders import HELPERS, SCENES, same_in_plain_python
-from small_scenes import LAYERS, same, small
+from small_scenes import same, small
 
 import reference_rt as rt
 from reference_rt.jit.kernel import is_compiled
 from reference_rt.rendering import kernels
 from reference_rt.rendering.accumulation import jobs_of
 from reference_rt.rendering.render import render
+from reference_rt.scene import build
 
 needs_jit = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
@@ -35,11 +36,6 @@ DIVERSE = (
     "whitted_classic",
 )
 """Scenes for the quick run: with and without hierarchy, solids, instances, nested materials, ..."""
-
-ALL = [
-    pytest.param(path.stem, marks=() if path.stem in DIVERSE else pytest.mark.slow)
-    for path in sorted(SCENES.glob("*.yaml"))
-]
 
 INTEGRATORS: dict[str, dict[str, Any]] = {
     "path": {"integrator": rt.Path(), "sampler": rt.Sobol(spp=4)},
@@ -68,7 +64,7 @@ def render_linked(*names):
             layers = () if integrator == "ray_cast" else scene.film.layers
             film = scene.film.model_copy(update={"width": 8, "height": 6, "layers": layers})
             try:
-                picture = render(scene.changed(film=film, **changes), specialised=False)
+                picture = render(scene.changed(film=film, **changes))
             except rt.SceneError:  # a material that only another integrator can do justice to
                 assert integrator != scene.integrator.type
                 continue
@@ -98,99 +94,62 @@ def test_linking_asks_for_all_that_is_called(names):
     for name in names:
         scene = small(name)
         view = scene.camera.setup(scene.film.width, scene.film.height)
-        linked = kernels.Linked(jobs_of(scene), scene.tables, view, scene.film.filter.setup())
-        assert all(is_compiled(*call) for call in linked.calls)
-        assert linked.calls
+        calls = kernels.calls_for(jobs_of(scene), scene.tables, view, scene.film.filter.setup())
+        assert all(is_compiled(*call) for call in calls)
+        assert calls
 
 
-# ---- the same bits ------------------------------------------------------------------------------
+# ---- what is made once --------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-@needs_jit
-@pytest.mark.parametrize("name", ALL)
-def test_linked_and_specialised_kernels_give_the_same_bits(name):
-    """In every layer."""
-    scene = small(name)
-    linked, specialised = (render(scene, specialised=k) for k in (False, True))
-    assert same(linked, specialised)
-    assert len(np.unique(linked.layers[linked.shown])) > 3
-
-
-@pytest.mark.slow
-@needs_jit
-@pytest.mark.parametrize("integrator", [rt.Path(), rt.Direct(), rt.Whitted()], ids=lambda i: i.type)
-def test_given_rays_have_the_same_bits(integrator, monkeypatch):
+def test_tables_and_links_are_made_once(monkeypatch):
+    """For a scene, whatever its film, camera and sampler; and never for other integrators."""
     scene = small("cornell_box")
-    rays = scene.camera_rays()
-    module, found = sys.modules["reference_rt.rendering.query.radiance"], []
-    for specialised in (False, True):
-        running = functools.partial(kernels.Running, specialised=specialised)
-        monkeypatch.setattr(module, "Running", running)
-        found.append(scene.radiance(*rays, 4, integrator=integrator))
-    for linked, own in zip(*found, strict=True):
-        assert linked.tobytes() == own.tobytes()
-    assert len(np.unique(found[0].mean)) > 100
-
-
-def pictures(folder, file):
-    """Write the picture of one scene by each choice of kernels."""
-    scene = small("cornell_box").changed(film=rt.Film(width=6, height=4, layers=LAYERS))
-    found = {str(k): render(scene, specialised=k) for k in (None, False, True)}
-    np.savez(
-        file, **{f"{k} {name}": layer for k, p in found.items() for name, layer in p.layers.items()}
-    )
-
-
-@pytest.mark.slow
-def test_plain_python_knows_no_difference(tmp_path):
-    arrays = same_in_plain_python(pictures, tmp_path)
-    for name in ("colour", *LAYERS):
-        first, *others = (arrays[f"{k} {name}"].tobytes() for k in (None, False, True))
-        assert others == [first, first]
-
-
-@pytest.mark.slow
-@needs_jit
-def test_specialised_kernels_are_used_where_they_are_compiled(monkeypatch):
-    scene = small("cornell_box")
-    expected = render(scene, specialised=True)
-    monkeypatch.setattr(kernels, "linked_scene", None)  # which would be called to link
+    expected = render(scene)
+    monkeypatch.setattr(build, "build_tables", None)
+    monkeypatch.setattr(kernels, "linked_scene", None)
     assert same(render(scene), expected)
+    for part in ({"spp": 2}, {"size": (5, 4)}, {"seed": 7}):
+        assert np.isfinite(render(scene, **part).colour).all()
+    with pytest.raises(TypeError):
+        render(scene.changed(integrator=rt.Whitted(), sampler=None))
 
 
-@needs_jit
-def test_pictures_of_one_kind_are_added_up(monkeypatch):
-    """None is long enough by itself to compile specialised kernels for it."""
-    forks = []
-
-    def fork():
-        child = os.fork()
-        if child == 0:
-            signal.pause()
-        forks.append(child)
-        return child
-
-    monkeypatch.setattr(kernels.parallel_compile, "may_fork", lambda: True)
-    monkeypatch.setattr(kernels, "fork_with_compiler", fork)
-    monkeypatch.setattr(kernels.Specialised, "are_compiled", lambda self: False)
-    monkeypatch.setattr(kernels, "BREAK_EVEN", 0.0)
-    monkeypatch.setattr(kernels, "_spent", {})
-    monkeypatch.setattr(kernels, "_children", {})
+def test_a_scene_that_is_sent_away_has_no_links():
     scene = small("cornell_box")
     render(scene)
-    assert not forks
-    render(scene)
-    render(scene)
-    assert [*kernels._children.values()] == forks
-    assert len(forks) == 1
+    assert scene.tables.links
+    copy = pickle.loads(pickle.dumps(scene))
+    assert copy.tables.links == {}
+    assert same(render(copy), render(scene))
+    assert scene.without_tables().tables is not scene.tables
 
-    def interrupt(what, fraction):
-        if what == "render":
-            raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
-        render(scene, progress=interrupt)
-    assert not kernels._children
-    with pytest.raises(ChildProcessError):
-        os.waitpid(forks[0], 0)
+def test_other_tables_have_other_links():
+    """Links hold the addresses of the tables that they were made of."""
+    scene = small("cornell_box")
+    tables, before = scene.tables, render(scene)
+    areas = tables.lights.areas
+    dark = areas._replace(radiance=areas.radiance._replace(value=0.0 * areas.radiance.value))
+    other = dataclasses.replace(tables, lights=tables.lights._replace(areas=dark))
+    assert other.links == {}
+    assert not render(scene, tables=other).colour.any()
+    assert same(render(scene), before)
+
+
+def layers_of_all(folder, file):
+    """Of tiny pictures of diverse scenes, all layers."""
+    found = {}
+    for name in DIVERSE:
+        scene = small(name)
+        film = scene.film.model_copy(update={"width": 4, "height": 3})
+        layers = render(scene.changed(film=film)).layers
+        found |= {f"{name} {layer}": array for layer, array in layers.items()}
+    np.savez(file, **found)
+
+
+@pytest.mark.slow
+@needs_jit
+def test_plain_python_has_the_same_bits(tmp_path):
+    """Of all stages and integrators, in every layer."""
+    assert len(same_in_plain_python(layers_of_all, tmp_path).files) > 40

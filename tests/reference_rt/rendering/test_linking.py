@@ -67,11 +67,13 @@ def test_names_are_those_that_the_code_loads(monkeypatch):
 class Asked:
     """In place of a `Linker`: notes what is asked for."""
 
+    nothing = Link(0)
+
     def __init__(self) -> None:
         self.operations: set[Operation] = set()
 
-    def link(self, operations: Any, wanted: Any, tables: Any, only: Any = None) -> Link:
-        self.operations |= {operations[name] for name in wanted}
+    def link(self, group: Any, wanted: Any, of_all: Any, only: Any = None) -> Link:
+        self.operations |= {group.operations[name] for name in wanted}
         return Link(1)
 
 

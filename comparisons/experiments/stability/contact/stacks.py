@@ -16,7 +16,7 @@ from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Ray, ray_from
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel
-from reference_rt.rendering.query.links import link_to_geometry
+from reference_rt.rendering.kept_links import link_to_geometry
 
 COUNT = 8
 """Surfaces in a stack."""

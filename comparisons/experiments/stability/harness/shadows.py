@@ -13,7 +13,7 @@ from reference_rt.accel.geometry import Geometry, closest_hit, occluded, surface
 from reference_rt.core.ray import Ray, SurfacePoint, ray_from
 from reference_rt.core.vec3 import Vec3, dot, row
 from reference_rt.jit.kernel import entry_kernel, kernel
-from reference_rt.rendering.query.links import link_to_geometry
+from reference_rt.rendering.kept_links import link_to_geometry
 
 PIXELS = 160
 """Across a picture."""

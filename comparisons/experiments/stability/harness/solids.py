@@ -1,5 +1,6 @@
 """Where rays go in and out of a solid: by ours, by the textbook's methods, and exactly."""
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -147,7 +148,7 @@ def _alone(tables: SceneTables, k: int, o: FloatArray, d: FloatArray) -> Lists:
         steps=zero,
     )
     geometry = tables.geometry._replace(solids=alone)
-    return _lists(solid_crossings(tables._replace(geometry=geometry), 0, o, d, MOST))
+    return _lists(solid_crossings(dataclasses.replace(tables, geometry=geometry), 0, o, d, MOST))
 
 
 def _truth(tree: Any, found: list[list[Any]], touching: bool, stated: list[Lists]) -> Truth:

@@ -18,8 +18,8 @@ from reference_rt.core.ray import Hit, Ray, SurfacePoint
 from reference_rt.core.vec3 import Vec3, dot, frame_from_normal, row, to_world
 from reference_rt.jit.kernel import entry_kernel, kernel
 from reference_rt.jit.links import Linker
+from reference_rt.rendering.kept_links import Linked, linked
 from reference_rt.rendering.linking import geometry_of, linked_shapes
-from reference_rt.rendering.query.links import Linked, linked
 from reference_rt.shapes import Shapes
 from reference_rt.shapes.meshes.watertight import shear_of
 from reference_rt.shapes.tables import TABLES, by_code

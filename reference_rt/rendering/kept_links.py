@@ -1,4 +1,4 @@
-"""A scene's tables behind links, as the kernels of queries take them (see `jit/links.py`)."""
+"""A scene's tables behind links, as kernels take them (see `jit/links.py`), made once."""
 
 import os
 import threading
@@ -10,10 +10,6 @@ from reference_rt.jit.links import Linker
 from reference_rt.jit.parallel_compile import precompile_all
 from reference_rt.rendering.linking import calls_of, geometry_of, linked_scene
 
-SCENES = 4
-"""Scenes whose links are kept: to make them takes some milliseconds, and keeps the scene in
-memory."""
-
 
 class Linked:
     """Tables behind links, which are valid as long as this object lives."""
@@ -24,27 +20,28 @@ class Linked:
 
 _lock = threading.Lock()
 
-_kept: dict[int, tuple[SceneTables, dict[Any, Linked]]] = {}
-"""Scenes and their links by purpose, the oldest scene first.  The keys are the identities of the
-scenes, which are kept so that no other scene can have the same."""
+
+def _compile_for(linker: Linker) -> None:
+    precompile_all([*linker.calls], os.cpu_count() or 1)
 
 
-def linked(scene: SceneTables, purpose: Any, link: Callable[[Linker], Any]) -> Linked:
+def linked(
+    scene: SceneTables,
+    purpose: Any,
+    link: Callable[[Linker], Any],
+    compile_for: Callable[[Linker], Any] = _compile_for,
+) -> Linked:
     """What `link` makes of the scene, with all its operations compiled: once for each purpose."""
-    of_scene = _kept.get(id(scene))
-    if of_scene is not None and purpose in of_scene[1]:
-        return of_scene[1][purpose]
-    with _lock:
-        _, links = _kept.setdefault(id(scene), (scene, {}))
-        if purpose not in links:
-            linker = Linker()
-            tables = link(linker)
-            precompile_all([*linker.calls], os.cpu_count() or 1)
-            linker.resolve()
-            links[purpose] = Linked(tables, linker)
-        while len(_kept) > SCENES:
-            del _kept[next(iter(_kept))]
-        return links[purpose]
+    if purpose not in scene.links:
+        with _lock:
+            if purpose not in scene.links:
+                linker = Linker()
+                tables = link(linker)
+                compile_for(linker)
+                linker.resolve()
+                scene.links[purpose] = Linked(tables, linker)
+    found: Linked = scene.links[purpose]
+    return found
 
 
 def link_to_geometry(scene: SceneTables, *operations: str) -> Linked:
