@@ -92,13 +92,9 @@ def changes_of_lamps(context: LightContext, setup: WhittedSetup) -> tuple[FloatA
             break  # no lamp has a texture
         alone = np.where(np.arange(len(choice.kind)) == light, choice.probability, 0.0)
         lights = tables.lights._replace(choice=choice._replace(probability=alone))
+        lit = dataclasses.replace(tables, lights=lights)
         around = [
-            query.radiance_without_noise(
-                dataclasses.replace(tables, lights=lights),
-                setup._replace(u0=u0, u1=u1),
-                rays.o,
-                rays.d,
-            )
+            query.radiance_without_noise(lit, setup._replace(u0=u0, u1=u1), rays.o, rays.d)
             for u0, u1 in [MIDDLE, *_beside(MIDDLE, float(scale.max()), AROUND)]
         ]
         changes = np.stack(around[1:]) - around[0]

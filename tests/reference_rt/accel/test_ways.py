@@ -11,7 +11,7 @@ from builders import cube, icosphere, random_shape, unit_vectors
 
 import reference_rt as rt
 from reference_rt.accel.array_query import rows_width
-from reference_rt.accel.block_query import any_hits, closest_hits, hit_of
+from reference_rt.accel.block_query import any_hits, closest_hits
 from reference_rt.accel.geometry import closest_hit, occluded
 from reference_rt.accel.packet import PACKET_SIZE, SPAN_FLOATS, TILE, packet_of
 from reference_rt.accel.packet_traversal import enter_packet
@@ -25,8 +25,8 @@ from reference_rt.core.ray import (
     HitBlock,
     Ray,
     RayBlock,
+    hit_of,
     put_ray,
-    ray_of,
 )
 from reference_rt.core.vec3 import row
 from reference_rt.jit.kernel import entry_kernel, local_floats
@@ -68,7 +68,7 @@ def _in_blocks(geometry, o, d, t_max, sizes, numbers, codes, found, blocked):
             put_ray(rays, j, Ray(row(o, begin + j), row(d, begin + j), t_max[begin + j]))
         closest_hits(geometry, rays, met, n)
         for j in range(n):
-            hit, i = hit_of(geometry, ray_of(rays, j), met, j), begin + j
+            hit, i = hit_of(met, j), begin + j
             found[i, 0], found[i, 1], found[i, 2] = hit.t, hit.u, hit.v
             found[i, 3], found[i, 4], found[i, 5] = hit.kind, hit.row, hit.instance
         any_hits(geometry, rays, met, n)

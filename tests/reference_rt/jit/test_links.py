@@ -12,6 +12,7 @@ from linked_tables import (
     ADDER,
     CODES,
     OTHER,
+    SCALER,
     Adders,
     Tables,
     blocks,
