@@ -27,7 +27,6 @@ from comparisons.rungs.rays.resolution import (
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.lights import AREA
-from reference_rt.materials import any_smooth
 from reference_rt.rendering import query
 from reference_rt.rendering.query import DirectLight
 from reference_rt.rendering.scene import Scene
@@ -84,7 +83,7 @@ def direct(
         return RungResult("direct", "not-applicable", "the scene has no light")
     if counterpart.no_light_reason:
         return RungResult("direct", "not-comparable", counterpart.no_light_reason)
-    if not any_smooth(tables.materials):
+    if not tables.materials.smooth.any():
         reason = "no material has a diffuse or glossy lobe, so that lights are not sampled"
         return RungResult("direct", "not-applicable", reason)
     sizes = ShapeSizes(scene, counterpart.frame)

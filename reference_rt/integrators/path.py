@@ -272,7 +272,7 @@ def radiances(
         if depth + 1 >= path.max_depth:
             break
         _ask(scene, samplers, depth, n, scratch)
-        any_light.samples(scene.lights, lit, scene.shapes, scene.textures, points, n)
+        any_light.sample_asked(scene.lights, lit, scene.shapes, scene.textures, points, n)
         _scatter(scene, n, scratch)
         n = _next_edges(path, scene, samplers, depth, n, scratch)
 

@@ -36,9 +36,9 @@ from reference_rt.lights.dispatch import is_area as is_area
 from reference_rt.lights.dispatch import pick as pick
 from reference_rt.lights.dispatch import pick_probability as pick_probability
 from reference_rt.lights.dispatch import picked_in as picked_in
+from reference_rt.lights.dispatch import sample_asked as sample_asked
 from reference_rt.lights.dispatch import sample_fixed as sample_fixed
 from reference_rt.lights.dispatch import sample_one as sample_one
-from reference_rt.lights.dispatch import samples as samples
 from reference_rt.lights.emitters.area import Areas as Areas
 from reference_rt.lights.emitters.constant import Environment as Environment
 from reference_rt.lights.emitters.environment_map import EnvironmentMaps as EnvironmentMaps

@@ -191,7 +191,7 @@ def _samples(
 
 
 @kernel
-def samples(
+def sample_asked(
     lights: LightTables,
     lit: LightBlock,
     shapes: Shapes,

@@ -112,7 +112,7 @@ def test_tables_and_links_are_made_once(monkeypatch):
     for part in ({"spp": 2}, {"size": (5, 4)}, {"seed": 7}):
         assert np.isfinite(render(scene, **part).colour).all()
     with pytest.raises(TypeError):
-        render(scene.changed(integrator=rt.Whitted(), sampler=None))
+        render(scene.changed(integrator=rt.Path(max_depth=3)))
 
 
 def test_a_scene_that_is_sent_away_has_no_links():

@@ -152,7 +152,7 @@ def _geometry(scene: rt.Scene) -> tuple[Geometry, Linked]:
         shapes = linked_shapes(linker, geometry.shapes, _INTERSECT)
         return geometry_of(linker, geometry, ("closest_hit", "surface")), shapes
 
-    return geometry, linked(tables, "leaving", link, (geometry, geometry.shapes))
+    return geometry, linked(tables, "leaving", link)
 
 
 def subjects(kind: str, placed: list[Placed]) -> list[Subject]:
