@@ -9,9 +9,25 @@ from PIL import Image
 
 from comparisons.statistics.chi_square import chi_square, integrate, sidak
 from reference_rt.core import transform
-from reference_rt.core.ray import BLOCK
+from reference_rt.core.ray import (
+    BLOCK,
+    HIT_FLOATS,
+    HIT_INTEGERS,
+    RAY_FLOATS,
+    HitBlock,
+    Ray,
+    RayBlock,
+    put_ray,
+)
 from reference_rt.core.vec3 import Vec3, row
-from reference_rt.jit.kernel import entry_kernel, local_floats
+from reference_rt.jit.kernel import entry_kernel, local_floats, local_integers
+from reference_rt.lights import (
+    LIGHT_FLOATS,
+    LIGHT_INTEGERS,
+    LightBlock,
+    background_in,
+    light_of,
+)
 from reference_rt.lights.emitters import environment_map
 from reference_rt.lights.emitters.environment_map import EnvironmentMap, tabulate
 from reference_rt.sampling import distribution
@@ -36,24 +52,28 @@ def _pdf(table, d, out):
 
 
 @entry_kernel
-def _ahead(table, u, d, sampled, seen):
-    numbers = local_floats(environment_map.AHEAD_FLOATS)
-    for k in range(len(numbers)):
-        numbers[k] = 0.0
-    for k in range(len(u)):
-        environment_map.put_surface(table, numbers, k, k, u[k, 0], u[k, 1])
-    for k in range(len(d)):
-        environment_map.put_escaped(numbers, k, k, row(d, k))
-    environment_map.compute_ahead(table, numbers, len(d), len(u))
-    for k in range(len(u)):
-        s = environment_map.sample_ahead(environment_map.Ahead(table, numbers, k))
-        sampled[k, 0], sampled[k, 1], sampled[k, 2] = s.wi
-        sampled[k, 3], sampled[k, 4], sampled[k, 5] = s.radiance
-        sampled[k, 6] = s.pdf
-    for k in range(len(d)):
-        ahead = environment_map.Ahead(table, numbers, k)
-        seen[k, 0], seen[k, 1], seen[k, 2] = environment_map.radiance_ahead(ahead)
-        seen[k, 3] = environment_map.pdf_ahead(ahead)
+def _of_block(table, u, d, sampled, seen):
+    """Paths of one block: those of `d` escape, those of `u` want a sample."""
+    rays = RayBlock(local_floats(RAY_FLOATS))
+    hits = HitBlock(local_floats(HIT_FLOATS), local_integers(HIT_INTEGERS))
+    lit = LightBlock(local_floats(LIGHT_FLOATS), local_integers(LIGHT_INTEGERS))
+    for j in range(len(d)):
+        hits.codes[j] = -1 if j % 3 != 1 else 0
+        put_ray(rays, j, Ray(Vec3(0.0, 0.0, 0.0), row(d, j), math.inf))
+    environment_map.backgrounds(table, rays, hits, len(d), lit)
+    for j in range(len(d)):
+        found = background_in(lit, j)
+        seen[j, 0], seen[j, 1], seen[j, 2] = found.radiance
+        seen[j, 3] = found.density
+    for j in range(len(u)):
+        lit.codes[j] = 5 if j % 4 != 2 else -1
+        lit.numbers[12 * BLOCK + j], lit.numbers[13 * BLOCK + j] = u[j, 0], u[j, 1]
+    environment_map.samples(table, 5, lit, len(u))
+    for j in range(len(u)):
+        s = light_of(lit, j)
+        sampled[j, 0], sampled[j, 1], sampled[j, 2] = s.wi
+        sampled[j, 3], sampled[j, 4], sampled[j, 5] = s.radiance
+        sampled[j, 6] = s.pdf
 
 
 def samples(table, u):
@@ -171,16 +191,17 @@ def test_the_luminance_of_a_fine_map_is_its_density():
 
 @pytest.mark.parametrize(("height", "width"), SIZES)
 @pytest.mark.parametrize("count", [1, 8, 13, BLOCK])
-def test_light_computed_ahead_has_the_same_bits(height, width, count):
+def test_light_of_a_block_has_the_same_bits(height, width, count):
     rng = np.random.default_rng(431)
     table = random_map(rng, height, width)
     u, d = rng.random((count, 2)), rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-9, 9)
     found, seen = np.empty((count, 7)), np.empty((count, 4))
-    _ahead(table, u, d, found, seen)
-    assert found.tobytes() == np.column_stack(samples(table, u)).tobytes()
-    assert seen[:, 3].tobytes() == pdf(table)(d).tobytes()
-    expected = [environment_map.radiance(table, Vec3(*row)) for row in d]
-    assert seen[:, :3].tobytes() == np.array(expected).tobytes()
+    _of_block(table, u, d, found, seen)
+    lit, escaped = np.arange(count) % 4 != 2, np.arange(count) % 3 != 1
+    assert found[lit].tobytes() == np.column_stack(samples(table, u))[lit].tobytes()
+    assert seen[escaped, 3].tobytes() == pdf(table)(d)[escaped].tobytes()
+    expected = np.array([environment_map.radiance(table, Vec3(*row)) for row in d])
+    assert seen[escaped, :3].tobytes() == expected[escaped].tobytes()
 
 
 def test_a_uniform_map_is_the_constant_environment():
