@@ -34,7 +34,7 @@ from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.rendering import query
 from reference_rt.rendering.accumulation import jobs_of
 from reference_rt.rendering.kept_links import link_to_geometry
-from reference_rt.rendering.kernels import Running
+from reference_rt.rendering.kernels import kernels_for
 from reference_rt.rendering.query import hits, tracing
 from reference_rt.scene import build_hierarchies
 
@@ -443,9 +443,8 @@ def test_paths_together_are_paths_one_by_one(spp):
     )
     jobs, total = jobs_of(lit), np.zeros((12 * 9, 3))
     view, film_filter = lit.camera.setup(12, 9), lit.film.filter.setup()
-    with Running(jobs, lit.tables, view, film_filter, 1) as running:
-        for pixel in range(12 * 9):
-            for sample in range(spp):
-                sums = {"colour": total[pixel : pixel + 1]}
-                running.run(0)(sums, pixel, pixel + 1, sample, sample + 1)
+    (kernel, *_) = kernels_for(jobs, lit.tables, view, film_filter, 1)
+    for pixel in range(12 * 9):
+        for sample in range(spp):
+            kernel({"colour": total[pixel : pixel + 1]}, pixel, pixel + 1, sample, sample + 1)
     assert np.array_equal(rt.render(lit).colour, total.reshape(9, 12, 3) / spp)

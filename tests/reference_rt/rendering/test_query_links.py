@@ -3,6 +3,8 @@ one compiled kernel for all of them; links that last as long as the query."""
 
 import contextlib
 import dataclasses
+import gc
+import weakref
 from concurrent.futures import ThreadPoolExecutor
 from unittest import mock
 
@@ -12,7 +14,8 @@ from builders import SCENES, cube, same_in_plain_python, unit_vectors, write_obj
 from every_shape import every_shape, tilted
 
 import reference_rt as rt
-from reference_rt.rendering.query import bsdf, direct_light, hits, light, links, tracing
+from reference_rt.rendering.kept_links import link_to_geometry
+from reference_rt.rendering.query import bsdf, direct_light, hits, light, tracing
 from reference_rt.rendering.query.crossings import solid_crossings
 from reference_rt.rendering.query.radiance import cast_kernel
 from reference_rt.scene.examples import NAMED
@@ -180,23 +183,24 @@ def test_all_scenes_have_the_same_kernels():
 
 
 def test_links_of_a_scene_are_made_once():
+    """And are gone with its tables."""
     scene = rt.Scene(shapes=(rt.Sphere(), rt.Box()))
-    one = links.link_to_geometry(scene.tables, "closest_hit")
-    assert links.link_to_geometry(scene.tables, "closest_hit") is one
-    assert links.link_to_geometry(scene.tables, "occluded") is not one
-    for _ in range(links.SCENES):
-        links.link_to_geometry(rt.Scene(shapes=(rt.Sphere(),)).tables, "closest_hit")
-    assert len(links._kept) == links.SCENES
-    assert links.link_to_geometry(scene.tables, "closest_hit") is not one
+    one = link_to_geometry(scene.tables, "closest_hit")
+    assert link_to_geometry(scene.tables, "closest_hit") is one
+    assert link_to_geometry(scene.tables, "occluded") is not one
+    gone = weakref.ref(one)
+    del scene, one
+    gc.collect()
+    assert gone() is None
 
 
 def test_links_last_as_long_as_the_query():
-    """Though the links of other scenes have taken their place."""
+    """Though the scene is gone."""
     scene = rt.Scene(shapes=(rt.Sphere(radius=0.5), rt.Box()))
     o, d = np.array([[0.0, 0.0, 3.0]]), np.array([[0.0, 0.0, -1.0]])
     traced_later = tracing.FirstHits(scene.tables, 1, surfaces=True)
-    for _ in range(links.SCENES):
-        rt.Scene(shapes=(rt.Sphere(),)).intersect(o, d)
+    del scene
+    gc.collect()
     taken = [np.full(n, -1) for n in range(1, 500)]  # the memory of links that are no more
     out = tracing.empty_hits(1, surfaces=True)
     traced_later.trace(o, d, None, tracing.NO_LIMIT, out)
@@ -205,7 +209,7 @@ def test_links_last_as_long_as_the_query():
     assert len(taken) == 499
 
 
-def test_threads_that_query_more_scenes_than_are_kept():
+def test_threads_that_query_many_scenes():
     scenes = [rt.Scene(shapes=(rt.Sphere(radius=(k + 1) / 16),)) for k in range(12)]
     o, d = (np.tile([0.0, 0.0, z], (500, 1)) for z in (3.0, -1.0))
 
