@@ -311,11 +311,12 @@ _OPERATIONS = {
     "any_hits": "shadow rays of blocks",
     "area_density": "light densities",
     "background": "radiance",
+    "backgrounds": "radiance where a block's rays escape",
     "branches": "perfect reflection and refraction",
     "camera_ray": "camera rays",
     "closest_hit": "closest hits",
     "closest_hits": "closest hits of blocks",
-    "found": "surface coordinates of hits of blocks",
+    "complete": "surface coordinates of hits of blocks",
     "coordinates": "texture coordinates",
     "emitted": "emission",
     "environment_density": "light densities",
@@ -337,8 +338,11 @@ _OPERATIONS = {
     "prepare": "weights and frames",
     "sample": "samples",
     "sample_fixed": "light of fixed points",
+    "samples": "light samples of blocks",
+    "scatter": "scattering of blocks",
     "stratum_of": "signs of filters",
     "surface": "surface points",
+    "surfaces": "surface points of blocks",
     "traversal_cost": "what rays cost",
     "uv": "texture coordinates",
 }
@@ -350,6 +354,7 @@ _TABLES = {
     "Environment": "constant environment",
     "Tabulated": "filter",
     "TentSetup": "filter",
+    "Panes": "thin dielectrics",
     "Transparents": "dielectrics",
 }
 """Classes of tables, likewise."""

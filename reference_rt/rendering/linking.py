@@ -109,7 +109,7 @@ def _of_geometry(calls: Calls, geometry: Geometry) -> Calls:
     if geometry.solids is None:
         calls = _without(calls, shapes, "spans", "enters")
     if geometry.bvh is not None:
-        return _without(calls, shapes, "nearest_of_type", "nearest_of_block", "found")
+        return _without(calls, shapes, "nearest_of_type", "nearest_of_block", "complete")
     if not others & {"closest_hit", "occluded"}:
         calls = _without(calls, shapes, "nearest_of_type")
     if others & _QUERIES or geometry.solids is not None:

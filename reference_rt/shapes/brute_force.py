@@ -22,7 +22,7 @@ from reference_rt.core.ray import (
 )
 from reference_rt.jit.kernel import by_class, kernel, local_floats, local_integers
 from reference_rt.jit.simd import VECTOR_WIDTH
-from reference_rt.shapes.dispatch import found, intersect
+from reference_rt.shapes.dispatch import intersect
 from reference_rt.shapes.meshes.watertight import shear_of
 from reference_rt.shapes.ray_simd import load, store
 from reference_rt.shapes.tables import CODES, TABLES, Shapes, by_code
@@ -70,7 +70,7 @@ def _complete(table: Any, kind: int, rays: RayBlock, hits: HitBlock, n: int) -> 
     for j in range(n):
         code, t = hits.codes[j], hits.numbers[j]
         if first <= code < first + KIND:
-            at = found(table, kind, code - first, ray_of(rays, j), t)
+            at = _found(table, code - first, ray_of(rays, j), t)
             put_hit(hits, j, Hit(at.t, kind, code - first, at.u, at.v, -1))
 
 
@@ -86,6 +86,10 @@ def _kind_of(code: int) -> int:
 
 # Rays against all shapes of one type.  What a kernel below calls of the type stands in these
 # functions: a kernel that held it in a closure would have another name in each process.
+
+
+_found = by_class("found", {of: m.found for code, _, of, m in TABLES if code in SIDE_BY_SIDE})
+"""The crossing with row i of a table that a SIMD test (`ray_simd.py`) has found at t."""
 
 
 def _nearer_by(module: Any) -> Callable[..., None]:

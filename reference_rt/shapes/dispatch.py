@@ -43,12 +43,6 @@ def intersect(shapes: Shapes, kind: int, i: int, ray: Ray, shear: Shear) -> Cros
     return miss()
 
 
-@by_code("found")
-def found(shapes: Shapes, kind: int, i: int, ray: Ray, t: float) -> Crossing:
-    """The crossing of one primitive that a SIMD test (`ray_simd.py`) has found at t."""
-    return miss()
-
-
 @by_code("surface", code="hit.kind")
 def surface(shapes: Shapes, ray: Ray, hit: Hit) -> SurfacePoint:
     """The surface point at a hit of a primitive."""

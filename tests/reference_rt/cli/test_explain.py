@@ -55,7 +55,7 @@ def test_tables(file):
     assert ("hierarchy" in used) == (tables.geometry.bvh is not None)
     assert ("hierarchy" in left_out) == (tables.geometry.bvh is None)
     assert ("layers" in used) == (tables.materials.flat_leaves is not None)
-    assert ("tangents" in used) == (tables.materials.oriented is not None)
+    assert ("tangents" in used) == tables.materials.oriented.any()
     for _, name, _, _ in TEXTURES:
         has = tables.textures is not None and getattr(tables.textures, name) is not None
         assert (f"textures: {name}" in used) == has
