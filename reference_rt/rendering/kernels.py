@@ -12,7 +12,7 @@ import numba
 
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit import parallel_compile
-from reference_rt.jit.kernel import signature_of
+from reference_rt.jit.kernel import is_compiled, precompile, signature_of
 from reference_rt.jit.links import Link, Linker
 from reference_rt.jit.parallel_compile import Ahead, Call, Report, precompile_all
 from reference_rt.rendering.accumulation import Job
@@ -83,7 +83,8 @@ def kernels_for(
 
     purpose = tuple((job.kernel, job.setup) for job in jobs)
     scene = linked(tables, purpose, link, compile_for)
-    compiled = precompile_all(given.calls, threads)  # where links were there already
+    if not all(is_compiled(*call) for call in given.calls):  # where the links were there already
+        precompile_all(given.calls, threads, say, ahead)
     given.linker.resolve()
 
     def bound(job: Job, kernel: Callable[..., Any], of_job: Any) -> Callable[..., None]:
@@ -96,7 +97,8 @@ def kernels_for(
 
         return run
 
-    return [bound(*one) for one in zip(jobs, compiled, scene.tables, strict=False)]
+    compiled = [precompile(*call) for call in given.own]
+    return [bound(*one) for one in zip(jobs, compiled, scene.tables, strict=True)]
 
 
 def plain_arguments(job: Job, tables: SceneTables, view: Any, film_filter: Any) -> tuple[Any, ...]:
