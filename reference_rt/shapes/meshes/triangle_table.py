@@ -45,7 +45,7 @@ RAGGED = ("points",)
 
 def table_of(
     points: FloatArray,
-    corners: IntArray,
+    corners: npt.NDArray[np.integer],
     context: TabulationContext,
     normals: FloatArray | None = None,
     uvs: FloatArray | None = None,
@@ -56,7 +56,7 @@ def table_of(
     n = len(corners)
     return Triangles(
         points=points,
-        corners=corners.astype(np.int32),
+        corners=corners.astype(np.int32, copy=False),
         normals=normals,
         uvs=uvs,
         colours=colours,
@@ -70,10 +70,19 @@ def table_of(
 def shared(triangles: Triangles) -> Triangles:
     """One row of the columns that are the same for all triangles, such as those of a single mesh:
     less memory, and a number that stays in the cache."""
-    names = "owner", "material", "light"
-    columns = {name: getattr(triangles, name) for name in names}
+    columns = {name: getattr(triangles, name) for name in _OFTEN_SHARED}
     same = {name: c[:1].copy() for name, c in columns.items() if (c == c[0]).all()}
     return triangles._replace(**same)
+
+
+def spread(triangles: Triangles) -> Triangles:
+    """One row for each triangle again, see `shared`."""
+    n = len(triangles.face)
+    columns = {name: getattr(triangles, name) for name in _OFTEN_SHARED}
+    return triangles._replace(**{k: np.repeat(c, n // len(c)) for k, c in columns.items()})
+
+
+_OFTEN_SHARED = "owner", "material", "light"
 
 
 def facing(m: transform.Affine, triangles: Triangles) -> Triangles:
@@ -149,7 +158,7 @@ def unit_normals(triangles: Triangles) -> FloatArray:
     return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
 
 
-def have_area(points: FloatArray, corners: IntArray) -> npt.NDArray[np.bool_]:
+def have_area(points: FloatArray, corners: npt.NDArray[np.integer]) -> npt.NDArray[np.bool_]:
     """Which triangles, see `Triangles`, have an area that float64 can hold: (n,)."""
     found = np.empty(len(corners), bool)
     for begin in range(0, len(corners), _TOGETHER):
@@ -158,12 +167,17 @@ def have_area(points: FloatArray, corners: IntArray) -> npt.NDArray[np.bool_]:
     return found
 
 
-_TOGETHER = 1 << 18
+_TOGETHER = 1 << 15
 """Triangles that are computed together: more only take more memory."""
 
 
 def areas(triangles: Triangles) -> FloatArray:
     return np.asarray(0.5 * np.linalg.norm(geometric_normals(triangles.vertices), axis=1))
+
+
+def extent(triangles: Triangles) -> Bounds:
+    """The box (3,), (3,) around all of them: each of the points is a vertex."""
+    return triangles.points.min(axis=0), triangles.points.max(axis=0)
 
 
 def bounds(triangles: Triangles) -> Bounds:
