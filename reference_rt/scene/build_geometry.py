@@ -18,6 +18,7 @@ from reference_rt.shapes.instances import Instance, composed
 from reference_rt.shapes.meshes.topology import describe_boundary
 from reference_rt.shapes.meshes.triangle_table import shared, spread
 from reference_rt.shapes.shape import TabulationContext, outward
+from reference_rt.util.memory import give_back
 
 _CODES = {table: code for code, _, table, _ in TABLES}
 
@@ -55,8 +56,11 @@ def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
     trees = HierarchyBuilder(scene.hierarchy, tables, bounds)
     roots = [trees.add(references, whole=whole) for references, whole in work.trees]
     trees.finish(top, copies, roots)
-    solids = work.solid_tables(trees, roots)
+    solids, parts = work.solid_tables(trees, roots), work.part_table()
+    del work, top
+    give_back()
     hierarchy = trees.hierarchy()
+    give_back()
     if tables["triangles"] is not None:
         tables["triangles"] = spread(tables["triangles"])
     return Geometry(
@@ -64,7 +68,7 @@ def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
         hierarchy,
         solids,
         trees.instances(),
-        work.part_table(),
+        parts,
     )
 
 

@@ -162,7 +162,7 @@ class HierarchyBuilder:
         return len(self._wide) - 1
 
     def _is_few(self, kinds: Kinds) -> bool:
-        if self._wide or np.any(kinds >= SOLID):
+        if self._wide or len(kinds) >= BVH_FROM or np.any(kinds >= SOLID):
             return False
         quick = np.isin(kinds, SIDE_BY_SIDE) & (kinds != QUADRIC)
         work = np.where(quick, 1, ONE_BY_ONE)
@@ -275,7 +275,10 @@ def _first_named(rows: IdArray, count: int) -> IdArray:
 
 
 def _joined(references: Sequence[TableRows]) -> tuple[Kinds, IdArray]:
-    """Kinds and rows (n,)."""
+    """Kinds and rows (n,); rows of a single kind are not copied."""
+    if len(references) == 1:
+        kind, rows = references[0]
+        return np.full(len(rows), kind, np.int8), rows
     kinds = [np.full(len(r.rows), r.kind, np.int8) for r in references]
     return (
         np.concatenate([np.zeros(0, np.int8), *kinds]),

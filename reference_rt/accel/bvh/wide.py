@@ -145,8 +145,11 @@ def joined(
             center = 0.5 * lower + 0.5 * upper
             frames[node, CENTER + 3] = max(np.abs(lower).max(), np.abs(upper).max())
         frames[node, CENTER : CENTER + 3] = center
-        boxes[here, : CHILDREN // 2] = _below(tree.boxes[:, :3], center)
-        boxes[here, CHILDREN // 2 : CHILDREN] = -_below(-tree.boxes[:, 3:], -center)
+        for begin in range(0, len(tree.codes), _TOGETHER):
+            some = tree.boxes[begin : begin + _TOGETHER]
+            of_some = boxes[node + begin : node + begin + len(some)]
+            of_some[:, : CHILDREN // 2] = _below(some[:, :3], center)
+            of_some[:, CHILDREN // 2 : CHILDREN] = -_below(-some[:, 3:], -center)
         codes = np.where(tree.codes < NOTHING, tree.codes - 32 * reference, tree.codes)
         children[here, CHILDREN : CHILDREN + VECTOR_WIDTH] = np.where(
             codes >= 0, codes + node, codes
@@ -183,7 +186,7 @@ def with_corners(bvh: Bvh, points: FloatArray, vertices: IdArray) -> Bvh:
 
 
 _TOGETHER = 1 << 10
-"""Nodes whose leaves' corners are copied by one call."""
+"""Nodes whose boxes are rounded together, and whose leaves' corners are copied by one call."""
 
 
 @entry_kernel

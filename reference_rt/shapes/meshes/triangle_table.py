@@ -52,18 +52,17 @@ def table_of(
     colours: FloatArray | None = None,
     face: IntArray | None = None,
 ) -> Triangles:
-    """Triangles of one shape: see `Triangles`; `face` defaults to 0, 1, 2, ..."""
-    n = len(corners)
+    """Triangles of one shape: see `Triangles` and `shared`; `face` defaults to 0, 1, 2, ..."""
     return Triangles(
         points=points,
         corners=corners.astype(np.int32, copy=False),
         normals=normals,
         uvs=uvs,
         colours=colours,
-        owner=np.full(n, context.owner, np.int32),
-        material=np.full(n, context.material, np.int32),
-        light=np.full(n, -1, np.int32),
-        face=np.arange(n, dtype=np.int32) if face is None else face.astype(np.int32),
+        owner=np.array([context.owner], np.int32),
+        material=np.array([context.material], np.int32),
+        light=np.array([-1], np.int32),
+        face=np.arange(len(corners), dtype=np.int32) if face is None else face.astype(np.int32),
     )
 
 
@@ -112,9 +111,11 @@ def _barycentrics(triangles: Triangles) -> FloatArray:
 
 
 def align(parts: Sequence[Triangles]) -> list[Triangles]:
-    """Gives all tables the columns that any of them has, and corners the rows of points in all
-    tables one after another, so that they can be concatenated."""
-    parts = list(parts)
+    """Gives all tables the columns that any of them has, with a row for each triangle, and corners
+    the rows of points in all tables one after another, so that they can be concatenated."""
+    if len(parts) == 1:
+        return [*parts]
+    parts = [spread(part) for part in parts]
     if any(part.normals is not None for part in parts):
         parts = [
             part._replace(normals=_flat_normals(part)) if part.normals is None else part
