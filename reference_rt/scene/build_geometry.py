@@ -53,6 +53,7 @@ def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
         tables["triangles"] = shared(tables["triangles"])  # until the hierarchies are built
     if work.solids:
         bounds[SOLID] = _concatenated_bounds([solid.bounds for solid in work.solids])
+    give_back()  # what readers leave
     trees = HierarchyBuilder(scene.hierarchy, tables, bounds)
     roots = [trees.add(references, whole=whole) for references, whole in work.trees]
     trees.finish(top, copies, roots)

@@ -226,10 +226,10 @@ MANY = LEAF_SHARE + 1
 
 
 @kernel
-def _leaf_cost(below: _Below, node: int) -> float:
-    if below.count[node] > LEAF_SHARE:
+def _leaf_cost(count: int, triangles: bool) -> float:
+    if count > LEAF_SHARE:
         return np.inf
-    return TRIANGLE_LEAF_COST if below.triangles[node] else PRIMITIVE_COST * below.count[node]
+    return TRIANGLE_LEAF_COST if triangles else PRIMITIVE_COST * count
 
 
 _INNER, _FEWER = -1, -2
@@ -264,7 +264,7 @@ def _plan(
         cost, of_left, of_right = costs[depth, side], costs[depth + 1, 0], costs[depth + 1, 1]
         depth -= 1
         area = half_area(nodes.boxes[node])
-        leaf = area * _leaf_cost(below, node)
+        leaf = area * _leaf_cost(int(below.count[node]), below.triangles[node])
         if nodes.size[node] > 0:
             for i in range(1, VECTOR_WIDTH + 1):
                 cost[i] = leaf

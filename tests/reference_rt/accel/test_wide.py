@@ -39,7 +39,9 @@ def _joined(corners, method, is_triangle):
     nodes, references = build(corners, method)
     wide = bvh.widened(nodes, is_triangle[references])
     kinds = np.where(is_triangle[references], 3, 7)
-    return nodes, references, bvh.joined([wide], [kinds], [references], corners)
+    vertices = np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3)
+    tree = bvh.joined([wide], [kinds], [references])
+    return nodes, references, bvh.with_corners(tree, corners.reshape(-1, 3), vertices)
 
 
 @pytest.mark.parametrize("method", METHODS)
