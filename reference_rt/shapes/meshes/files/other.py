@@ -3,9 +3,10 @@ installed.
 
 Stereolithography files, .stl (3D Systems 1989), are separate triangles, binary or ascii.
 Normals are not read, since they are those of the winding; nor are the attributes of binary files,
-which have no agreed meaning: they are named as ignored.  The solids of an ascii file become one
-mesh.  Equal vertices are merged.  Object files, .off (Geomview), are polygons in ascii.  Of COFF, NOFF and STOFF files only the
-positions are read; colours, normals and texture coordinates are ignored, and named.
+which have no agreed meaning: they are named as ignored.  The solids of an ascii file become one mesh, and
+equal vertices one vertex.  Object files, .off (Geomview), are polygons in ascii.  Of COFF, NOFF and
+STOFF files only the positions are read; colours, normals and texture coordinates are ignored, and
+named.
 
 Of trimesh's formats the positions and triangles are read, in the scene that the file describes,
 without normals, uv and colours (the last two are named as ignored).
@@ -70,8 +71,8 @@ def read_stl(content: bytes) -> RawMesh:
 
 
 def _merged(corners: Corners) -> tuple[Corners, IdArray]:
-    """Vertices and triangles (m, 3) of corners (m, 3, 3): a vertex that several triangles have, with
-    the same bits, is one, which is a sixth of the memory.  In the order of their first use."""
+    """Vertices and triangles (m, 3) of corners (m, 3, 3).  Vertices of the same bits are one, which
+    is a sixth of the memory; in the order of their first use."""
     hashes = np.zeros(corners.size // 3, np.uint64)
     for k in range(3):
         hashes ^= _bits(corners, k)
