@@ -16,7 +16,7 @@ from reference_rt.shapes import TABLES, TRIANGLE, Shape, Shapes, csg
 from reference_rt.shapes.csg import NOT, OR, Parts, Solid, Solids
 from reference_rt.shapes.instances import Instance, composed
 from reference_rt.shapes.meshes.topology import describe_boundary
-from reference_rt.shapes.meshes.triangle_table import shared, spread
+from reference_rt.shapes.meshes.triangle_table import shared
 from reference_rt.shapes.shape import TabulationContext, outward
 from reference_rt.util.memory import give_back
 
@@ -27,7 +27,7 @@ MOST_INSTANCES = 10_000_000
 
 
 def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
-    """The geometry of a scene.  materials: the row of each material.
+    """The geometry of a scene, its triangles `shared`.  materials: the row of each material.
 
     Raises SceneError with file, line and key path.
     """
@@ -50,7 +50,7 @@ def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
             work.check_finite(work.tables[code])
             tables[field] = _concatenate(work.tables.pop(code))
     if tables["triangles"] is not None:
-        tables["triangles"] = shared(tables["triangles"])  # until the hierarchies are built
+        tables["triangles"] = shared(tables["triangles"])
     if work.solids:
         bounds[SOLID] = _concatenated_bounds([solid.bounds for solid in work.solids])
     give_back()  # what readers leave
@@ -62,8 +62,6 @@ def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
     give_back()
     hierarchy = trees.hierarchy()
     give_back()
-    if tables["triangles"] is not None:
-        tables["triangles"] = spread(tables["triangles"])
     return Geometry(
         Shapes(**tables),
         hierarchy,

@@ -144,9 +144,10 @@ def new_nodes(m: int) -> Nodes:
 
 
 def trimmed(nodes: Nodes, count: int) -> Nodes:
-    """The first `count` of the nodes; the rest, which was never written, takes no memory."""
-    boxes, first, size = nodes
-    return Nodes(boxes[:count], first[:count], size[:count])
+    """The first `count` of `new_nodes`; the room for more is given back."""
+    for column in nodes:
+        column.resize((count, *column.shape[1:]), refcheck=False)
+    return nodes
 
 
 @entry_kernel

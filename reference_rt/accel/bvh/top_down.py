@@ -5,7 +5,7 @@ The SAH builder splits each node at the cheapest of many planes (Wald 2007, "On 
 SAH-based bounding volume hierarchies", RT'07), with or without spatial splits.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -247,9 +247,7 @@ def build_sah(primitives: FloatArray, corners: FloatArray | None) -> tuple[Nodes
         _, begin, end, depth = row.tolist()
         if end - begin > APART:
             return build(_Task(begin, end, depth, end - begin - 1), new_nodes(2))
-        nodes, used, left_out = build(_Task(begin, end, depth, 0), new_nodes(end - begin))
-        # Copied, so that the room for more nodes is free again.
-        return Nodes(*(column.copy() for column in nodes)), used, left_out
+        return build(_Task(begin, end, depth, 0), new_nodes(end - begin))
 
     whole = new_nodes(n)
     count, rows = 1, [np.array([0, 0, n, 0])]
@@ -259,7 +257,8 @@ def build_sah(primitives: FloatArray, corners: FloatArray | None) -> tuple[Nodes
             # Where its root is, and what to add to the numbers of its other nodes.
             root, more = int(task[0]), count - 1
             nodes.first[nodes.size == 0] += more
-            for column, of_part in zip(whole, nodes, strict=True):
+            columns: Any = zip(whole, nodes, strict=True)
+            for column, of_part in columns:
                 column[root], column[count : more + len(of_part)] = of_part[0], of_part[1:]
             left_out[:, 0] += more
             rows += [*left_out]

@@ -214,11 +214,11 @@ a node's boxes.  Measured: between 0.5 and 2 the first makes no difference on th
 
 
 class _Below(NamedTuple):
-    """What is below each of n nodes.  start (n,): the first reference;  count (n,): how many there
+    """What is below each of n nodes.  start (n,): the first reference;  size (n,): how many there
     are, MANY for more than LEAF_SHARE;  triangles (n,): whether all are triangles."""
 
     start: IdArray
-    count: npt.NDArray[np.int8]
+    size: npt.NDArray[np.int8]
     triangles: npt.NDArray[np.bool_]
 
 
@@ -264,7 +264,7 @@ def _plan(
         cost, of_left, of_right = costs[depth, side], costs[depth + 1, 0], costs[depth + 1, 1]
         depth -= 1
         area = half_area(nodes.boxes[node])
-        leaf = area * _leaf_cost(int(below.count[node]), below.triangles[node])
+        leaf = area * _leaf_cost(int(below.size[node]), below.triangles[node])
         if nodes.size[node] > 0:
             for i in range(1, VECTOR_WIDTH + 1):
                 cost[i] = leaf
@@ -277,7 +277,7 @@ def _plan(
                 if both < cost[i]:
                     cost[i], choice[node, i] = both, j
         inner = area + cost[VECTOR_WIDTH]
-        is_leaf = below.count[node] <= LEAF_SHARE and not inner < leaf
+        is_leaf = below.size[node] <= LEAF_SHARE and not inner < leaf
         cost[1] = leaf if is_leaf else inner
         choice[node, 1] = 0 if is_leaf else _INNER
         for i in range(2, VECTOR_WIDTH + 1):
@@ -323,7 +323,7 @@ def _collapse(
                     waiting += 1
                 else:
                     codes[row, lane] = leaf_code(
-                        int(below.start[child]), int(below.count[child]), below.triangles[child]
+                        int(below.start[child]), int(below.size[child]), below.triangles[child]
                     )
                 lane += 1
                 continue
@@ -338,7 +338,7 @@ def _collapse(
 @entry_kernel
 def _count(nodes: Nodes, is_triangle: npt.NDArray[np.bool_], below: _Below) -> None:
     """Fills `below`."""
-    start, count, triangles = below.start, below.count, below.triangles
+    start, count, triangles = below.start, below.size, below.triangles
     for k in range(len(nodes.first)):
         node = len(nodes.first) - 1 - k
         first, size = nodes.first[node], nodes.size[node]
@@ -362,8 +362,8 @@ def widened(nodes: Nodes, is_triangle: npt.NDArray[np.bool_]) -> Wide:
     choice = np.empty((n, VECTOR_WIDTH + 1), np.int8)
     jobs, costs = np.empty((STACK_SIZE, 3), np.int64), np.empty((STACK_SIZE, 2, VECTOR_WIDTH + 1))
     _plan(nodes, below, jobs, costs, choice)
-    # Every wide node takes up at least one inner node.
-    most = int((nodes.size == 0).sum())
+    # Every wide node is made of the root, or of one that is an inner node where it is one child.
+    most = 1 + int((choice[1:, 1] == _INNER).sum())
     jobs = np.empty((most + 1, 2), np.int64)
     boxes, codes = np.empty((most, 6, VECTOR_WIDTH)), np.empty((most, VECTOR_WIDTH), np.int32)
     made = _collapse(nodes, below, choice, jobs, boxes, codes)

@@ -143,7 +143,8 @@ _TOGETHER = 1 << 15
 
 def _has_area(n: FloatArray) -> npt.NDArray[np.bool_]:
     """Which normals (m, 3) are not 0: (m, 1)."""
-    return np.any(n != 0.0, axis=1, keepdims=True)
+    found: npt.NDArray[np.bool_] = np.any(n != 0.0, axis=1, keepdims=True)
+    return found
 
 
 def unit(vectors: FloatArray) -> FloatArray:

@@ -3,10 +3,10 @@ installed.
 
 Stereolithography files, .stl (3D Systems 1989), are separate triangles, binary or ascii.
 Normals are not read, since they are those of the winding; nor are the attributes of binary files,
-which have no agreed meaning: they are named as ignored.  The solids of an ascii file become one mesh, and
-equal vertices one vertex.  Object files, .off (Geomview), are polygons in ascii.  Of COFF, NOFF and
-STOFF files only the positions are read; colours, normals and texture coordinates are ignored, and
-named.
+which have no agreed meaning: they are named as ignored.  The solids of an ascii file become one
+mesh, and equal vertices one vertex.  Object files, .off (Geomview), are polygons in ascii.  Of
+COFF, NOFF and STOFF files only the positions are read; colours, normals and texture coordinates are
+ignored, and named.
 
 Of trimesh's formats the positions and triangles are read, in the scene that the file describes,
 without normals, uv and colours (the last two are named as ignored).
@@ -67,6 +67,9 @@ def read_stl(content: bytes) -> RawMesh:
             f"it has {len(content)} bytes; expected {size} for the {count} triangles that its "
             "header promises, or 'solid' as its first word"
         )
+    if not np.isfinite(corners).all():  # an error, which names the number in the file
+        vertices = corners.reshape(-1, 3)
+        return RawMesh(vertices, np.arange(len(vertices)).reshape(-1, 3), ignored=ignored)
     return RawMesh(*_merged(corners), ignored=ignored)
 
 
