@@ -153,8 +153,16 @@ def apply_points(m: Affine, points: npt.NDArray[np.float64]) -> npt.NDArray[np.f
 
     The rounding of NumPy's matrix product may depend on a point's place in the array.
     """
-    x, y, z = points[:, :1], points[:, 1:2], points[:, 2:]
-    return np.asarray(x * m[:, 0] + y * m[:, 1] + z * m[:, 2] + m[:, 3])
+    mapped = np.empty(points.shape)
+    for begin in range(0, len(points), _TOGETHER):
+        here = slice(begin, begin + _TOGETHER)
+        x, y, z = points[here, :1], points[here, 1:2], points[here, 2:]
+        mapped[here] = x * m[:, 0] + y * m[:, 1] + z * m[:, 2] + m[:, 3]
+    return mapped
+
+
+_TOGETHER = 1 << 15
+"""Points that are mapped together: more only take more memory."""
 
 
 def apply_normals(m: Affine, normals: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

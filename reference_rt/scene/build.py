@@ -4,6 +4,7 @@ Every array is C-contiguous and writable, and has the same type in all scenes, s
 type have the same Numba type and share compiled kernels.  A table that the scene lacks is None.
 """
 
+from collections.abc import Callable
 from typing import Any, Self
 
 import numpy as np
@@ -11,12 +12,13 @@ from pydantic import PrivateAttr
 
 from reference_rt.accel.geometry import Geometry
 from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.materials import Emissive
 from reference_rt.scene.build_geometry import assemble
 from reference_rt.scene.build_lights import light_tables
 from reference_rt.scene.build_materials import material_tables
 from reference_rt.scene.build_textures import texture_tables
 from reference_rt.scene.model import SceneModel
-from reference_rt.shapes.meshes.triangle_table import shared
+from reference_rt.shapes.meshes.triangle_table import Triangles, shared, spread
 
 
 class BuiltScene(SceneModel):
@@ -57,16 +59,19 @@ def build_tables(scene: SceneModel) -> SceneTables:
     textures, palette = texture_tables(scene)
     with np.errstate(over="ignore", invalid="ignore"):  # checked afterwards: not finite
         geometry = assemble(scene, numbers)
+        if any(isinstance(material, Emissive) for material in scene.materials.values()):
+            geometry = _with_triangles(geometry, spread)  # which may be numbered as lights
         materials = material_tables(scene, palette, _has_material(geometry, numbers[None]))
         lights = light_tables(scene, geometry, palette)
-        return SceneTables(_with_shared_ids(geometry), materials, lights, textures)
+        geometry = _with_triangles(geometry, shared)
+        return SceneTables(geometry, materials, lights, textures)
 
 
-def _with_shared_ids(geometry: Geometry) -> Geometry:
+def _with_triangles(geometry: Geometry, change: Callable[[Triangles], Triangles]) -> Geometry:
     shapes = geometry.shapes
     if shapes.triangles is None:
         return geometry
-    return geometry._replace(shapes=shapes._replace(triangles=shared(shapes.triangles)))
+    return geometry._replace(shapes=shapes._replace(triangles=change(shapes.triangles)))
 
 
 def _has_material(geometry: Geometry, number: int) -> bool:

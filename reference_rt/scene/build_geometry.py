@@ -16,7 +16,9 @@ from reference_rt.shapes import TABLES, TRIANGLE, Shape, Shapes, csg
 from reference_rt.shapes.csg import NOT, OR, Parts, Solid, Solids
 from reference_rt.shapes.instances import Instance, composed
 from reference_rt.shapes.meshes.topology import describe_boundary
+from reference_rt.shapes.meshes.triangle_table import shared
 from reference_rt.shapes.shape import TabulationContext, outward
+from reference_rt.util.memory import give_back
 
 _CODES = {table: code for code, _, table, _ in TABLES}
 
@@ -25,7 +27,7 @@ MOST_INSTANCES = 10_000_000
 
 
 def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
-    """The geometry of a scene.  materials: the row of each material.
+    """The geometry of a scene, its triangles `shared`.  materials: the row of each material.
 
     Raises SceneError with file, line and key path.
     """
@@ -42,25 +44,30 @@ def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
             raise scene.error(str(error), "shapes", i) from None
     tables: dict[str, Any] = {}
     bounds: dict[int, Bounds] = {}
-    for code, field, _, module in TABLES:
+    for code, field, _, _ in TABLES:
         tables[field] = None
         if work.tables[code]:  # popped, so that a large mesh is never held twice
             work.check_finite(work.tables[code])
-            table = tables[field] = _concatenate(work.tables.pop(code))
-            bounds[code] = module.bounds(table)
-            del table
+            tables[field] = _concatenate(work.tables.pop(code))
+    if tables["triangles"] is not None:
+        tables["triangles"] = shared(tables["triangles"])
     if work.solids:
         bounds[SOLID] = _concatenated_bounds([solid.bounds for solid in work.solids])
+    give_back()  # what readers leave
     trees = HierarchyBuilder(scene.hierarchy, tables, bounds)
     roots = [trees.add(references, whole=whole) for references, whole in work.trees]
     trees.finish(top, copies, roots)
-    solids = work.solid_tables(trees, roots)
+    solids, parts = work.solid_tables(trees, roots), work.part_table()
+    del work, top
+    give_back()
+    hierarchy = trees.hierarchy()
+    give_back()
     return Geometry(
-        Shapes(**trees.tables),
-        trees.hierarchy(),
+        Shapes(**tables),
+        hierarchy,
         solids,
         trees.instances(),
-        work.part_table(),
+        parts,
     )
 
 
@@ -104,7 +111,7 @@ class _Assembly:
         first = self.rows[code]
         self.rows[code] += len(table.face)
         self.tables[code].append(table)
-        return TableRows(code, np.arange(first, self.rows[code]))
+        return TableRows(code, np.arange(first, self.rows[code], dtype=np.int32))
 
     def check_finite(self, parts: Sequence[Any]) -> None:
         """Raise SceneError for a shape, whose table is one of these, with numbers that have
@@ -120,7 +127,7 @@ class _Assembly:
         """Add a shape of the scene or of a group that is not an instance."""
         name = shape.material if shape.material is not None else material
         if isinstance(shape, Solid):
-            return TableRows(SOLID, np.array([self.solid(shape, owner, name)]))
+            return TableRows(SOLID, np.array([self.solid(shape, owner, name)], np.int32))
         return self.add(shape, self.place(owner, name))
 
     def part(

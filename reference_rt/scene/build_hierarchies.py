@@ -4,11 +4,12 @@ from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from reference_rt.accel import bvh
 from reference_rt.accel.bvh import Bvh
 from reference_rt.accel.leaf import INSTANCE, SOLID
-from reference_rt.core.arrays import Bounds, FloatArray, IntArray
+from reference_rt.core.arrays import Bounds, FloatArray, IdArray, IntArray
 from reference_rt.shapes import QUADRIC, TABLES, TRIANGLE
 from reference_rt.shapes.brute_force import SIDE_BY_SIDE
 from reference_rt.shapes.instances import Instances
@@ -23,11 +24,18 @@ time in blocks of rays, but in front of single rays of Whitted's method 6 take 2
 ONE_BY_ONE = 10
 
 
+Kinds = npt.NDArray[np.int8]
+"""Kinds of primitives: codes of tables, SOLID or INSTANCE."""
+
+_TOGETHER = 1 << 15
+"""Primitives whose boxes are computed together: more only take more memory."""
+
+
 class TableRows(NamedTuple):
     """Primitives or solids of one kind: their rows (n,)."""
 
     kind: int
-    rows: IntArray
+    rows: IdArray
 
 
 class ExpandedInstance(NamedTuple):
@@ -41,7 +49,8 @@ class ExpandedInstance(NamedTuple):
 class HierarchyBuilder:
     """Builds the hierarchies of a scene and joins them into the arrays of one `Bvh`.
 
-    method: of `bvh.build`, or "auto";  tables: by field of `Shapes`;  bounds: boxes of each kind.
+    method: of `bvh.build`, or "auto";  tables: by field of `Shapes`;  bounds: boxes of the kinds
+    without a table.
     """
 
     def __init__(
@@ -53,25 +62,19 @@ class HierarchyBuilder:
         self.method, self.tables, self.bounds = method, tables, bounds
         self._wide: list[bvh.Wide] = []
         self._boxes: list[FloatArray] = []
-        self._kinds: list[IntArray] = []
-        self._rows: list[IntArray] = []
+        self._sizes: list[int] = []
+        self._kinds: list[Kinds] = []
+        self._rows: list[IdArray] = []
         self._unbounded = -1
         self._instances: Instances | None = None
-        self._new_rows: dict[int, IntArray] = {}
+        self._new_rows: dict[int, IdArray] = {}
         self._scene: int | None = None
 
-    def add(self, references: Sequence[TableRows], whole: bool = False, last: bool = False) -> int:
-        """Build a hierarchy over these, and return its number.  whole: reference each only once;
-        last: forget the bounds, no other one is built."""
+    def add(self, references: Sequence[TableRows], whole: bool = False) -> int:
+        """Build a hierarchy over these, which are finite, and return its number.  whole: reference
+        each only once."""
         kinds, rows = _joined(references)
-        lower, upper = self._bounds_of(kinds, rows)
-        method: bvh.Method = "sah" if self.method == "auto" else self.method
-        if whole and method == "spatial":
-            method = "sah"
-        nodes, order = bvh.build(lower, upper, method, self._corners(kinds, rows))
-        if last:
-            self.bounds.clear()
-        del lower, upper
+        nodes, order = self._built(kinds, rows, self._boxes_of(kinds, rows)[0], whole)
         return self._append(nodes, kinds[order], rows[order])
 
     def finish(
@@ -82,48 +85,40 @@ class HierarchyBuilder:
         if copies:
             self._instances = self._place(copies, roots)
             count = len(self._instances.owner)
-            top = [*top, TableRows(INSTANCE, np.arange(count))]
-        kinds, rows = _joined(top)
+            top = [*top, TableRows(INSTANCE, np.arange(count, dtype=np.int32))]
+        kinds, rows = _joined(sorted(top, key=lambda some: some.kind))
         if len(kinds) > 0 and not (self.method == "auto" and self._is_few(kinds)):
-            lower, upper = self._bounds_of(kinds, rows)
-            finite = np.isfinite(lower).all(axis=1) & np.isfinite(upper).all(axis=1)
-            del lower, upper  # `add` computes them again: two copies would double the memory
-            if finite.any():
-                bounded = [TableRows(k, rows[finite & (kinds == k)]) for k in _distinct(kinds)]
-                self._scene = self.add([some for some in bounded if len(some.rows)], last=True)
-            if not finite.all():
-                everywhere = np.repeat([-np.inf, np.inf], 3)[None]
-                leaf = bvh.Nodes(everywhere, np.zeros(1, np.int64), np.array([(~finite).sum()]))
-                self._unbounded = self._append(leaf, kinds[~finite], rows[~finite])
-                if self._scene is None:
-                    self._scene, self._unbounded = self._unbounded, -1
+            self._add_top(kinds, rows)
         self._order_rows()
 
     def hierarchy(self) -> Bvh | None:
         """All hierarchies, the scene's first; None if brute force is faster for few shapes."""
         if self._scene is None:
             return None
-        order = [self._scene, *(k for k in range(len(self._wide)) if k != self._scene)]
-        triangles = self.tables["triangles"]
+        order = [self._scene, *(k for k in range(len(self._sizes)) if k != self._scene)]
         joined = bvh.joined(
             [self._wide[k] for k in order],
             [self._kinds[k] for k in order],
             [self._rows[k] for k in order],
-            None if triangles is None else triangles.vertices,
         )
+        for used in (self._wide, self._kinds, self._rows):
+            used.clear()
+        triangles = self.tables["triangles"]
+        if triangles is not None:
+            joined = bvh.with_corners(joined, triangles.points, triangles.corners)
         return joined._replace(unbounded=-1 if self._unbounded < 0 else self.start(self._unbounded))
 
     def start(self, tree: int) -> int:
         """The index of a hierarchy's root among all nodes."""
         if tree == self._scene:
             return 0
-        before = sum(len(self._wide[k].codes) for k in range(tree) if k != self._scene)
-        return before + (0 if self._scene is None else len(self._wide[self._scene].codes))
+        before = sum(self._sizes[k] for k in range(tree) if k != self._scene)
+        return before + (0 if self._scene is None else self._sizes[self._scene])
 
     def instances(self) -> Instances | None:
         if self._instances is None:
             return None
-        starts = np.array([self.start(k) for k in range(len(self._wide))])
+        starts = np.array([self.start(k) for k in range(len(self._sizes))])
         return self._instances._replace(root=starts[self._instances.root])
 
     def new_row(self, kind: int, row: int) -> int:
@@ -132,34 +127,78 @@ class HierarchyBuilder:
 
     # ---- how ------------------------------------------------------------------------------------
 
-    def _append(self, nodes: bvh.Nodes, kinds: IntArray, rows: IntArray) -> int:
+    def _add_top(self, kinds: Kinds, rows: IdArray) -> None:
+        """The scene's own hierarchy, and one leaf of what is infinite."""
+        boxes, finite = self._boxes_of(kinds, rows)
+        infinite = kinds[~finite], rows[~finite]
+        if finite.any():
+            if len(infinite[0]):
+                kinds, rows = kinds[finite], rows[finite]
+            nodes, order = self._built(kinds, rows, boxes)
+            del boxes  # it takes more than all that follows
+            self._scene = self._append(nodes, kinds[order], rows[order])
+        if len(infinite[0]):
+            everywhere = np.repeat([-np.inf, np.inf], 3)[None]
+            size = np.array([len(infinite[0])], np.int32)
+            leaf = bvh.Nodes(everywhere, np.zeros(1, np.int32), size)
+            self._unbounded = self._append(leaf, *infinite)
+            if self._scene is None:
+                self._scene, self._unbounded = self._unbounded, -1
+
+    def _built(
+        self, kinds: Kinds, rows: IdArray, boxes: FloatArray, whole: bool = False
+    ) -> tuple[bvh.Nodes, IdArray]:
+        method: bvh.Method = "sah" if self.method == "auto" else self.method
+        if whole and method == "spatial":
+            method = "sah"
+        return bvh.build_over(boxes, method, self._corners(kinds, rows))
+
+    def _append(self, nodes: bvh.Nodes, kinds: Kinds, rows: IdArray) -> int:
         self._wide.append(bvh.widened(nodes, kinds == TRIANGLE))
+        self._sizes.append(len(self._wide[-1].codes))
         self._boxes.append(nodes.boxes[0].copy())
         self._kinds.append(kinds)
         self._rows.append(rows)
         return len(self._wide) - 1
 
-    def _is_few(self, kinds: IntArray) -> bool:
-        if self._wide or np.any(kinds >= SOLID):
+    def _is_few(self, kinds: Kinds) -> bool:
+        if self._wide or len(kinds) >= BVH_FROM or np.any(kinds >= SOLID):
             return False
         quick = np.isin(kinds, SIDE_BY_SIDE) & (kinds != QUADRIC)
         work = np.where(quick, 1, ONE_BY_ONE)
         return bool(work.sum() < BVH_FROM)
 
-    def _bounds_of(self, kinds: IntArray, rows: IntArray) -> Bounds:
-        present = _distinct(kinds)
-        if len(present) == 1:
-            low, high = self.bounds[present[0]]
-            if len(rows) == len(low) and np.array_equal(rows, np.arange(len(low))):
-                return low, high  # not copied: a large mesh
-            return low[rows], high[rows]
-        lower, upper = np.empty((2, len(kinds), 3))
-        for kind in present:
-            mine = kinds == kind
-            lower[mine], upper[mine] = (side[rows[mine]] for side in self.bounds[kind])
-        return lower, upper
+    def _boxes_of(self, kinds: Kinds, rows: IdArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+        """The boxes of those that are finite, one after another, see `bvh.build_over`; and which
+        are finite, (n,)."""
+        boxes, finite, count = bvh.room_for(len(kinds)), np.empty(len(kinds), np.bool_), 0
+        for begin in range(0, len(kinds), _TOGETHER):
+            here = slice(begin, begin + _TOGETHER)
+            box = np.empty((len(kinds[here]), 6))
+            for kind in np.unique(kinds[here]).tolist():
+                mine = kinds[here] == kind
+                box[mine, :3], box[mine, 3:] = self._bounds_of(kind, rows[here][mine])
+            finite[here] = np.isfinite(box).all(axis=1)
+            box = box[finite[here]]
+            boxes[count : count + len(box), :6] = box
+            count += len(box)
+        return boxes[: count + 1], finite
 
-    def _corners(self, kinds: IntArray, rows: IntArray) -> FloatArray | None:
+    def _bounds_of(self, kind: int, rows: IdArray) -> Bounds:
+        if kind in self.bounds:
+            low, high = self.bounds[kind]
+            return low[rows], high[rows]
+        _, field, table_type, module = TABLES[kind]
+        columns = self.tables[field]._asdict()
+        which: slice | IdArray = rows
+        if np.array_equal(rows, np.arange(rows[0], rows[0] + len(rows))):
+            which = slice(int(rows[0]), int(rows[0]) + len(rows))  # not copied
+        for name in _by_row(columns, module):
+            columns[name] = columns[name][which]
+        bounds: Bounds = module.bounds(table_type(**columns))
+        return bounds
+
+    def _corners(self, kinds: Kinds, rows: IdArray) -> FloatArray | None:
         """The vertices (n, 9) of triangles for clipping by spatial splits; NaN for other kinds."""
         if self.method != "spatial":
             return None
@@ -191,46 +230,57 @@ class HierarchyBuilder:
     def _order_rows(self) -> None:
         """Sort the tables into the order of the leaves, so that neighbours are adjacent in
         memory."""
-        kinds = np.concatenate([np.zeros(0, np.int64), *self._kinds])
-        rows = np.concatenate([np.zeros(0, np.int64), *self._rows])
+        kinds = np.concatenate([np.zeros(0, np.int8), *self._kinds])
+        rows = np.concatenate([np.zeros(0, np.int32), *self._rows])
         for code, field, table_type, module in TABLES:
             if self.tables[field] is None:
                 continue
             # Column by column, so that no two tables of a large mesh are in memory.
             columns = self.tables[field]._asdict()
             self.tables[field] = None
-            order = _first_named(rows[kinds == code], len(columns["owner"]))
+            order = _first_named(rows[kinds == code], len(columns["face"]))
             new_row = np.empty_like(order)
-            new_row[order] = np.arange(len(order))
+            new_row[order] = np.arange(len(order), dtype=np.int32)
             self._new_rows[code] = new_row
-            ragged = getattr(module, "RAGGED", ())
-            for name in columns:
-                if columns[name] is not None and name not in ragged:
-                    columns[name] = np.ascontiguousarray(columns[name][order])
+            for name in _by_row(columns, module):
+                columns[name] = np.ascontiguousarray(columns[name][order])
             self.tables[field] = table_type(**columns)
             for tree_kinds, tree_rows in zip(self._kinds, self._rows, strict=True):
                 mine = tree_kinds == code
                 tree_rows[mine] = new_row[tree_rows[mine]]
 
 
-def _distinct(kinds: IntArray) -> list[int]:
-    """The distinct codes in kinds (n,), small numbers; np.unique takes 0.2 s for a million."""
-    return np.flatnonzero(np.bincount(kinds)).tolist()
+def _by_row(columns: dict[str, Any], module: Any) -> list[str]:
+    """The names of a table's columns with a row for each shape: neither absent, nor ragged, nor
+    `triangle_table.shared`."""
+    left_out, count = getattr(module, "RAGGED", ()), len(columns["face"])
+    return [
+        name
+        for name, column in columns.items()
+        if column is not None and name not in left_out and len(column) == count
+    ]
 
 
-def _first_named(rows: IntArray, count: int) -> IntArray:
+def _first_named(rows: IdArray, count: int) -> IdArray:
     """A permutation of range(count): first those in rows (m,), in the order of their first
     occurrence, then the rest."""
-    if len(rows) == count and np.bincount(rows, minlength=count).max(initial=0) <= 1:
+    named = np.zeros(count, np.bool_)
+    named[rows] = True
+    if len(rows) == count and named.all():
         return rows  # all of them once, as in a mesh: sorting a million takes 60 ms
     first = np.full(count, len(rows))
     # Backwards, so that the first of several occurrences wins.
     first[rows[::-1]] = np.arange(len(rows))[::-1]
-    return np.argsort(first, kind="stable")
+    return np.argsort(first, kind="stable").astype(np.int32)
 
 
-def _joined(references: Sequence[TableRows]) -> tuple[IntArray, IntArray]:
-    """Kinds and rows (n,)."""
-    none = np.zeros(0, np.int64)
-    kinds = [np.full(len(r.rows), r.kind) for r in references]
-    return np.concatenate([none, *kinds]), np.concatenate([none, *(r.rows for r in references)])
+def _joined(references: Sequence[TableRows]) -> tuple[Kinds, IdArray]:
+    """Kinds and rows (n,); rows of a single kind are not copied."""
+    if len(references) == 1:
+        kind, rows = references[0]
+        return np.full(len(rows), kind, np.int8), rows
+    kinds = [np.full(len(r.rows), r.kind, np.int8) for r in references]
+    return (
+        np.concatenate([np.zeros(0, np.int8), *kinds]),
+        np.concatenate([np.zeros(0, np.int32), *(r.rows for r in references)]),
+    )

@@ -86,7 +86,10 @@ def scene_radius(geometry: Geometry) -> float:
     lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
     for _, field, _, module in SHAPE_TABLES:
         table = getattr(geometry.shapes, field)
-        if table is not None:
+        if table is not None and hasattr(module, "extent"):  # quicker, of a large mesh
+            low, high = module.extent(table)
+            lower, upper = np.minimum(lower, low), np.maximum(upper, high)
+        elif table is not None:
             low, high = module.bounds(table)
             finite = np.isfinite(low).all(axis=1) & np.isfinite(high).all(axis=1)
             lower = np.minimum(lower, low[finite].min(axis=0, initial=np.inf))

@@ -19,6 +19,7 @@ world coordinates and scene units, for row i of the table or the row of a hit:
 - `spans(table, i, ray) -> Spans` of solids: where the line, at all t, is inside; t = inf for none;
 - `crossings(table, i, ray) -> Spans` of shapes that a ray can cross more than once: all crossings;
 - `unit_normals(table)` (n, 3) of flat shapes that can be lights;
+- `extent(table)`, the box around all rows, where it is quicker to find than all of `bounds`;
 - `face_of(table, hit)` of shapes with several faces: the number of the face;
 - `nearer` of shapes that `ray_simd.py` tests against several rays at once, with `arguments(table,
   i)`, what its `distance` takes of a row, and `found(table, i, ray, t)`, the crossing at t.

@@ -1,5 +1,6 @@
 """The machine's memory: data that cannot fit are refused before they are read."""
 
+import ctypes
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -66,3 +67,10 @@ def resident_memory() -> int | None:
         return pages * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError, IndexError, AttributeError):
         return None
+
+
+def give_back() -> None:
+    """Gives freed memory back to the system.  glibc keeps up to 32 MB of every array that it has
+    freed, in case it is needed again; other systems' allocators are left alone."""
+    with suppress(AttributeError, OSError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)

@@ -3,8 +3,11 @@
 Builders see only the primitives' bounding boxes (spatial splits also triangles' vertices).  `build`
 makes a binary BVH, `Nodes` in world space, by one of four methods: `top_down.py`'s median
 splits and SAH, the latter with `bins.py` and `spatial.py`, or a single leaf.  `widened` makes it a
-BVH of eight children a node, `Wide`; `joined` puts several into one `Bvh`, the arrays that
-traversals read (both in `wide.py`).  `statistics` measures a BVH.
+BVH of eight children a node, `Wide`; `joined` and `with_corners` put several into one `Bvh`, the
+arrays that traversals read (all in `wide.py`).  `statistics` measures a BVH.
+
+Builders' indices are int32, and what one step leaves is freed before the next: of a large mesh the
+64 bytes of a reference's box, `room_for`, are most of what a build takes.
 
 To add a method: a function build_...(boxes (n, 6)) -> (Nodes, references), deterministic, no deeper
 than STACK_SIZE allows, leaves of at most LEAF_SIZE; a name in `Method` and a branch in `build`; the
@@ -44,8 +47,9 @@ from reference_rt.accel.bvh.wide import (
     size_of,
     statistics,
     widened,
+    with_corners,
 )
-from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.arrays import FloatArray, IdArray
 
 __all__ = [
     "CENTER",
@@ -62,6 +66,7 @@ __all__ = [
     "Statistics",
     "Wide",
     "build",
+    "build_over",
     "child_of",
     "first_of",
     "half_area",
@@ -69,10 +74,12 @@ __all__ = [
     "joined",
     "kind_of",
     "of_wide",
+    "room_for",
     "row_of",
     "size_of",
     "statistics",
     "widened",
+    "with_corners",
 ]
 
 Method = Literal["sah", "median", "spatial", "none"]
@@ -80,8 +87,23 @@ Method = Literal["sah", "median", "spatial", "none"]
 
 def build(
     lower: FloatArray, upper: FloatArray, method: Method = "sah", corners: FloatArray | None = None
-) -> tuple[Nodes, IntArray]:
-    """A binary BVH over n >= 1 primitives with finite bounds lower (n, 3), upper (n, 3).
+) -> tuple[Nodes, IdArray]:
+    """`build_over` primitives with finite bounds lower (n, 3), upper (n, 3)."""
+    boxes = room_for(len(lower))
+    boxes[:-1, :3], boxes[:-1, 3:6] = lower, upper
+    return build_over(boxes, method, corners)
+
+
+def room_for(n: int) -> FloatArray:
+    """Room for the boxes of n primitives, as `build_over` takes them: (n + 1, REF_FLOATS)."""
+    return aligned(n + 1, REF_FLOATS)
+
+
+def build_over(
+    primitives: FloatArray, method: Method = "sah", corners: FloatArray | None = None
+) -> tuple[Nodes, IdArray]:
+    """A binary BVH over n >= 1 primitives with finite boxes: of `room_for` them, the lower corners
+    in columns 0 to 2 and the upper ones in 3 to 5; the rows may be reordered.
 
     Returns the nodes and the references (m,): indices of primitives, leaf after leaf.
 
@@ -93,14 +115,14 @@ def build(
       cut.
     - "none": one leaf with everything.
     """
-    n = len(lower)
-    primitives = aligned(n + 1, REF_FLOATS)
-    primitives[:n, :3], primitives[:n, 3:6] = lower, upper
+    n = len(primitives) - 1
     # With sizes near the largest float, areas and extents overflow: a worse tree, not a wrong one.
     with np.errstate(over="ignore", invalid="ignore"):
         if method == "none":
+            lower, upper = primitives[:n, :3], primitives[:n, 3:6]
             box = np.concatenate([lower.min(axis=0), upper.max(axis=0)])
-            return Nodes(box[None], np.zeros(1, np.int64), np.full(1, n)), np.arange(n)
+            leaf = Nodes(box[None], np.zeros(1, np.int32), np.full(1, n, np.int32))
+            return leaf, np.arange(n, dtype=np.int32)
         if method == "median":
             return top_down.build_median(primitives[:n])
         if method == "sah":

@@ -4,13 +4,13 @@ A box is six numbers, lower corner and upper corner; an empty one is +inf and -i
 """
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.arrays import FloatArray, IdArray, IntArray
 from reference_rt.core.ray import UNIT_ROUNDOFF
 from reference_rt.jit.kernel import entry_kernel, kernel
 from reference_rt.jit.simd import VECTOR_WIDTH, simd_kernel
@@ -44,8 +44,8 @@ class Nodes(NamedTuple):
     parents."""
 
     boxes: FloatArray
-    first: IntArray
-    size: IntArray
+    first: IdArray
+    size: IdArray
 
 
 @kernel
@@ -117,17 +117,17 @@ def _exchange(refs: Any, i: Any, j: Any) -> Any:
 
 
 @kernel
-def swap(refs: FloatArray, ids: IntArray, i: int, j: int) -> None:
+def swap(refs: FloatArray, ids: IdArray, i: int, j: int) -> None:
     """Exchanges references i and j: boxes (m + 1, REF_FLOATS) and primitives' indices (m,)."""
     _exchange(refs, REF_FLOATS * i, REF_FLOATS * j)
     ids[i], ids[j] = ids[j], ids[i]
 
 
-def on_threads(run: Callable[[T], U], items: Sequence[T]) -> list[U]:
-    """What `run` returns for each item, on as many threads as there are cores; kernels run without
-    the GIL."""
+def on_threads(run: Callable[[T], U], items: Iterable[T]) -> Iterator[U]:
+    """Yields what `run` returns for each item, in their order, on as many threads as there are
+    cores; kernels run without the GIL."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return [*pool.map(run, items)]
+        yield from pool.map(run, items)
 
 
 def aligned(n: int, k: int) -> FloatArray:
@@ -140,17 +140,18 @@ def aligned(n: int, k: int) -> FloatArray:
 def new_nodes(m: int) -> Nodes:
     """Uninitialised nodes for m >= 1 references: every leaf holds one, and as many inner nodes as
     leaves but one join them."""
-    return Nodes(np.empty((2 * m, 6)), np.empty(2 * m, np.int64), np.empty(2 * m, np.int64))
+    return Nodes(np.empty((2 * m, 6)), np.empty(2 * m, np.int32), np.empty(2 * m, np.int32))
 
 
 def trimmed(nodes: Nodes, count: int) -> Nodes:
-    """The first `count` of the nodes; the rest, which was never written, takes no memory."""
-    boxes, first, size = nodes
-    return Nodes(boxes[:count], first[:count], size[:count])
+    """The first `count` of `new_nodes`; the room for more is given back."""
+    for column in nodes:
+        column.resize((count, *column.shape[1:]), refcheck=False)
+    return nodes
 
 
 @entry_kernel
-def fit(nodes: Nodes, references: IntArray, primitives: FloatArray) -> None:
+def fit(nodes: Nodes, references: IdArray, primitives: FloatArray) -> None:
     """Fill the nodes' boxes from the primitives' (n, 6), leaves first."""
     for i in range(len(nodes.first)):
         node = len(nodes.first) - 1 - i

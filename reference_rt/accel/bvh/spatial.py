@@ -25,7 +25,7 @@ from reference_rt.accel.bvh.nodes import (
     merge,
     swap,
 )
-from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.arrays import FloatArray, IdArray
 from reference_rt.core.ray import UNIT_ROUNDOFF
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.simd import VECTOR_WIDTH
@@ -166,7 +166,7 @@ def _fill_bins(
 def best_cut(
     corners: FloatArray,
     refs: FloatArray,
-    ids: IntArray,
+    ids: IdArray,
     begin: int,
     end: int,
     spare: int,
@@ -241,7 +241,7 @@ def cut(
 def cut_all(
     corners: FloatArray,
     refs: FloatArray,
-    ids: IntArray,
+    ids: IdArray,
     begin: int,
     end: int,
     box: FloatArray,

@@ -5,7 +5,7 @@ The SAH builder splits each node at the cheapest of many planes (Wald 2007, "On 
 SAH-based bounding volume hierarchies", RT'07), with or without spatial splits.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,7 +37,7 @@ from reference_rt.accel.bvh.nodes import (
     swap,
     trimmed,
 )
-from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.arrays import FloatArray, IdArray, IntArray
 from reference_rt.jit.kernel import entry_kernel, kernel, local_floats
 from reference_rt.jit.simd import VECTOR_WIDTH
 
@@ -88,7 +88,7 @@ def _halve_all(
     return count
 
 
-def build_median(primitives: FloatArray) -> tuple[Nodes, IntArray]:
+def build_median(primitives: FloatArray) -> tuple[Nodes, IdArray]:
     """Nodes and references for primitives with boxes (n, 6), in O(n log n) for any input.  Of equal
     centres that of the primitive with the lower index counts as smaller."""
     n = len(primitives)
@@ -97,7 +97,7 @@ def build_median(primitives: FloatArray) -> tuple[Nodes, IntArray]:
     goes_left, waiting = np.empty(n, np.int64), np.empty(n, np.int64)
     jobs, nodes = np.empty((STACK_SIZE, 3), np.int64), new_nodes(n)
     count = _halve_all(centers, ordered, goes_left, waiting, jobs, nodes)
-    nodes, references = trimmed(nodes, count), ordered[0].copy()
+    nodes, references = trimmed(nodes, count), ordered[0].astype(np.int32)
     fit(nodes, references, primitives)
     return nodes, references
 
@@ -110,7 +110,7 @@ triangles are no faster."""
 
 @kernel
 def _partition(
-    refs: FloatArray, ids: IntArray, begin: int, end: int, bounds: FloatArray, split: Split
+    refs: FloatArray, ids: IdArray, begin: int, end: int, bounds: FloatArray, split: Split
 ) -> int:
     """Reorders references, the right child's first; the index of the left child's first one.  It
     exchanges each of them, whether or not it has to, because branches would be mispredicted."""
@@ -138,13 +138,13 @@ class _Task(NamedTuple):
 def _split_all(
     task: _Task,
     refs: FloatArray,
-    ids: IntArray,
+    ids: IdArray,
     corners: FloatArray | None,
     jobs: IntArray,
     bins: Bins,
     parts: spatial.Parts,
     nodes: Nodes,
-    references: IntArray,
+    references: IdArray,
     left_out: IntArray,
 ) -> tuple[int, int, int]:
     """Fills nodes and references; returns how many nodes there are, where its references end, and
@@ -219,7 +219,7 @@ APART = 1 << 14
 on threads: the same tree whatever the number of threads."""
 
 
-def build_sah(primitives: FloatArray, corners: FloatArray | None) -> tuple[Nodes, IntArray]:
+def build_sah(primitives: FloatArray, corners: FloatArray | None) -> tuple[Nodes, IdArray]:
     """Nodes and references for primitives (n + 1, REF_FLOATS), n boxes and a row of any numbers,
     which are reordered.  With corners (n, 9), see `reference_rt.accel.bvh.build`, spatial splits
     may cut them, into at most spatial.MOST_REFERENCES n references."""
@@ -229,7 +229,7 @@ def build_sah(primitives: FloatArray, corners: FloatArray | None) -> tuple[Nodes
         m = spatial.MOST_REFERENCES * n
         refs = aligned(m + 1, REF_FLOATS)
         refs[:n] = primitives[:n]
-    ids, references, room = np.arange(m), np.empty(m, np.int64), new_nodes(m)
+    ids, references = np.arange(m, dtype=np.int32), np.empty(m, np.int32)
 
     def build(task: _Task, nodes: Nodes) -> tuple[Nodes, int, IntArray]:
         jobs, left_out = np.empty((STACK_SIZE, 3), np.int64), np.empty((2, 4), np.int64)
@@ -240,31 +240,27 @@ def build_sah(primitives: FloatArray, corners: FloatArray | None) -> tuple[Nodes
         return trimmed(nodes, count), used, left_out[:left]
 
     if corners is not None or n <= APART:
-        nodes, used, _ = build(_Task(0, n, 0, 0), room)
+        nodes, used, _ = build(_Task(0, n, 0, 0), new_nodes(m))
         return nodes, references[:used]
 
     def part(row: IntArray) -> tuple[Nodes, int, IntArray]:
         _, begin, end, depth = row.tolist()
         if end - begin > APART:
             return build(_Task(begin, end, depth, end - begin - 1), new_nodes(2))
-        here = slice(2 * begin, 2 * end)
-        own = Nodes(room.boxes[here], room.first[here], room.size[here])
-        return build(_Task(begin, end, depth, 0), own)
+        return build(_Task(begin, end, depth, 0), new_nodes(end - begin))
 
-    # (number of its root, what to add to those of its other nodes, its nodes) of each part.
-    parts: list[tuple[int, int, Nodes]] = []
+    whole = new_nodes(n)
     count, rows = 1, [np.array([0, 0, n, 0])]
     while rows:
-        built = [*zip(rows, on_threads(part, rows), strict=True)]
-        rows = []
-        for row, (nodes, _, left_out) in built:
-            parts.append((int(row[0]), count - 1, nodes))
-            left_out[:, 0] += count - 1
+        parts, tasks, rows = on_threads(part, rows), rows, []
+        for task, (nodes, _, left_out) in zip(tasks, parts, strict=True):
+            # Where its root is, and what to add to the numbers of its other nodes.
+            root, more = int(task[0]), count - 1
+            nodes.first[nodes.size == 0] += more
+            columns: Any = zip(whole, nodes, strict=True)
+            for column, of_part in columns:
+                column[root], column[count : more + len(of_part)] = of_part[0], of_part[1:]
+            left_out[:, 0] += more
             rows += [*left_out]
             count += len(nodes.first) - 1
-    joined = new_nodes(count // 2 + 1)
-    for root, more, nodes in parts:
-        nodes.first[nodes.size == 0] += more
-        for whole, part_of in zip(joined, nodes, strict=True):
-            whole[root], whole[more + 1 : more + len(part_of)] = part_of[0], part_of[1:]
-    return trimmed(joined, count), references
+    return trimmed(whole, count), references

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from reference_rt.accel.bvh.nodes import STACK_SIZE, Nodes, aligned, half_area, on_threads
-from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.arrays import FloatArray, IdArray, IntArray
 from reference_rt.jit.kernel import entry_kernel, kernel, local_integers
 from reference_rt.jit.simd import VECTOR_WIDTH
 
@@ -65,7 +65,7 @@ class Wide(NamedTuple):
     children; lanes without a child hold the empty box and NOTHING."""
 
     boxes: FloatArray
-    codes: IntArray
+    codes: IdArray
 
 
 NOTHING = -1
@@ -125,13 +125,12 @@ def row_of(bvh: Bvh, reference: int) -> int:
 
 def joined(
     trees: Sequence[Wide],
-    kinds: Sequence[IntArray],
-    rows: Sequence[IntArray],
-    vertices: FloatArray | None,
+    kinds: Sequence[npt.NDArray[np.integer]],
+    rows: Sequence[IdArray],
 ) -> Bvh:
     """The `Bvh` of several trees, one after another, given the kinds (m,) and rows (m,) of each
-    one's references, and the vertices (n, 9) of the scene's triangles.  Raises ValueError for more
-    than MOST_REFERENCES."""
+    one's references; without `Bvh.corners`, see `with_corners`.  Raises ValueError for more than
+    MOST_REFERENCES."""
     if sum(map(len, rows)) > MOST_REFERENCES:
         raise ValueError(f"over {MOST_REFERENCES:,} primitives; expected fewer")
     frames = aligned(sum(len(tree.codes) for tree in trees), 32)
@@ -146,8 +145,11 @@ def joined(
             center = 0.5 * lower + 0.5 * upper
             frames[node, CENTER + 3] = max(np.abs(lower).max(), np.abs(upper).max())
         frames[node, CENTER : CENTER + 3] = center
-        boxes[here, : CHILDREN // 2] = _below(tree.boxes[:, :3], center)
-        boxes[here, CHILDREN // 2 : CHILDREN] = -_below(-tree.boxes[:, 3:], -center)
+        for begin in range(0, len(tree.codes), _TOGETHER):
+            some = tree.boxes[begin : begin + _TOGETHER]
+            of_some = boxes[node + begin : node + begin + len(some)]
+            of_some[:, : CHILDREN // 2] = _below(some[:, :3], center)
+            of_some[:, CHILDREN // 2 : CHILDREN] = -_below(-some[:, 3:], -center)
         codes = np.where(tree.codes < NOTHING, tree.codes - 32 * reference, tree.codes)
         children[here, CHILDREN : CHILDREN + VECTOR_WIDTH] = np.where(
             codes >= 0, codes + node, codes
@@ -155,10 +157,7 @@ def joined(
         node, reference = here.stop, reference + len(of_tree)
     references = np.empty((sum(map(len, rows)), 2), np.int32)
     references[:, 0], references[:, 1] = np.concatenate(kinds), np.concatenate(rows)
-    corners = None
-    if vertices is not None:
-        corners = _corners_of(vertices, children, np.ascontiguousarray(references[:, 1]))
-    return Bvh(boxes, children.reshape(-1), frames, references, corners, -1)
+    return Bvh(boxes, children.reshape(-1), frames, references, None, -1)
 
 
 def _below(planes: FloatArray, center: FloatArray) -> Singles:
@@ -171,32 +170,40 @@ def _below(planes: FloatArray, center: FloatArray) -> Singles:
     return np.where(rounded > exact, lower, rounded).reshape(len(planes), -1)
 
 
-def _corners_of(vertices: FloatArray, children: Codes, rows: Codes) -> FloatArray | None:
-    """`Bvh.corners` for the triangle leaves among the children (n, NODE_SINGLES) of nodes; rows
-    (m,): each reference's row of vertices (n, 9)."""
-    codes = children[:, CHILDREN : CHILDREN + VECTOR_WIDTH]
+def with_corners(bvh: Bvh, points: FloatArray, vertices: IdArray) -> Bvh:
+    """With `Bvh.corners` for its leaves of triangles, if it has any; vertices (n, 3): the rows of
+    points (m, 3) of the scene's triangles."""
+    codes = codes_of(bvh)
     if not ((codes < NOTHING) & ((-1 - codes) & 1 == 1)).any():
-        return None
-    corners = np.zeros(9 * len(rows) + VECTOR_WIDTH)
-    blocks = [children[k : k + _TOGETHER] for k in range(0, len(children), _TOGETHER)]
-    on_threads(lambda block: _copy_corners(block, rows, vertices, corners), blocks)
-    return corners
+        return bvh
+    corners = np.zeros(9 * len(bvh.references) + VECTOR_WIDTH)
+    blocks = [codes[k : k + _TOGETHER] for k in range(0, len(codes), _TOGETHER)]
+    for _ in on_threads(
+        lambda block: _copy_corners(block, bvh.references, points, vertices, corners), blocks
+    ):
+        pass
+    return bvh._replace(corners=corners)
 
 
 _TOGETHER = 1 << 10
-"""Nodes whose leaves' corners are copied by one call."""
+"""Nodes whose boxes are rounded together, and whose leaves' corners are copied by one call."""
 
 
 @entry_kernel
-def _copy_corners(children: Codes, rows: Codes, vertices: FloatArray, corners: FloatArray) -> None:
-    for node in range(len(children)):
+def _copy_corners(
+    codes: Codes, references: Codes, points: FloatArray, vertices: IdArray, corners: FloatArray
+) -> None:
+    for node in range(len(codes)):
         for lane in range(VECTOR_WIDTH):
-            code: int = np.int64(children[node, CHILDREN + lane])  # type: ignore[assignment]
+            code: int = np.int64(codes[node, lane])  # type: ignore[assignment]
             if code < NOTHING and is_triangle_leaf(code):
                 first, size = first_of(code), size_of(code)
                 for k in range(size):
-                    for i in range(9):
-                        corners[9 * first + i * size + k] = vertices[rows[first + k], i]
+                    for corner in range(3):
+                        point = vertices[references[first + k, 1], corner]
+                        for axis in range(3):
+                            to = 9 * first + (3 * corner + axis) * size + k
+                            corners[to] = points[point, axis]
 
 
 # ---- collapsing a binary BVH ---------------------------------------------------------------------
@@ -206,11 +213,23 @@ TRIANGLE_LEAF_COST, PRIMITIVE_COST = 1.0, 0.5
 a node's boxes.  Measured: between 0.5 and 2 the first makes no difference on the bunny."""
 
 
+class _Below(NamedTuple):
+    """What is below each of n nodes.  start (n,): the first reference;  size (n,): how many there
+    are, MANY for more than LEAF_SHARE;  triangles (n,): whether all are triangles."""
+
+    start: IdArray
+    size: npt.NDArray[np.int8]
+    triangles: npt.NDArray[np.bool_]
+
+
+MANY = LEAF_SHARE + 1
+
+
 @kernel
-def _leaf_cost(count: int, triangles: int) -> float:
+def _leaf_cost(count: int, triangles: bool) -> float:
     if count > LEAF_SHARE:
         return np.inf
-    return TRIANGLE_LEAF_COST if triangles == count else PRIMITIVE_COST * count
+    return TRIANGLE_LEAF_COST if triangles else PRIMITIVE_COST * count
 
 
 _INNER, _FEWER = -1, -2
@@ -219,53 +238,61 @@ _INNER, _FEWER = -1, -2
 @entry_kernel
 def _plan(
     nodes: Nodes,
-    count: IntArray,
-    triangles: IntArray,
-    cost: FloatArray,
+    below: _Below,
+    jobs: IntArray,
+    costs: FloatArray,
     choice: npt.NDArray[np.int8],
 ) -> None:
     """Computes the cheapest way to turn each binary node into at most i children of a wide node.
 
-    cost, choice (n, VECTOR_WIDTH + 1): by node and i.  choice for i = 1: _INNER, or 0 for a leaf;
-    for i > 1: how many of the i go to the left child, or _FEWER: i - 1 are as cheap.  count,
-    triangles (n,): references below each node, and how many of these are triangles.
+    choice (n, VECTOR_WIDTH + 1): by node and i.  For i = 1: _INNER, or 0 for a leaf; for i > 1: how
+    many of the i go to the left child, or _FEWER: i - 1 are as cheap.  jobs (STACK_SIZE, 3), costs
+    (STACK_SIZE, 2, VECTOR_WIDTH + 1) are scratch: depth first, the costs of the children of one
+    node of each depth are all that is needed, and all nodes' would take 72 bytes each.
     """
-    n = len(nodes.first)
-    for k in range(n):
-        node = n - 1 - k  # children first
+    jobs[0, 0], jobs[0, 1], jobs[0, 2] = 0, 0, 0  # the node, 1 behind its children, its side
+    depth = 0
+    while depth >= 0:
+        node, side = jobs[depth, 0], jobs[depth, 2]
+        left = nodes.first[node]
+        if nodes.size[node] == 0 and jobs[depth, 1] < 2:
+            jobs[depth + 1, 0], jobs[depth + 1, 1] = left + jobs[depth, 1], 0
+            jobs[depth + 1, 2] = jobs[depth, 1]
+            jobs[depth, 1] += 1
+            depth += 1
+            continue
+        cost, of_left, of_right = costs[depth, side], costs[depth + 1, 0], costs[depth + 1, 1]
+        depth -= 1
         area = half_area(nodes.boxes[node])
-        leaf = area * _leaf_cost(count[node], triangles[node])
+        leaf = area * _leaf_cost(int(below.size[node]), below.triangles[node])
         if nodes.size[node] > 0:
             for i in range(1, VECTOR_WIDTH + 1):
-                cost[node, i] = leaf
+                cost[i] = leaf
                 choice[node, i] = 0 if i == 1 else _FEWER
             continue
-        left = nodes.first[node]
         for i in range(2, VECTOR_WIDTH + 1):
-            cost[node, i], choice[node, i] = np.inf, 1
+            cost[i], choice[node, i] = np.inf, 1
             for j in range(1, i):
-                both = cost[left, j] + cost[left + 1, i - j]
-                if both < cost[node, i]:
-                    cost[node, i], choice[node, i] = both, j
-        inner = area + cost[node, VECTOR_WIDTH]
-        is_leaf = count[node] <= LEAF_SHARE and not inner < leaf
-        cost[node, 1] = leaf if is_leaf else inner
+                both = of_left[j] + of_right[i - j]
+                if both < cost[i]:
+                    cost[i], choice[node, i] = both, j
+        inner = area + cost[VECTOR_WIDTH]
+        is_leaf = below.size[node] <= LEAF_SHARE and not inner < leaf
+        cost[1] = leaf if is_leaf else inner
         choice[node, 1] = 0 if is_leaf else _INNER
         for i in range(2, VECTOR_WIDTH + 1):
-            if cost[node, i - 1] <= cost[node, i]:
-                cost[node, i], choice[node, i] = cost[node, i - 1], _FEWER
+            if cost[i - 1] <= cost[i]:
+                cost[i], choice[node, i] = cost[i - 1], _FEWER
 
 
 @entry_kernel
 def _collapse(
     nodes: Nodes,
-    start: IntArray,
-    count: IntArray,
-    triangles: IntArray,
+    below: _Below,
     choice: npt.NDArray[np.int8],
     jobs: IntArray,
     boxes: FloatArray,
-    codes: IntArray,
+    codes: IdArray,
 ) -> int:
     """Fills the wide nodes as `_plan` chose; returns their number.  The root must not be a leaf."""
     opening, shares = local_integers(2 * STACK_SIZE), local_integers(2 * STACK_SIZE)
@@ -296,7 +323,7 @@ def _collapse(
                     waiting += 1
                 else:
                     codes[row, lane] = leaf_code(
-                        start[child], count[child], triangles[child] == count[child]
+                        int(below.start[child]), int(below.size[child]), below.triangles[child]
                     )
                 lane += 1
                 continue
@@ -309,26 +336,20 @@ def _collapse(
 
 
 @entry_kernel
-def _count(
-    nodes: Nodes,
-    is_triangle: npt.NDArray[np.bool_],
-    start: IntArray,
-    count: IntArray,
-    triangles: IntArray,
-) -> None:
-    """Fills start, count, triangles (n,): the first reference below each node, how many there are,
-    and how many of them are triangles."""
+def _count(nodes: Nodes, is_triangle: npt.NDArray[np.bool_], below: _Below) -> None:
+    """Fills `below`."""
+    start, count, triangles = below.start, below.size, below.triangles
     for k in range(len(nodes.first)):
         node = len(nodes.first) - 1 - k
         first, size = nodes.first[node], nodes.size[node]
         if size == 0:
             start[node] = min(start[first], start[first + 1])
-            count[node] = count[first] + count[first + 1]
-            triangles[node] = triangles[first] + triangles[first + 1]
+            count[node] = min(MANY, int(count[first]) + int(count[first + 1]))
+            triangles[node] = triangles[first] and triangles[first + 1]
         else:
-            start[node], count[node], triangles[node] = first, size, 0
+            start[node], count[node], triangles[node] = first, size, True
             for r in range(first, first + size):
-                triangles[node] += is_triangle[r]
+                triangles[node] = triangles[node] and is_triangle[r]
 
 
 def widened(nodes: Nodes, is_triangle: npt.NDArray[np.bool_]) -> Wide:
@@ -336,15 +357,16 @@ def widened(nodes: Nodes, is_triangle: npt.NDArray[np.bool_]) -> Wide:
     if nodes.size[0] > 0:
         return _leaf(nodes, is_triangle)
     n = len(nodes.first)
-    start, count, triangles = np.empty((3, n), np.int64)
-    _count(nodes, is_triangle, start, count, triangles)
+    below = _Below(np.empty(n, np.int32), np.empty(n, np.int8), np.empty(n, np.bool_))
+    _count(nodes, is_triangle, below)
     choice = np.empty((n, VECTOR_WIDTH + 1), np.int8)
-    _plan(nodes, count, triangles, np.empty((n, VECTOR_WIDTH + 1)), choice)
-    # Every wide node takes up at least one inner node.
-    most = int((nodes.size == 0).sum())
+    jobs, costs = np.empty((STACK_SIZE, 3), np.int64), np.empty((STACK_SIZE, 2, VECTOR_WIDTH + 1))
+    _plan(nodes, below, jobs, costs, choice)
+    # Every wide node is made of the root, or of one that is an inner node where it is one child.
+    most = 1 + int((choice[1:, 1] == _INNER).sum())
     jobs = np.empty((most + 1, 2), np.int64)
-    boxes, codes = np.empty((most, 6, VECTOR_WIDTH)), np.empty((most, VECTOR_WIDTH), np.int64)
-    made = _collapse(nodes, start, count, triangles, choice, jobs, boxes, codes)
+    boxes, codes = np.empty((most, 6, VECTOR_WIDTH)), np.empty((most, VECTOR_WIDTH), np.int32)
+    made = _collapse(nodes, below, choice, jobs, boxes, codes)
     return Wide(boxes[:made], codes[:made])  # the rest was never written, and takes no memory
 
 
@@ -373,7 +395,7 @@ def _leaf(nodes: Nodes, is_triangle: npt.NDArray[np.bool_]) -> Wide:
     codes = np.where(codes >= 0, len(codes) - 1 - codes, codes)
     empty = np.repeat([np.inf, -np.inf], 3)[None, :, None]
     boxes = np.where((codes != NOTHING)[:, None], nodes.boxes[0][None, :, None], empty)
-    return Wide(boxes, codes)
+    return Wide(boxes, codes.astype(np.int32))
 
 
 # ---- statistics: size, depth and SAH cost --------------------------------------------------------

@@ -129,18 +129,18 @@ class Mesh(Shape):
                 "area, or one that float64 cannot hold, and are left out (the others keep their "
                 "numbers); expected triangles with an area",
             )
+        normals = self._normals(data, faces, m)
+        uvs, colours = _at_corners(data.uv, faces), _at_corners(data.colours, faces)
+        del data  # a large mesh is held once
         is_used = np.zeros(len(points), bool)
         is_used[faces] = True
-        triangles = table_of(
-            np.ascontiguousarray(points[is_used]),
-            (np.cumsum(is_used) - 1)[faces],
-            context,
-            normals=self._normals(data, faces, m),
-            uvs=_at_corners(data.uv, faces),
-            colours=_at_corners(data.colours, faces),
-            face=numbers,
-        )
-        return facing(m, triangles)
+        if is_used.all():
+            corners = faces.astype(np.int32)
+        else:
+            points = points[is_used]
+            corners = (np.cumsum(is_used, dtype=np.int32) - np.int32(1))[faces]
+        del faces
+        return facing(m, table_of(points, corners, context, normals, uvs, colours, numbers))
 
     def makes_normals(self, data: MeshData) -> bool:
         """Whether the mesh has vertex normals that its data do not have."""

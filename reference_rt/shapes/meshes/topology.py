@@ -116,20 +116,35 @@ def smooth_normals(vertices: FloatArray, faces: IntArray, uv: FloatArray | None)
     (0, 0, 1) if that has no area either.
     """
     number, firsts = number_rows(vertices if uv is None else np.column_stack([vertices, uv]))
+    n, weights = np.empty(faces.shape), np.empty(faces.shape)
+    blocks = [slice(begin, begin + _TOGETHER) for begin in range(0, len(faces), _TOGETHER)]
+    for here in blocks:
+        n[here], angles = _normals_and_angles(vertices[faces[here]])
+        weights[here] = np.where(_has_area(n[here]), angles, 0.0)
     vertex = number[faces]
-    n, angles = _normals_and_angles(vertices[faces])
-    has_area: npt.NDArray[np.bool_] = np.any(n != 0.0, axis=1)
-    weights = np.where(has_area[:, None], angles, 0.0)
-    terms = weights[:, :, None] * n[:, None, :]
-    sums = np.stack([_summed(vertex, terms[:, :, k], len(firsts)) for k in range(3)], axis=1)
+    sums = np.stack([_summed(vertex, weights * n[:, k : k + 1], len(firsts)) for k in range(3)], 1)
     total = _summed(vertex, weights, len(firsts))
-    count = _summed(vertex, np.ones(vertex.shape), len(firsts))
+    count = np.bincount(vertex.ravel(), minlength=len(firsts))
     # The error of a sum of k terms: k - 1 roundings of the sum of their sizes, and those of each.
     error = UNIT_ROUNDOFF * (count + TERM) * total
-    smooth = np.linalg.norm(sums, axis=1) > error
-    own = np.where(has_area[:, None], n, [0.0, 0.0, 1.0])
-    at_corners = np.where(smooth[vertex][:, :, None], unit(sums)[vertex], own[:, None, :])
-    return np.ascontiguousarray(at_corners.reshape(-1, 9))
+    smooth, mean = np.linalg.norm(sums, axis=1) > error, unit(sums)
+    del weights, number
+    at_corners = np.empty((*faces.shape, 3))
+    for here in blocks:
+        own = np.where(_has_area(n[here]), n[here], [0.0, 0.0, 1.0])
+        which = vertex[here]
+        at_corners[here] = np.where(smooth[which][:, :, None], mean[which], own[:, None, :])
+    return at_corners.reshape(-1, 9)
+
+
+_TOGETHER = 1 << 15
+"""Faces whose normals are computed together: more only take more memory."""
+
+
+def _has_area(n: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which normals (m, 3) are not 0: (m, 1)."""
+    found: npt.NDArray[np.bool_] = np.any(n != 0.0, axis=1, keepdims=True)
+    return found
 
 
 def unit(vectors: FloatArray) -> FloatArray:

@@ -45,35 +45,43 @@ RAGGED = ("points",)
 
 def table_of(
     points: FloatArray,
-    corners: IntArray,
+    corners: npt.NDArray[np.integer],
     context: TabulationContext,
     normals: FloatArray | None = None,
     uvs: FloatArray | None = None,
     colours: FloatArray | None = None,
     face: IntArray | None = None,
 ) -> Triangles:
-    """Triangles of one shape: see `Triangles`; `face` defaults to 0, 1, 2, ..."""
-    n = len(corners)
+    """Triangles of one shape: see `Triangles` and `shared`; `face` defaults to 0, 1, 2, ..."""
     return Triangles(
         points=points,
-        corners=corners.astype(np.int32),
+        corners=corners.astype(np.int32, copy=False),
         normals=normals,
         uvs=uvs,
         colours=colours,
-        owner=np.full(n, context.owner, np.int32),
-        material=np.full(n, context.material, np.int32),
-        light=np.full(n, -1, np.int32),
-        face=np.arange(n, dtype=np.int32) if face is None else face.astype(np.int32),
+        owner=np.array([context.owner], np.int32),
+        material=np.array([context.material], np.int32),
+        light=np.array([-1], np.int32),
+        face=np.arange(len(corners), dtype=np.int32) if face is None else face.astype(np.int32),
     )
 
 
 def shared(triangles: Triangles) -> Triangles:
     """One row of the columns that are the same for all triangles, such as those of a single mesh:
     less memory, and a number that stays in the cache."""
-    names = "owner", "material", "light"
-    columns = {name: getattr(triangles, name) for name in names}
+    columns = {name: getattr(triangles, name) for name in _OFTEN_SHARED}
     same = {name: c[:1].copy() for name, c in columns.items() if (c == c[0]).all()}
     return triangles._replace(**same)
+
+
+def spread(triangles: Triangles) -> Triangles:
+    """One row for each triangle again, see `shared`."""
+    n = len(triangles.face)
+    columns = {name: getattr(triangles, name) for name in _OFTEN_SHARED}
+    return triangles._replace(**{k: np.repeat(c, n // len(c)) for k, c in columns.items()})
+
+
+_OFTEN_SHARED = "owner", "material", "light"
 
 
 def facing(m: transform.Affine, triangles: Triangles) -> Triangles:
@@ -103,9 +111,11 @@ def _barycentrics(triangles: Triangles) -> FloatArray:
 
 
 def align(parts: Sequence[Triangles]) -> list[Triangles]:
-    """Gives all tables the columns that any of them has, and corners the rows of points in all
-    tables one after another, so that they can be concatenated."""
-    parts = list(parts)
+    """Gives all tables the columns that any of them has, with a row for each triangle, and corners
+    the rows of points in all tables one after another, so that they can be concatenated."""
+    if len(parts) == 1:
+        return [*parts]
+    parts = [spread(part) for part in parts]
     if any(part.normals is not None for part in parts):
         parts = [
             part._replace(normals=_flat_normals(part)) if part.normals is None else part
@@ -149,7 +159,7 @@ def unit_normals(triangles: Triangles) -> FloatArray:
     return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
 
 
-def have_area(points: FloatArray, corners: IntArray) -> npt.NDArray[np.bool_]:
+def have_area(points: FloatArray, corners: npt.NDArray[np.integer]) -> npt.NDArray[np.bool_]:
     """Which triangles, see `Triangles`, have an area that float64 can hold: (n,)."""
     found = np.empty(len(corners), bool)
     for begin in range(0, len(corners), _TOGETHER):
@@ -158,12 +168,17 @@ def have_area(points: FloatArray, corners: IntArray) -> npt.NDArray[np.bool_]:
     return found
 
 
-_TOGETHER = 1 << 18
+_TOGETHER = 1 << 15
 """Triangles that are computed together: more only take more memory."""
 
 
 def areas(triangles: Triangles) -> FloatArray:
     return np.asarray(0.5 * np.linalg.norm(geometric_normals(triangles.vertices), axis=1))
+
+
+def extent(triangles: Triangles) -> Bounds:
+    """The box (3,), (3,) around all of them: each of the points is a vertex."""
+    return triangles.points.min(axis=0), triangles.points.max(axis=0)
 
 
 def bounds(triangles: Triangles) -> Bounds:

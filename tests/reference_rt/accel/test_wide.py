@@ -39,7 +39,9 @@ def _joined(corners, method, is_triangle):
     nodes, references = build(corners, method)
     wide = bvh.widened(nodes, is_triangle[references])
     kinds = np.where(is_triangle[references], 3, 7)
-    return nodes, references, bvh.joined([wide], [kinds], [references], corners)
+    vertices = np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3)
+    tree = bvh.joined([wide], [kinds], [references])
+    return nodes, references, bvh.with_corners(tree, corners.reshape(-1, 3), vertices)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -117,8 +119,7 @@ def _cheapest(nodes, is_triangle, references):
 
     def child(node):
         held = below(node)
-        triangles = int(is_triangle[held].sum())
-        leaf = area(node) * wide._leaf_cost(len(held), triangles)
+        leaf = area(node) * wide._leaf_cost(len(held), is_triangle[held].all())
         return leaf if nodes.size[node] > 0 else min(leaf, area(node) + opened(node))
 
     def opened(node):
@@ -156,7 +157,7 @@ def test_is_the_cheapest_of_all(seed):
                 rows = tree.references[bvh.first_of(code) :][: bvh.size_of(code), 1]
                 tests = 1.0
                 if code < 0:
-                    tests = wide._leaf_cost(len(rows), int(is_triangle[rows].sum()))
+                    tests = wide._leaf_cost(len(rows), is_triangle[rows].all())
                 cost += tests * (x * y + y * z + z * x)[lane]
     # Planes are rounded outwards to float32: by 2^-23 of the tree's size, about 4, areas of up to
     # 16 by up to 8e-6 each and some 1e-6 of a box's own; measured at most 1.3e-7 of the cost.

@@ -69,8 +69,8 @@ def checked(mesh: RawMesh) -> MeshData:
                 name, f": {len(values)} {name} and {len(vertices)} vertices; expected one for each"
             )
     _expect_finite("vertices", vertices, "vertex {} is not finite; expected three finite numbers")
-    outside = (faces < 0) | (faces >= len(vertices))
-    if outside.any():
+    if not 0 <= faces.min() <= faces.max() < len(vertices):
+        outside = (faces < 0) | (faces >= len(vertices))
         bad = int(np.flatnonzero(outside.any(axis=1))[0])
         raise FieldError(
             "faces",
@@ -135,7 +135,7 @@ def joined(parts: Iterable[tuple[RawMesh, transform.Affine]]) -> RawMesh:
     others: dict[str, list[npt.NDArray[Any] | None]] = {"normals": [], "uv": [], "colours": []}
     names: dict[str, None] = {}  # a set in the order of the parts
     for part, m in parts:
-        f = part.faces.astype(np.int64)
+        f = part.faces.astype(np.int64, copy=False)
         if f.size and not 0 <= f.min() <= f.max() < len(part.vertices):
             raise ValueError(
                 f"a part of {len(part.vertices)} vertices has indices {f.min()} to {f.max()}"
@@ -144,11 +144,12 @@ def joined(parts: Iterable[tuple[RawMesh, transform.Affine]]) -> RawMesh:
         if max(n_vertices + len(part.vertices), n_faces) > LIMIT:
             raise ValueError(f"its parts have more than {LIMIT} vertices or triangles")
         mirrored = np.linalg.det(m[:, :3]) < 0.0
-        vertices.append(transform.apply_points(m, part.vertices.astype(np.float64)))
+        vertices.append(transform.apply_points(m, np.asarray(part.vertices, np.float64)))
         normals = part.normals
         if normals is not None:
             normals = transform.apply_normals(m, normals.astype(np.float64))
-        faces.append(n_vertices + (f[:, ::-1] if mirrored else f))
+        f = f[:, ::-1] if mirrored else f
+        faces.append(n_vertices + f if n_vertices else f)
         n_vertices += len(part.vertices)
         for name, found in (("normals", normals), ("uv", part.uv), ("colours", part.colours)):
             others[name].append(found)
@@ -159,13 +160,17 @@ def joined(parts: Iterable[tuple[RawMesh, transform.Affine]]) -> RawMesh:
         if any(v is None for v in values) and any(v is not None for v in values):
             names[f"{name} of some parts"] = None
     return RawMesh(
-        np.concatenate(vertices),
-        np.concatenate(faces),
+        _one_after_another(vertices),
+        _one_after_another(faces),
         normals=_all_or_none(others["normals"]),
         uv=_all_or_none(others["uv"]),
         colours=_all_or_none(others["colours"]),
         ignored=tuple(names),
     )
+
+
+def _one_after_another(parts: list[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def _all_or_none(values: list[npt.NDArray[Any] | None]) -> FloatArray | None:

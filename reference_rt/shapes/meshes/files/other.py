@@ -4,8 +4,9 @@ installed.
 Stereolithography files, .stl (3D Systems 1989), are separate triangles, binary or ascii.
 Normals are not read, since they are those of the winding; nor are the attributes of binary files,
 which have no agreed meaning: they are named as ignored.  The solids of an ascii file become one
-mesh.  Object files, .off (Geomview), are polygons in ascii.  Of COFF, NOFF and STOFF files only the
-positions are read; colours, normals and texture coordinates are ignored, and named.
+mesh, and equal vertices one vertex.  Object files, .off (Geomview), are polygons in ascii.  Of
+COFF, NOFF and STOFF files only the positions are read; colours, normals and texture coordinates are
+ignored, and named.
 
 Of trimesh's formats the positions and triangles are read, in the scene that the file describes,
 without normals, uv and colours (the last two are named as ignored).
@@ -21,14 +22,18 @@ from array import array
 from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from reference_rt.core import transform
-from reference_rt.core.arrays import FloatArray
+from reference_rt.core.arrays import FloatArray, IdArray
 from reference_rt.shapes.meshes.files.data import RawMesh, joined
 from reference_rt.shapes.meshes.files.polygons import doubt, triangulated
 from reference_rt.util.memory import check_unpacked
+
+Corners = npt.NDArray[np.floating[Any]]
 
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
 
@@ -50,11 +55,11 @@ def read_stl(content: bytes) -> RawMesh:
     size = 84 + count * _TRIANGLE.itemsize
     if len(content) == size:
         triangles = np.frombuffer(content, _TRIANGLE, offset=84)
-        vertices = triangles["vertices"].reshape(-1, 3)
+        corners = triangles["vertices"]
         if triangles["attribute"].any():
             ignored = ("attributes of triangles",)
     elif _SOLID.match(text := content.removeprefix(codecs.BOM_UTF8)):
-        vertices = _ascii(text)
+        corners = _ascii(text)
     elif count < 0:
         raise ValueError("it is too short; expected 'solid' or a header of 84 bytes")
     else:
@@ -62,10 +67,50 @@ def read_stl(content: bytes) -> RawMesh:
             f"it has {len(content)} bytes; expected {size} for the {count} triangles that its "
             "header promises, or 'solid' as its first word"
         )
-    return RawMesh(vertices, np.arange(len(vertices)).reshape(-1, 3), ignored=ignored)
+    if not np.isfinite(corners).all():  # an error, which names the number in the file
+        vertices = corners.reshape(-1, 3)
+        return RawMesh(vertices, np.arange(len(vertices)).reshape(-1, 3), ignored=ignored)
+    return RawMesh(*_merged(corners), ignored=ignored)
+
+
+def _merged(corners: Corners) -> tuple[Corners, IdArray]:
+    """Vertices and triangles (m, 3) of corners (m, 3, 3).  Vertices of the same bits are one, which
+    is a sixth of the memory; in the order of their first use."""
+    hashes = np.zeros(corners.size // 3, np.uint64)
+    for k in range(3):
+        hashes ^= _bits(corners, k)
+        hashes *= _ODD
+        hashes ^= hashes >> np.uint64(29)
+    order = np.argsort(hashes)
+    hashes = hashes[order]
+    is_new = np.ones(len(hashes), np.bool_)
+    is_new[1:] = hashes[1:] != hashes[:-1]
+    del hashes
+    for k in range(3):  # equal hashes of different vertices, should there be any
+        bits = _bits(corners, k)[order]
+        is_new[1:] |= bits[1:] != bits[:-1]
+    starts = np.flatnonzero(is_new)
+    first = np.minimum.reduceat(order, starts) if len(order) else order
+    by_use = np.argsort(first)
+    number = np.empty(len(first), np.int32)
+    number[by_use] = np.arange(len(first), dtype=np.int32)
+    vertex = np.empty(len(order), np.int32)
+    vertex[order] = np.repeat(number, np.diff(starts, append=len(order)))
+    first = first[by_use]
+    return corners[first // 3, first % 3], vertex.reshape(-1, 3)
+
+
+_ODD = np.uint64(0x9E3779B97F4A7C15)
+"""2^64 over the golden ratio: products by it spread over all bits (Knuth 1998, 6.4)."""
+
+
+def _bits(corners: Corners, axis: int) -> npt.NDArray[Any]:
+    """The bits of one coordinate of all corners, (3 m,)."""
+    return corners[..., axis].reshape(-1).view(f"u{corners.itemsize}")
 
 
 def _ascii(content: bytes) -> FloatArray:
+    """The corners (m, 3, 3) of all triangles."""
     text = content.rstrip()
     numbers, position = array("d"), 0
     try:
@@ -80,7 +125,7 @@ def _ascii(content: bytes) -> FloatArray:
     except ValueError as error:
         line = text.count(b"\n", 0, position) + 1
         raise ValueError(f"after line {line}: {error}") from None
-    return np.frombuffer(numbers, np.float64).reshape(-1, 3)
+    return np.frombuffer(numbers, np.float64).reshape(-1, 3, 3)
 
 
 def _after(expected: re.Pattern[bytes], text: bytes, position: int, what: str) -> int:

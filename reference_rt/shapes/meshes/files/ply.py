@@ -240,8 +240,7 @@ def read(content: bytes) -> RawMesh:
         elif element.name == "face" and element.rows > 0:
             start = position
             corners, counts, position = lists(body, position, element, _indices(element))
-            if not np.all(np.isfinite(corners) & (corners == np.trunc(corners))):
-                raise ValueError("it has an index that is no integer")
+            _expect_integers(corners)
             polygons = corners.astype(np.int64), counts
             used = [_indices(element).name]
             for p in element.properties:
@@ -253,8 +252,7 @@ def read(content: bytes) -> RawMesh:
             ignored += [f"face {p.name}" for p in element.properties if p.name not in used]
         elif element.name == "tristrips" and element.rows > 0:
             corners, counts, position = lists(body, position, element, _indices(element))
-            if not np.all(np.isfinite(corners) & (corners == np.trunc(corners))):
-                raise ValueError("it has an index that is no integer")
+            _expect_integers(corners)
             strips = _of_strips(corners.astype(np.int64), counts)
         else:
             _, _, position = lists(body, position, element, None)
@@ -274,6 +272,13 @@ def read(content: bytes) -> RawMesh:
         faces, concave = triangulated(mesh.vertices, *polygons)
         mesh = mesh._replace(faces=faces, doubtful=doubt(concave))
     return mesh._replace(ignored=tuple(ignored))
+
+
+def _expect_integers(corners: Array) -> None:
+    if corners.dtype.kind == "f" and not np.all(
+        np.isfinite(corners) & (corners == np.trunc(corners))
+    ):
+        raise ValueError("it has an index that is no integer")
 
 
 def _parted(
