@@ -13,7 +13,7 @@ from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.scene.build_geometry import assemble
 from reference_rt.scene.build_lights import light_tables
 from reference_rt.scene.build_materials import material_tables
-from reference_rt.scene.build_textures import texture_tables
+from reference_rt.scene.build_textures import texture_tables, with_uv_sets
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes.meshes.triangle_table import shared
 
@@ -40,14 +40,16 @@ def build_tables(scene: SceneModel) -> SceneTables:
         geometry = assemble(scene, numbers)
         materials = material_tables(scene, palette, _has_material(geometry, numbers[None]))
         lights = light_tables(scene, geometry, palette)
-        return SceneTables(_with_shared_ids(geometry), materials, lights, textures)
+        textures = with_uv_sets(scene, textures, geometry.shapes.triangles)
+        return SceneTables(_as_in_scenes(geometry), materials, lights, textures)
 
 
-def _with_shared_ids(geometry: Geometry) -> Geometry:
+def _as_in_scenes(geometry: Geometry) -> Geometry:
     shapes = geometry.shapes
     if shapes.triangles is None:
         return geometry
-    return geometry._replace(shapes=shapes._replace(triangles=shared(shapes.triangles)))
+    triangles = shared(shapes.triangles)._replace(more_uvs=None)
+    return geometry._replace(shapes=shapes._replace(triangles=triangles))
 
 
 def _has_material(geometry: Geometry, number: int) -> bool:
