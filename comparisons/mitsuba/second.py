@@ -200,9 +200,7 @@ def _by_mitsuba(path: Path) -> Corners:
         column("texcoords", 2) if mesh.has_vertex_texcoords() else None,
         silent=() if kind == "ply" else ("colours",),
         source="Mitsuba's loader",
-        **(
-            _by_vertices(path, len(values["vertex_positions"]) // 3, faces) if kind == "ply" else {}
-        ),
+        **more,
     )
 
 

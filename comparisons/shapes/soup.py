@@ -115,10 +115,10 @@ class Soup:
             found[VERTEX_COLOUR] = self.colours
             found[VERTEX_LUMINANCE] = np.asarray(luminance(Vec3(*self.colours.T)))
         if self.more_uvs is not None:
-            sets = np.pad(
-                self.more_uvs.reshape(len(self.more_uvs), -1, 2), ((0, 0), (0, 0), (0, 1))
-            )
-            found |= {uv_attribute(k): sets[:, k - 1] for k in range(1, sets.shape[1] + 1)}
+            nothing = np.zeros((len(self.positions), 1))
+            for k in range(self.more_uvs.shape[1] // 2):
+                uv = self.more_uvs[:, 2 * k : 2 * k + 2]
+                found[uv_attribute(k + 1)] = np.hstack([uv, nothing])
         return found
 
 

@@ -340,41 +340,7 @@ def _mixtures(mi: Any) -> None:
         def to_string(self) -> str:
             return f"TextureProduct[{', '.join(map(str, self.of))}]"
 
-    class TextureOfSet(mi.Texture):  # type: ignore[misc]
-        """The texture `of` by other coordinates than the surface's: those that a mesh has at its
-        vertices as the attribute with this name."""
-
-        def __init__(self, properties: Any) -> None:
-            super().__init__(properties)
-            self.of = properties["of"]
-            self.attribute = str(properties["attribute"])
-
-        def there(self, si: Any, active: Any) -> Any:
-            found = mi.SurfaceInteraction3f(si)
-            uv = si.shape.eval_attribute_3(self.attribute, si, active)
-            found.uv = mi.Point2f(uv.x, uv.y)
-            return found
-
-        def eval(self, si: Any, active: Any = True) -> Any:
-            return self.of.eval(self.there(si, active), active)
-
-        def eval_3(self, si: Any, active: Any = True) -> Any:
-            return self.of.eval_3(self.there(si, active), active)
-
-        def eval_1(self, si: Any, active: Any = True) -> Any:
-            return self.of.eval_1(self.there(si, active), active)
-
-        def mean(self) -> Any:
-            return self.of.mean()
-
-        def is_spatially_varying(self) -> bool:
-            return True
-
-        def to_string(self) -> str:
-            return f"TextureOfSet[{self.attribute}, {self.of}]"
-
     mi.register_texture("texture_product", TextureProduct)
-    mi.register_texture("texture_of_set", TextureOfSet)
     mi.register_bsdf("mixture_blend", MixtureBlend)
     mi.register_bsdf("mixture_mask", MixtureMask)
     mi.register_bsdf("mixture_sides", MixtureSides)

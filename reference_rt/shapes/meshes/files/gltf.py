@@ -157,8 +157,8 @@ class GltfFile:
         return (*names, *(["points or lines"] if self.has_lines else []))
 
     def primitive(self, primitive: dict[str, Any], uv_sets: Sequence[int] = (0,)) -> RawMesh:
-        """The triangles of a primitive.  uv_sets: the numbers of its texture coordinates, our mesh's
-        own first; those of others that it lacks are (0, 0)."""
+        """The triangles of a primitive.  uv_sets: the numbers of its texture coordinates, those of
+        our mesh's `uv` first; of the others what it lacks is (0, 0)."""
         attributes, packed = primitive["attributes"], self.packed(primitive)
         of_draco = {} if packed is None else packed[1]
         points = self.accessor(attributes.get("POSITION"), (3,), packed=of_draco.get("POSITION"))
