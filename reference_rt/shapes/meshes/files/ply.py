@@ -4,10 +4,10 @@ It reads the element `vertex` with x y z, nx ny nz, uv (u v, s t or texture_u te
 colour, and the element `face`, or `tristrips`, with its list vertex_indices or vertex_index;
 everything else is ignored, and named.  Texture coordinates of a face's corners, its list texcoord,
 come before those of vertices; u1 v1, u2 v2, ... are those of further sets.  A colour is red green
-blue, or r g b; or diffuse_red and so on; or as Mitsuba writes it, color_0 color_1 color_2, and in the other forms that it reads, color_r and
-vertex_color_x among them; the first of these that the file has.  Colours of integers are sRGB-
-encoded, 255 or 65535 being 1: as displayed, which is what scanners and modellers write.  Colours of
-floats are linear: as computed."""
+blue, or r g b; or diffuse_red and so on; or as Mitsuba writes it, color_0 color_1 color_2, and in
+the other forms that it reads, color_r and vertex_color_x among them; the first of these that the
+file has.  Colours of integers are sRGB-encoded, 255 or 65535 being 1: as displayed, which is what
+scanners and modellers write.  Colours of floats are linear: as computed."""
 
 import re
 import struct
