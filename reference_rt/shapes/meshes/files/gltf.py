@@ -32,13 +32,15 @@ _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # points and lines are 0 to 3
 _READ = ("POSITION", "NORMAL", "TEXCOORD_0", "COLOR_0")
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 
+_QUANTIZED = "KHR_mesh_quantization"  # texture coordinates may be integers that are no fractions
+
 # Extensions that a file may require although they are unknown here: they do not change the shape.
 _HARMLESS = (
     "KHR_materials_",
     "KHR_texture_",
     "KHR_lights_",
     "EXT_texture_",
-    "KHR_mesh_quantization",
+    _QUANTIZED,
     compression.DRACO,
     *compression.MESHOPT,
 )
@@ -162,6 +164,7 @@ class GltfFile:
         attributes, packed = primitive["attributes"], self.packed(primitive)
         of_draco = {} if packed is None else packed[1]
         points = self.accessor(attributes.get("POSITION"), (3,), packed=of_draco.get("POSITION"))
+        fractions = _QUANTIZED not in self.root.get("extensionsUsed", [])  # else they say so
         normals, colours, *sets = (
             self.accessor(attributes[name], widths, fraction, of_draco.get(name))
             if name in attributes
@@ -169,7 +172,7 @@ class GltfFile:
             for name, widths, fraction in (
                 ("NORMAL", (3,), False),
                 ("COLOR_0", (3, 4), True),
-                *((f"TEXCOORD_{n}", (2,), True) for n in uv_sets),
+                *((f"TEXCOORD_{n}", (2,), fractions) for n in uv_sets),
             )
         )
         if any(a is not None and len(a) != len(points) for a in (normals, colours, *sets)):
