@@ -193,7 +193,9 @@ def _by_mitsuba(path: Path) -> Corners:
     def column(name: str, width: int) -> FloatArray:
         return np.array(values[f"vertex_{name}"], np.float64).reshape(-1, width)[faces]
 
-    more = _by_vertices(path, len(values["vertex_positions"]) // 3, faces) if kind == "ply" else {}
+    more: dict[str, Any] = {}
+    if kind == "ply":
+        more = _by_vertices(path, len(values["vertex_positions"]) // 3, faces)
     return Corners(
         column("positions", 3),
         column("normals", 3) if _has_normals(path) else None,

@@ -144,7 +144,8 @@ def _in_set(sets: UvSets | None, k: int, u: float, v: float, on: OnTriangle) -> 
 
 @kernel
 def _ask(textures: Any, k: int, at: At) -> Vec3:
-    return evaluate(textures, k, at.u, at.v, at.colour, at.on)
+    on: Any = at.on
+    return evaluate(textures, k, at.u, at.v, at.colour, on)
 
 
 _lookup = by_class(

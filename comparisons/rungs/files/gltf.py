@@ -237,7 +237,7 @@ def _coordinates(root: Any, buffers: _Buffers, scene: Any) -> Iterator[Value]:
             images = _images(getattr(layers.get(layer), field, None), scene)
             if info is None or not images:
                 continue
-            said = [rows for p in parts if (rows := _said(p, info, buffers)) is not None]
+            said = [one for p in parts if (one := _said(p, info, buffers)) is not None]
             for mesh in on:
                 ours = _of_set(mesh, images[0].uv_set)
                 rows = [one for one in said if ours is not None and len(one) == len(ours)]
