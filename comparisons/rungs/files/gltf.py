@@ -15,9 +15,9 @@ from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
+import numpy.typing as npt
 
 from comparisons.rungs.files.findings import Findings, text
-from reference_rt.core.arrays import FloatArray
 
 DEFAULTS: dict[str, Any] = {
     "pbrMetallicRoughness/baseColorFactor": [1.0, 1.0, 1.0, 1.0],
@@ -185,6 +185,8 @@ SLOTS = (
 )
 """Where an image is in glTF, and in which field of which of our materials."""
 
+Pairs = npt.NDArray[np.float64]
+
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5126: "<f4"}
 
 
@@ -202,7 +204,7 @@ class _Buffers:
             return base64.b64decode(uri.partition(",")[2])
         return (self.folder / unquote(uri)).read_bytes()
 
-    def pairs(self, number: int) -> FloatArray | None:
+    def pairs(self, number: int) -> Pairs | None:
         """An accessor's rows (n, 2); None where they are sparse, compressed or without data."""
         accessor = self.root["accessors"][number]
         if "sparse" in accessor or "bufferView" not in accessor:
@@ -249,7 +251,7 @@ def _coordinates(root: Any, buffers: _Buffers, scene: Any) -> Iterator[Value]:
                     yield where, rows[best][most].tolist(), ours[most].tolist()
 
 
-def _said(primitive: Any, info: Any, buffers: _Buffers) -> FloatArray | None:
+def _said(primitive: Any, info: Any, buffers: _Buffers) -> Pairs | None:
     """The coordinates (n, 2) of an image on a primitive, v from the bottom."""
     own = _get(info, "extensions/KHR_texture_transform/texCoord")
     name = f"TEXCOORD_{info.get('texCoord', 0) if own is None else own}"
@@ -259,7 +261,7 @@ def _said(primitive: Any, info: Any, buffers: _Buffers) -> FloatArray | None:
     return None if rows is None else rows * [1.0, -1.0] + [0.0, 1.0]
 
 
-def _of_set(mesh: Any, uv_set: int) -> FloatArray | None:
+def _of_set(mesh: Any, uv_set: int) -> Pairs | None:
     if uv_set == 0:
         return mesh.uv  # type: ignore[no-any-return]
     return mesh.more_uv[:, 2 * uv_set - 2 : 2 * uv_set]  # type: ignore[no-any-return]
