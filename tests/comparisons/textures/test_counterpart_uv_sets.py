@@ -16,14 +16,16 @@ from comparisons.mitsuba.context import UntranslatableError
 from comparisons.mitsuba.files import write_scene
 from comparisons.pbrt import write_pbrt
 from comparisons.renderers import NoCounterpartError
-from comparisons.rungs import direct
+from comparisons.rungs import direct, layers
 from comparisons.rungs.files import files
+from comparisons.rungs.layers import seen
 from comparisons.shapes import site
 from comparisons.textures import translate
 from comparisons.translator import load
 from comparisons.translator.writing import write_xml
 from reference_rt.gltf import surfaces
 from reference_rt.gltf.document import TextureInfo
+from reference_rt.integrators import RayCast
 from reference_rt.materials import Diffuse
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
@@ -84,6 +86,20 @@ def test_mitsuba_sees_the_same(scene: Scene, monkeypatch: Patch) -> None:
     assert right.status == "agree", right.reason
     monkeypatch.setattr(translate, "uv_attribute", lambda uv_set: f"vertex_uv_{3 - uv_set}")
     assert direct(scene, tables, load(scene)).status == "differ"
+
+
+def test_the_albedo_of_each_set(scene: Scene, monkeypatch: Patch) -> None:
+    """The colours that the layers are held against."""
+    cast = scene.changed(
+        integrator=RayCast(show="colour"),
+        materials=scene.materials | {"m": Diffuse(reflectance="b"), "l": Diffuse(reflectance="c")},
+        sampler=None,
+    )
+    tables, counterpart, films = build_tables(cast), load(cast), (cast.film, cast.film)
+    right = layers(cast, tables, counterpart, films)
+    assert right.status == "agree", right.reason
+    monkeypatch.setattr(seen, "_coordinates", lambda looked, uv_set: looked.uv)
+    assert layers(cast, tables, counterpart, films).status == "differ"
 
 
 @pytest.mark.parametrize("attribute", ["more_uv", "colours"])
