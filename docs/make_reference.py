@@ -264,6 +264,8 @@ def _array(value: Mapping[str, Any], targets: list[str]) -> str:
     if "enum" in items:
         return f"a list of {', '.join(f'`{one}`' for one in items['enum'])}"
     if most is None:
+        if least is not None and items.get("type") == "number":
+            return f"{least} numbers or more"
         return "a list" if least is None else f"a list of at least {least}"
     count = str(most) if least == most else f"{least} or {most}"
     return f"{count} {'integers' if items.get('type') == 'integer' else 'numbers'}{_range(items)}"

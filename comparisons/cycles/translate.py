@@ -79,6 +79,8 @@ class Writing:
         texture = self.scene.textures[value]
         if (to_cycles := type_of_texture(texture).to_cycles) is None:
             raise NoCounterpartError(f"the texture {texture.type}")
+        if texture.uv_set:
+            raise NoCounterpartError(f"a texture with 'uv_set: {texture.uv_set}'")
         return to_cycles(texture, self)
 
     def number(self, value: Any) -> Any:

@@ -247,7 +247,11 @@ class _Document(Surfaces):
         for k, uv in enumerate(surface.maps):
             if mesh.uv is None:
                 raise UnwritableError("a mesh without texture coordinates under a texture")
-            mapped = np.column_stack([mesh.uv, np.ones(len(mesh.vertices))]) @ uv[:2].T
+            pairs = mesh.uv
+            if uv.uv_set:
+                assert mesh.more_uv is not None  # checked where the scene is built
+                pairs = mesh.more_uv[:, 2 * uv.uv_set - 2 : 2 * uv.uv_set]
+            mapped = np.column_stack([pairs, np.ones(len(mesh.vertices))]) @ uv.matrix[:2].T
             attributes[f"TEXCOORD_{k}"] = self.numbers(mapped * [1.0, -1.0] + [0.0, 1.0])
         if surface.tangents:
             attributes["TANGENT"] = self.numbers(_tangents(mesh, surface.follow_v))

@@ -11,7 +11,7 @@ from PIL import Image
 
 from comparisons.materials import type_of
 from comparisons.mitsuba.files import Losses, UnwritableError
-from comparisons.renderers.vocabulary import GltfImage, Look, matte
+from comparisons.renderers.vocabulary import GltfImage, GltfUv, Look, matte
 from comparisons.textures import type_of as type_of_texture
 from comparisons.textures.texture import grey
 from reference_rt.core.arrays import FloatArray
@@ -21,12 +21,12 @@ from reference_rt.textures.image_file import linear
 
 
 class Surface(NamedTuple):
-    """number: the material's;  maps: of each set of texture coordinates, (3, 3);  colours: those of
-    vertices, if it has them;  tangents: whether it has a normal map;  follow_v: whether green is
-    along dp/dv there."""
+    """number: the material's;  maps: its sets of texture coordinates;  colours: those of vertices,
+    if it has them;  tangents: whether it has a normal map;  follow_v: whether green is along dp/dv
+    there."""
 
     number: int
-    maps: tuple[FloatArray, ...]
+    maps: tuple[GltfUv, ...]
     colours: VertexColours | None
     tangents: bool
     both_sides: bool
@@ -80,7 +80,7 @@ class Surfaces(Losses):
         return self.surfaces[name]
 
     def material(self, look: Look, name: str) -> Surface:
-        maps: list[FloatArray] = []
+        maps: list[GltfUv] = []
         pbr: dict[str, Any] = {}
         found: dict[str, Any] = {"name": name, "pbrMetallicRoughness": pbr}
         base, opacity = self.parts(look.base), self.parts(look.opacity)
@@ -140,9 +140,7 @@ class Surfaces(Losses):
         colours = base.colours
         return Surface(number, tuple(maps), colours, tangents, look.both_sides, follow_v)
 
-    def emission(
-        self, look: Look, found: dict[str, Any], maps: list[FloatArray], name: str
-    ) -> None:
+    def emission(self, look: Look, found: dict[str, Any], maps: list[GltfUv], name: str) -> None:
         shining = self.parts(look.radiance)
         factor = shining.factor
         if shining.colours:
@@ -232,25 +230,25 @@ class Surfaces(Losses):
         self,
         codes: npt.NDArray[np.uint8],
         sampler: dict[str, int],
-        uv: FloatArray,
-        maps: list[FloatArray],
+        uv: GltfUv,
+        maps: list[GltfUv],
     ) -> dict[str, int]:
         """A texture with its set of texture coordinates: those of the map `uv`."""
         stream = io.BytesIO()
         Image.fromarray(codes).save(stream, "PNG")
         source = {"bufferView": self.view(stream.getvalue()), "mimeType": "image/png"}
         number = {"source": self.add("images", source), "sampler": self.add("samplers", sampler)}
-        same = [k for k, other in enumerate(maps) if np.array_equal(other, uv)]
+        same = [k for k, other in enumerate(maps) if other.is_like(uv)]
         if not same:
             maps.append(uv)
         which = same[0] if same else len(maps) - 1
         return {"index": self.add("textures", number), "texCoord": which}
 
 
-def _common(first: GltfImage, *others: GltfImage) -> tuple[Any, dict[str, int], FloatArray]:
+def _common(first: GltfImage, *others: GltfImage) -> tuple[Any, dict[str, int], GltfUv]:
     """The shape, sampler and map of images that become one."""
     for one in others:
         same = one.texels.shape == first.texels.shape and one.sampler == first.sampler
-        if not (same and np.array_equal(one.uv, first.uv)):
+        if not (same and one.uv.is_like(first.uv)):
             raise UnwritableError("textures of several sizes, filters or maps in one")
     return first.texels.shape, first.sampler, first.uv

@@ -308,9 +308,11 @@ def ply(
     assert mesh.vertices is not None
     assert mesh.faces is not None
     columns: list[tuple[str, FloatArray]] = list(zip("xyz", mesh.vertices.T, strict=True))
+    sets = 0 if mesh.more_uv is None else mesh.more_uv.shape[1] // 2
     for names, values in (
         (("nx", "ny", "nz"), mesh.normals),
         (("u", "v"), mesh.uv),
+        ([f"{c}{k + 1}" for k in range(sets) for c in "uv"], mesh.more_uv),
         (of_colours, mesh.colours),
     ):
         if values is not None:

@@ -5,6 +5,7 @@ we read 5 % too large is then too large in one renderer only.
 """
 
 import functools
+import re
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -31,7 +32,7 @@ ROUNDING = 2.0**-22
 @dataclass(frozen=True)
 class Corners:
     """A mesh before its transform, by corners: points (n, 3, 3), and of these, or None, unit
-    normals (n, 3, 3), uv (n, 3, 2) and colours (n, 3, 3).
+    normals (n, 3, 3), uv (n, 3, 2), colours (n, 3, 3) and the uv of other sets (n, 3, 2 k).
 
     source: who says so;  silent: names of what it says nothing of;  bent: of normals that are made
     of those of the triangles around, by how much rounding may change each (n, 3);  doubtful: what
@@ -46,6 +47,7 @@ class Corners:
     silent: tuple[str, ...] = ()
     bent: FloatArray | None = None
     doubtful: tuple[str, ...] = ()
+    more_uv: FloatArray | None = None
 
 
 def by_us(shape: Mesh | Triangle, folder: Path) -> Corners:
@@ -53,8 +55,8 @@ def by_us(shape: Mesh | Triangle, folder: Path) -> Corners:
     if isinstance(shape, Triangle):
         return Corners(np.array([[shape.v0, shape.v1, shape.v2]]))
     data = shape.data(folder)
-    arrays = (data.vertices, data.normals, data.uv, data.colours)
-    points, normals, uv, colours = (None if a is None else a[data.faces] for a in arrays)
+    arrays = (data.vertices, data.normals, data.uv, data.colours, data.more_uv)
+    points, normals, uv, colours, more = (None if a is None else a[data.faces] for a in arrays)
     bent = None
     if shape.makes_normals(data):
         normals = smooth_normals(data.vertices, data.faces, data.uv).reshape(-1, 3, 3)
@@ -62,7 +64,8 @@ def by_us(shape: Mesh | Triangle, folder: Path) -> Corners:
     elif shape.face_normals:
         normals = None
     assert points is not None
-    return Corners(points, normals, uv, colours, bent=bent, doubtful=data.doubtful)
+    found = Corners(points, normals, uv, colours, bent=bent, doubtful=data.doubtful)
+    return replace(found, more_uv=more)
 
 
 def by_second(shape: Mesh | Triangle, folder: Path, ours: Corners) -> Corners | None:
@@ -74,6 +77,8 @@ def by_second(shape: Mesh | Triangle, folder: Path, ours: Corners) -> Corners | 
         faces = np.asarray(shape.faces)
         arrays = (shape.vertices, shape.normals, shape.uv, shape.colours)
         corners = Corners(*(None if a is None else np.asarray(a)[faces] for a in arrays))  # type: ignore[arg-type]
+        if shape.more_uv is not None:
+            corners = replace(corners, more_uv=np.asarray(shape.more_uv)[faces])
         if corners.normals is not None:
             corners = replace(corners, normals=_unit(corners.normals))
     else:
@@ -107,7 +112,7 @@ def described(shape: Mesh | Triangle, folder: Path) -> Corners:
         name: getattr(ours, name)
         if name in theirs.silent
         else _refined(getattr(theirs, name), getattr(ours, name))
-        for name in ("points", "uv", "colours")
+        for name in ("points", "uv", "colours", "more_uv")
     }
     bent = None if theirs.bent is None else theirs.bent[:, :, None]
     normals = _refined(theirs.normals, ours.normals, bent)
@@ -188,31 +193,44 @@ def _by_mitsuba(path: Path) -> Corners:
     def column(name: str, width: int) -> FloatArray:
         return np.array(values[f"vertex_{name}"], np.float64).reshape(-1, width)[faces]
 
+    more: dict[str, Any] = {}
+    if kind == "ply":
+        more = _by_vertices(path, len(values["vertex_positions"]) // 3, faces)
     return Corners(
         column("positions", 3),
         column("normals", 3) if _has_normals(path) else None,
         column("texcoords", 2) if mesh.has_vertex_texcoords() else None,
-        _colours(path, len(values["vertex_positions"]) // 3, faces) if kind == "ply" else None,
-        source="Mitsuba's loader",
         silent=() if kind == "ply" else ("colours",),
+        source="Mitsuba's loader",
+        **more,
     )
 
 
-def _colours(path: Path, vertices: int, faces: IntArray) -> FloatArray | None:
-    """Colours of a .ply file's vertices, by trimesh; decoded as IEC 61966-2-1 says."""
-    if b" red" not in path.read_bytes()[:_HEADER]:  # trimesh need not read it all
-        return None
+def _by_vertices(path: Path, vertices: int, faces: IntArray) -> dict[str, FloatArray]:
+    """Colours and further uv of a .ply file's vertices, by trimesh; decoded as IEC 61966-2-1
+    says."""
+    header = path.read_bytes()[:_HEADER]
+    if b" red" not in header and b" u1" not in header:  # trimesh need not read it all
+        return {}
     import trimesh
 
     element = trimesh.load(path, process=False).metadata["_ply_raw"]["vertex"]
     if element["length"] != vertices:
         raise ValueError("trimesh finds another number of vertices")
-    names = ("red", "green", "blue")
-    if not {*names} <= {*element["properties"]}:
-        return None
-    encoded = np.stack([np.ravel(element["data"][name]) for name in names], axis=1)
-    kind = np.dtype(element["properties"]["red"])
-    return _decoded(encoded[faces] / (np.iinfo(kind).max if kind.kind == "u" else 1.0))
+    kinds, found = element["properties"], {}
+
+    def column(*names: str) -> FloatArray:
+        return np.stack([np.ravel(element["data"][name]) for name in names], axis=1)[faces]
+
+    if {"red", "green", "blue"} <= {*kinds}:
+        kind = np.dtype(kinds["red"])
+        white = np.iinfo(kind).max if kind.kind == "u" else 1.0
+        found["colours"] = _decoded(column("red", "green", "blue") / white)
+    sets = sum(1 for name in kinds if re.fullmatch(r"u[1-9]", name))
+    if sets:
+        names = [f"{c}{k + 1}" for k in range(sets) for c in "uv"]
+        found["more_uv"] = np.asarray(column(*names), np.float64)
+    return found
 
 
 _HEADER = 1 << 14
@@ -256,7 +274,7 @@ def _by_trimesh(path: Path) -> Corners:
                 uv = getattr(mesh.visual, "uv", None)
                 columns["uv"].append(None if uv is None else uv[mesh.faces])
     arrays: dict[str, Any] = {}
-    silent = ["colours"]
+    silent = ["colours", "more_uv"]
     for name, key in (("points", b"POSITION"), ("normals", b"NORMAL"), ("uv", b"TEXCOORD_0")):
         said = content.count(b'"%s"' % key)
         whole = is_gltf and said == content.count(b'"POSITION"')
@@ -299,7 +317,7 @@ def _by_lib3mf(path: Path) -> Corners:
         place = _rows_of(item.GetObjectTransform()) if item.HasObjectTransform() else np.eye(4, 3)
         add(item.GetObjectResource(), place)
     unit = _MILLIMETRES[model.GetUnit().name]
-    silent = ("normals", "uv", "colours")
+    silent = ("normals", "uv", "colours", "more_uv")
     return Corners(unit * np.concatenate(parts), source="lib3mf", silent=silent)
 
 

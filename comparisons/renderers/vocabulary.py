@@ -100,13 +100,23 @@ def of_index(ior: float) -> dict[str, dict[str, Any]]:
     return {} if ior == 1.5 else {"KHR_materials_ior": {"ior": ior}}
 
 
+class GltfUv(NamedTuple):
+    """Texture coordinates: matrix (3, 3), of a shape's own, or of a mesh's set `uv_set`."""
+
+    matrix: FloatArray
+    uv_set: int = 0
+
+    def is_like(self, other: "GltfUv") -> bool:
+        return self.uv_set == other.uv_set and np.array_equal(self.matrix, other.matrix)
+
+
 class GltfImage(NamedTuple):
-    """Linear texels (height, width, 3);  scale: a factor of 8-bit codes in them;  uv: (3, 3), from
-    a shape's coordinates;  sampler: glTF's."""
+    """Linear texels (height, width, 3);  scale: a factor of 8-bit codes in them;  uv: where they
+    are;  sampler: glTF's."""
 
     texels: FloatArray
     scale: float
-    uv: FloatArray
+    uv: GltfUv
     sampler: dict[str, int]
 
 

@@ -84,13 +84,13 @@ def soup_of(shape: Triangle | Mesh, folder: Path) -> Soup:
     edges = np.diff(mesh.points, axis=1)
     edges /= np.maximum(np.abs(edges).max(axis=(1, 2), keepdims=True), np.finfo(float).tiny)
     numbers = np.flatnonzero(np.cross(edges[:, 0], edges[:, 1]).any(axis=1))
-    points, normals, uv, colours = (
+    points, normals, uv, colours, more = (
         None if c is None else c[numbers].reshape(-1, c.shape[2])
-        for c in (mesh.points, mesh.normals, mesh.uv, mesh.colours)
+        for c in (mesh.points, mesh.normals, mesh.uv, mesh.colours, mesh.more_uv)
     )
     assert points is not None
     m = affine.of_steps(shape.transform)
-    soup = Soup(points, None, uv, colours).moved(m, affine.mirrors(m))
+    soup = Soup(points, None, uv, colours, more_uvs=more).moved(m, affine.mirrors(m))
     soup.numbers = numbers
     if normals is not None:  # under its own transform they are unit at the vertices
         soup.normals = affine.apply_normals(m, normals)

@@ -92,11 +92,17 @@ MOST_INSTANCES = 32
 
 def placed(soup: Soup, key: Any, m: affine.Affine, mirrored: bool, site: Site) -> Plugin:
     """Triangles under the map m: a mesh, or, with many copies that do not emit, an instance of the
-    one mesh for `key`.  `mirrored`: see `Soup.moved`."""
+    one mesh for `key`.  `mirrored`: see `Soup.moved`.  Raises UntranslatableError."""
     parts = site.parts if soup.colours is None else site.coloured
     few = site.copies * len(soup.faces) <= MOST_TRIANGLES
     if site.copies == 1 or few or "emitter" in site.parts:
         return Plugin(soup.moved(m, mirrored).mesh(parts))
+    if soup.attributes():
+        # Mitsuba 3.9.1 interpolates attributes of instances at the place in the world, not in the
+        # group.
+        raise UntranslatableError(
+            f"mesh with vertex colours or further uv in a group with {site.copies} copies,", "shape"
+        )
     # Mitsuba transforms normals of instances as we do: the front stays the front.
     return instance_of(str(key), lambda: soup.mesh(parts), m, site)
 

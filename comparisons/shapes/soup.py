@@ -7,6 +7,7 @@ import numpy as np
 
 from comparisons.geometry import affine
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.textures.texture import uv_attribute
 from comparisons.textures.vertex_colours import VERTEX_COLOUR, VERTEX_LUMINANCE
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.vec3 import Vec3, luminance
@@ -14,7 +15,7 @@ from reference_rt.core.vec3 import Vec3, luminance
 
 class Soup:
     """A mesh: positions (v, 3) of its vertices, and of each vertex, or None, unit normals (v, 3),
-    uv (v, 2), colours (v, 3).
+    uv (v, 2), colours (v, 3), uv of other sets (v, 2 k).
 
     faces (n, 3): indices of vertices, None if every three vertices are a triangle;  numbers (n,):
     our face numbers, None if they count from 0.
@@ -28,8 +29,9 @@ class Soup:
         colours: FloatArray | None = None,
         faces: IntArray | None = None,
         numbers: IntArray | None = None,
+        more_uvs: FloatArray | None = None,
     ) -> None:
-        self.numbers = numbers
+        self.numbers, self.more_uvs = numbers, more_uvs
         self.positions, self.normals, self.uvs, self.colours = positions, normals, uvs, colours
         self.faces = np.arange(len(positions)).reshape(-1, 3) if faces is None else faces
 
@@ -45,25 +47,28 @@ class Soup:
             normals /= np.abs(normals).max()
         positions = affine.apply_points(m, self.positions)
         if not mirrored:
-            return Soup(positions, normals, self.uvs, self.colours, self.faces)
+            faces = self.faces
+            return Soup(positions, normals, self.uvs, self.colours, faces, more_uvs=self.more_uvs)
         uvs = self.uvs
         if uvs is None and len(positions) == 3 * len(self.faces):
             # Mitsuba's default uv are the barycentrics in its order of the corners.
             uvs = np.tile([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], (len(self.faces), 1))
-        return Soup(positions, normals, uvs, self.colours, self.faces[:, [0, 2, 1]])
+        faces = self.faces[:, [0, 2, 1]]
+        return Soup(positions, normals, uvs, self.colours, faces, more_uvs=self.more_uvs)
 
     def at_corners(self) -> "Soup":
         """The same with a vertex for each corner."""
         at = self.faces.ravel()
-        normals, uvs, colours = (
+        normals, uvs, colours, more = (
             None if column is None else column[at]
-            for column in (self.normals, self.uvs, self.colours)
+            for column in (self.normals, self.uvs, self.colours, self.more_uvs)
         )
-        return Soup(self.positions[at], normals, uvs, colours, numbers=self.numbers)
+        at_corners = self.positions[at], normals, uvs, colours
+        return Soup(*at_corners, numbers=self.numbers, more_uvs=more)
 
     def is_like(self, other: "Soup") -> bool:
         """Whether another one has the same numbers, but for some roundings of float64."""
-        for name in ("numbers", "positions", "normals", "uvs", "colours"):
+        for name in ("numbers", "positions", "normals", "uvs", "colours", "more_uvs"):
             a, b = getattr(self, name), getattr(other, name)
             if a is None or b is None:
                 if a is not b:
@@ -98,13 +103,23 @@ class Soup:
         if self.uvs is not None:
             values["vertex_texcoords"] = self.uvs.astype(np.float32).ravel()
         values.update()
-        if self.colours is not None:
-            grey = np.asarray(luminance(Vec3(*self.colours.T)))
-            for name, column in ((VERTEX_COLOUR, self.colours), (VERTEX_LUMINANCE, grey)):
-                mesh.add_attribute(
-                    name, column.size // len(grey), column.astype(np.float32).ravel()
-                )
+        for name, column in self.attributes().items():
+            width = column.size // len(self.positions)
+            mesh.add_attribute(name, width, column.astype(np.float32).ravel())
         return mesh
+
+    def attributes(self) -> dict[str, FloatArray]:
+        """What Mitsuba's mesh has at its vertices by our names; of one number or of three."""
+        found = {}
+        if self.colours is not None:
+            found[VERTEX_COLOUR] = self.colours
+            found[VERTEX_LUMINANCE] = np.asarray(luminance(Vec3(*self.colours.T)))
+        if self.more_uvs is not None:
+            nothing = np.zeros((len(self.positions), 1))
+            for k in range(self.more_uvs.shape[1] // 2):
+                uv = self.more_uvs[:, 2 * k : 2 * k + 2]
+                found[uv_attribute(k + 1)] = np.hstack([uv, nothing])
+        return found
 
 
 def heights_of(corners: FloatArray) -> FloatArray:

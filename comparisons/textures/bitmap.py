@@ -18,6 +18,7 @@ from comparisons.renderers.vocabulary import (
     CyclesWriter,
     Data,
     GltfImage,
+    GltfUv,
     GltfWriter,
     Params,
     PbrtWriter,
@@ -131,7 +132,8 @@ def _to_gltf(texture: Bitmap, name: str, writing: GltfWriter) -> GltfImage:
     along_u, along_v = texture.wraps
     sampler = {"magFilter": kind, "minFilter": kind}
     sampler |= {"wrapS": WRAPS[along_u], "wrapT": WRAPS[along_v]}
-    return GltfImage(texels, texture.scale, affine.of_uv(texture.uv), sampler)
+    uv = GltfUv(affine.of_uv(texture.uv), texture.uv_set)
+    return GltfImage(texels, texture.scale, uv, sampler)
 
 
 def _to_pbrt(texture: Bitmap, name: str, kind: str, writing: PbrtWriter) -> tuple[str, Params]:
@@ -152,6 +154,8 @@ def _to_pbrt(texture: Bitmap, name: str, kind: str, writing: PbrtWriter) -> tupl
 
 def pbrt_uv(texture: Any, factor: float) -> Params:
     """pbrt's parameters of a map.  factor: on the coordinates.  Raises UnwritableError."""
+    if texture.uv_set:
+        raise UnwritableError(f"a texture with 'uv_set: {texture.uv_set}'")
     (a, b, c), (d, e, f), _ = (factor * affine.of_uv(texture.uv)).tolist()
     if b != 0.0 or d != 0.0:
         raise UnwritableError("a uv map that turns or shears")

@@ -15,6 +15,7 @@ from comparisons.renderers.vocabulary import (
     CyclesWriter,
     Data,
     GltfImage,
+    GltfUv,
     GltfWriter,
     Params,
     PbrtWriter,
@@ -86,7 +87,8 @@ def _to_gltf(texture: Checker, name: str, writing: GltfWriter) -> GltfImage:
     texels = _texels(texture)
     sampler = {"magFilter": NEAREST, "minFilter": NEAREST}
     sampler |= {"wrapS": WRAPS["repeat"], "wrapT": WRAPS["repeat"]}
-    return GltfImage(texels, float(texels.max()) or 1.0, affine.of_uv(texture.uv), sampler)
+    uv = GltfUv(affine.of_uv(texture.uv), texture.uv_set)
+    return GltfImage(texels, float(texels.max()) or 1.0, uv, sampler)
 
 
 def _to_pbrt(texture: Checker, name: str, kind: str, writing: PbrtWriter) -> tuple[str, Params]:

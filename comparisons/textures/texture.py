@@ -70,6 +70,11 @@ def grey(texels: FloatArray) -> FloatArray:
     return np.asarray(luminance(Vec3(*np.moveaxis(texels, -1, 0))))
 
 
+def uv_attribute(uv_set: int) -> str:
+    """The name of the attribute of Mitsuba's meshes that has a further set of coordinates."""
+    return f"vertex_uv_{uv_set}"
+
+
 # ---- maps of texture coordinates, to Mitsuba -----------------------------------------------------
 
 FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])

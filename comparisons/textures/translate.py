@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from comparisons.mitsuba.context import TranslationContext, rgb
+from comparisons.mitsuba.context import TranslationContext, UntranslatableError, rgb
 from comparisons.textures import type_of
-from comparisons.textures.texture import Nested, Use
-from reference_rt.textures import Texture, VertexColours
+from comparisons.textures.texture import Nested, Use, uv_attribute
+from reference_rt.textures import Product, Texture, VertexColours
 
 
 def colour(value: tuple[float, float, float] | str, context: TranslationContext) -> dict[str, Any]:
@@ -44,10 +44,17 @@ def translate_texture(
     """The dictionary of a texture.  Raises as `colour` does."""
     translated = type_of(texture).to_mitsuba(texture, name, context, use)
     nested = Use(projected=use.projected)
-    return {
+    found = {
         key: _colour(part.name, context, nested) if isinstance(part, Nested) else part
         for key, part in translated.items()
     }
+    if texture.uv_set and not isinstance(texture, Product | VertexColours):
+        if context.files is not None:
+            kind = f"{type(texture).__name__} with 'uv_set: {texture.uv_set}'"
+            raise UntranslatableError(kind, "texture")
+        attribute = uv_attribute(texture.uv_set)
+        found = {"type": "texture_of_set", "attribute": attribute, "of": found}
+    return found
 
 
 def depends_on_uv(texture: Texture) -> bool:

@@ -160,12 +160,12 @@ def with_float32_vertices(scene: Scene) -> tuple[Scene, float, Callable[[], Scen
 
 
 def _by_corners(table: Triangles) -> Soup:
-    normals, uvs, colours = (
+    normals, uvs, colours, more = (
         None if column is None else column.reshape(3 * len(table.face), -1)
-        for column in (table.normals, table.uvs, table.colours)
+        for column in (table.normals, table.uvs, table.colours, table.more_uvs)
     )
-    numbers = table.face.astype(np.int64)
-    return Soup(table.vertices.reshape(-1, 3), normals, uvs, colours, numbers=numbers)
+    at_corners = table.vertices.reshape(-1, 3), normals, uvs, colours
+    return Soup(*at_corners, numbers=table.face.astype(np.int64), more_uvs=more)
 
 
 def _rounded(soup: Soup, material: str | None, frame: Frame) -> tuple[Mesh, float]:
@@ -183,6 +183,7 @@ def _rounded(soup: Soup, material: str | None, frame: Frame) -> tuple[Mesh, floa
         faces=faces,
         normals=soup.normals,
         uv=soup.uvs,
+        more_uv=soup.more_uvs,
         colours=soup.colours,
     )
     return mesh, moved

@@ -5,6 +5,7 @@ picture is in the file, or in the files beside it."""
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -52,6 +53,9 @@ def tessellated(shape: Shape, folder: Path) -> Tessellated:
                 None if table.normals is None else table.normals.reshape(-1, 3),
                 None if table.uvs is None else table.uvs.reshape(-1, 2),
                 None if table.colours is None else table.colours.reshape(-1, 3),
+                more_uv=None
+                if table.more_uvs is None
+                else table.more_uvs.reshape(3 * len(table.vertices), -1),
             ),
             0.0,
         )
@@ -110,7 +114,7 @@ def placed(mesh: MeshData, outer: Affine) -> MeshData:
     faces = mesh.faces[:, ::-1] if affine.mirrors(outer) else mesh.faces
     normals = None if mesh.normals is None else affine.apply_normals(outer, mesh.normals)
     vertices = affine.apply_points(outer, mesh.vertices)
-    return MeshData(vertices, faces, normals, mesh.uv, mesh.colours)
+    return replace(mesh, vertices=vertices, faces=faces, normals=normals)
 
 
 # ---- the document --------------------------------------------------------------------------------

@@ -29,12 +29,13 @@ from reference_rt.core.vec3 import Vec3
 from reference_rt.jit.kernel import kernel, local_floats, local_integers
 from reference_rt.jit.links import Linkable
 from reference_rt.jit.simd import VECTOR_WIDTH
-from reference_rt.shapes import TABLES, Shapes
+from reference_rt.shapes import TABLES, TRIANGLE, Shapes
 from reference_rt.shapes.csg import Parts, Solids, out_of_solid, ray_near
 from reference_rt.shapes.dispatch import primitive_count
 from reference_rt.shapes.instances import Instances, out_of, ray_in, tangents_out_of
 from reference_rt.shapes.meshes.watertight import PROJECTION_FLOATS, Shear, shear_of
 from reference_rt.shapes.shape import Tangents
+from reference_rt.textures import OnTriangle
 
 KINDS = len(TABLES)
 
@@ -265,6 +266,12 @@ def coordinates(geometry: Geometry, ray: Ray, hit: Hit) -> Coordinates:
     local, seen, _ = _in_primitive_space(geometry, ray, hit)
     u, v = any_shape.uv(geometry.shapes, local, seen)
     return Coordinates(u, v, colour(geometry.shapes, hit, Vec3(-1.0, -1.0, -1.0)))
+
+
+@kernel
+def on_triangle(hit: Hit) -> OnTriangle:
+    """Where a hit is on its triangle, for other sets of texture coordinates."""
+    return OnTriangle(hit.row if hit.kind == TRIANGLE else -1, hit.u, hit.v)
 
 
 @geometries.operation

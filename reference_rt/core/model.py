@@ -90,17 +90,22 @@ def _listed(array: Any) -> Any:
     return array.tolist()
 
 
-def _rows(width: int, integers: bool) -> Callable[[Any], npt.NDArray[Any]]:
+def _rows(width: int, integers: bool, or_more: bool = False) -> Callable[[Any], npt.NDArray[Any]]:
+    """or_more: whether rows may have a multiple of `width` numbers."""
     kinds, dtype = ("iu", np.int64) if integers else ("iuf", np.float64)
     numbers = "integers" if integers else "finite numbers"
-    expected = f"expected an (n, {width}) array, or a list of n rows, of {numbers}"
+    columns = f"{width} k" if or_more else str(width)
+    expected = f"expected an (n, {columns}) array, or a list of n rows, of {numbers}"
 
     def check(value: Any) -> npt.NDArray[Any]:
         try:
             found = value if isinstance(value, np.ndarray) else np.asarray(value)
         except (ValueError, TypeError):  # rows of different lengths
             raise ValueError(expected) from None
-        if found.ndim != 2 or found.shape[1] != width or found.dtype.kind not in kinds:
+        is_wide = found.ndim == 2 and (
+            found.shape[1] == width or (or_more and found.shape[1] > 0 == found.shape[1] % width)
+        )
+        if not is_wide or found.dtype.kind not in kinds:
             raise ValueError(f"{expected}, got {found.dtype} of shape {found.shape}")
         if isinstance(found, np.ma.MaskedArray) and np.ma.is_masked(found):
             raise ValueError(f"{expected}, got a masked array")
@@ -121,8 +126,9 @@ def _written(array: npt.NDArray[Any], info: SerializationInfo) -> Any:
     return array.tolist()
 
 
-def _schema(width: int, item: str) -> WithJsonSchema:
-    row = {"type": "array", "items": {"type": item}, "minItems": width, "maxItems": width}
+def _schema(width: int, item: str, or_more: bool = False) -> WithJsonSchema:
+    row = {"type": "array", "items": {"type": item}, "minItems": width}
+    row |= {} if or_more else {"maxItems": width}
     return WithJsonSchema({"type": "array", "items": row})
 
 
@@ -132,6 +138,14 @@ Floats2 = Annotated[
     npt.NDArray[np.float64], PlainValidator(_rows(2, False)), _AS_LISTS, _schema(2, "number")
 ]
 """(n, 2) finite float64, copied and read-only; lists in scene files."""
+
+Floats2s = Annotated[
+    npt.NDArray[np.float64],
+    PlainValidator(_rows(2, False, or_more=True)),
+    _AS_LISTS,
+    _schema(2, "number", or_more=True),
+]
+"""(n, 2 k) finite float64 for any k > 0, as `Floats2`."""
 
 Floats3 = Annotated[
     npt.NDArray[np.float64], PlainValidator(_rows(3, False)), _AS_LISTS, _schema(3, "number")

@@ -26,7 +26,6 @@ from reference_rt.gltf.document import (
     Primitive,
 )
 from reference_rt.gltf.surfaces import Reading, Surfaces
-from reference_rt.gltf.uv_sets import Maps, Piece, pieces
 from reference_rt.lights import AnyLight, Constant, Directional, EnvironmentMap, Point, Spot
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes import Mesh
@@ -274,25 +273,20 @@ class _Shapes:
                 continue
             raw = self.reading.file.root["meshes"][index]["primitives"][k]
             sets = self.surfaces.uv_sets(part.material)
-            found, *others = (self.reading.file.primitive(raw, n) for n in sets or [0])
-            uv = {n: one.uv for n, one in zip(sets, [found, *others], strict=False)}
-            for n in [n for n, of in uv.items() if of is None]:
-                uv[n] = np.zeros((len(found.vertices), 2))
-                self.reading.note(f"{where} has no TEXCOORD_{n}: its textures show one point")
+            found = self.reading.file.primitive(raw, sets or (0,))
+            for n in sets:
+                if f"TEXCOORD_{n}" not in part.attributes:
+                    self.reading.note(f"{where} has no TEXCOORD_{n}: its textures show one point")
             if part.targets:
                 self.reading.note("morph targets are ignored")
-            cut = [Piece(np.arange(len(found.faces)), ())]
-            if len(sets) > 1 and _is_whole(found):
-                at_corners = [np.asarray(uv[n], np.float64)[found.faces] for n in sets]
-                cut = pieces(at_corners[0], dict(zip(sets[1:], at_corners[1:], strict=True))) or cut
-            for piece in cut:
-                own = found if len(cut) == 1 else found._replace(faces=found.faces[piece.faces])
-                yield self._piece(part, own, uv[sets[0]] if sets else None, piece.maps, where)
+            if not sets:
+                found = found._replace(uv=None)
+            elif found.uv is None:
+                found = found._replace(uv=np.zeros((len(found.vertices), 2)))
+            yield self._mesh(part, found, where)
 
-    def _piece(
-        self, part: Primitive, found: RawMesh, uv: FloatArray | None, maps: Maps, where: str
-    ) -> Mesh:
-        surface = self.surfaces.surface(part.material, "COLOR_0" in part.attributes, maps)
+    def _mesh(self, part: Primitive, found: RawMesh, where: str) -> Mesh:
+        surface = self.surfaces.surface(part.material, "COLOR_0" in part.attributes)
         self.lamps |= {surface.name} if surface.emits else set()
         self.is_lit = self.is_lit or surface.is_bright
         if surface.is_clear and "alpha of COLOR_0" in found.ignored:
@@ -303,7 +297,8 @@ class _Shapes:
                 vertices=found.vertices,
                 faces=found.faces,
                 normals=found.normals,
-                uv=uv,
+                uv=found.uv,
+                more_uv=found.more_uv,
                 colours=colours,
                 material=surface.name,
             )
@@ -314,12 +309,6 @@ class _Shapes:
             if _is_mirrored(made.uv[made.faces]):
                 self.mirrored.add(surface.tilt)
         return made
-
-
-def _is_whole(mesh: RawMesh) -> bool:
-    """Whether all corners are vertices; otherwise the mesh is an error, which its checks say."""
-    faces = mesh.faces
-    return len(faces) > 0 and bool((faces >= 0).all() and (faces < len(mesh.vertices)).all())
 
 
 def _is_mirrored(uv: FloatArray) -> bool:

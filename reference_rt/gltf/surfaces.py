@@ -15,7 +15,6 @@ import platformdirs
 
 from reference_rt.core.image_files import open_image
 from reference_rt.gltf.document import Document, Image, Material, TextureInfo, TextureTransform
-from reference_rt.gltf.uv_sets import MOST_PIECES, Map, Maps
 from reference_rt.materials import (
     AnyMaterial,
     Diffuse,
@@ -91,7 +90,7 @@ class Surfaces:
         self.reading = reading
         self.textures: dict[str, AnyTexture] = {}
         self.materials: dict[str, AnyMaterial] = {}
-        self._made: dict[tuple[int | None, bool, Maps], Surface] = {}
+        self._made: dict[tuple[int | None, bool], Surface] = {}
         self._named: dict[str, str] = {}
         self._files: dict[int, str] = {}
 
@@ -106,30 +105,22 @@ class Surfaces:
         found: Material = self.reading.one("materials", index)
         return found
 
-    def surface(self, index: int | None, coloured: bool, maps: Maps = ()) -> Surface:
-        """A material, None for the default one;  coloured: for a primitive with vertex colours;
-        maps: for a piece of one, of other sets of texture coordinates."""
-        key = index, coloured, maps
+    def surface(self, index: int | None, coloured: bool) -> Surface:
+        """A material, None for the default one;  coloured: for a primitive with vertex colours."""
+        key = index, coloured
         if key not in self._made:
-            self._made[key] = self._make(index, coloured, dict(maps))
+            self._made[key] = self._make(index, coloured)
         return self._made[key]
 
-    def _make(self, index: int | None, coloured: bool, maps: dict[int, Map]) -> Surface:
+    def _make(self, index: int | None, coloured: bool) -> Surface:
         material = self._material(index)
         where = f"materials[{index}]"
-        uv_set = next(iter(self.uv_sets(index)), None)
+        sets = self.uv_sets(index)
 
         def image(info: TextureInfo | None, **fields: Any) -> str | None:
             if info is None:
                 return None
-            if info.uv_set != uv_set and info.uv_set not in maps:
-                self.reading.lack(
-                    f"{where} has textures by TEXCOORD_{uv_set} and TEXCOORD_{info.uv_set}; "
-                    f"expected one set of texture coordinates, or at most {MOST_PIECES} affine "
-                    "maps between them"
-                )
-                return None
-            return self.bitmap(info, by=maps.get(info.uv_set), **fields)
+            return self.bitmap(info, uv_set=sets.index(info.uv_set), **fields)
 
         def number(info: TextureInfo | None, factor: float, channel: Channel) -> float | str:
             name = image(info, channel=channel, scale=factor) if factor > 0.0 else None
@@ -251,10 +242,10 @@ class Surfaces:
         encoding: Encoding = "raw",
         scale: float = 1.0,
         cutoff: float | None = None,
-        by: Map | None = None,
+        uv_set: int = 0,
     ) -> str | None:
         """The name of an image as a texture; None for none: without a source, or for the opacity of
-        an opaque image."""
+        an opaque image.  uv_set: its place among the sets of texture coordinates of our mesh."""
         reading = self.reading
         texture = reading.one("textures", info.index)
         webp = texture.extensions.webp
@@ -275,8 +266,10 @@ class Surfaces:
             along_u, along_v = _WRAPS[sampler.wrap_s], _WRAPS[sampler.wrap_t]
             fields["wrap"] = along_u if along_u == along_v else (along_u, along_v)
             fields["filter"] = _FILTERS[sampler.mag_filter]
-        if info.extensions.transform is not None or by is not None:
-            fields["uv"] = _uv_map(info.extensions.transform or TextureTransform(), by)
+        if info.extensions.transform is not None:
+            fields["uv"] = _uv_map(info.extensions.transform)
+        if uv_set:
+            fields["uv_set"] = uv_set
         return self._texture(
             name if channel == "all" else f"{name}, {channel}",
             Bitmap(
@@ -346,9 +339,8 @@ def _opacity(
     return 1.0 if name is None else name
 
 
-def _uv_map(transform: TextureTransform, by: Map | None) -> UvMap:
-    """KHR_texture_transform, whose v counts from the top, for ours, which counts from the bottom,
-    after a map of ours.
+def _uv_map(transform: TextureTransform) -> UvMap:
+    """KHR_texture_transform, whose v counts from the top, for ours, which counts from the bottom.
 
     It turns uv counter-clockwise as an image shows them, v down, as the extension's text and its
     model TextureTransformTest say; its GLSL, read by columns, turns them the other way.
@@ -358,8 +350,6 @@ def _uv_map(transform: TextureTransform, by: Map | None) -> UvMap:
     theirs = np.array([[a * c, b * s, du], [-a * s, b * c, dv], [0.0, 0.0, 1.0]])
     flip = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
     ours = flip @ theirs @ flip
-    if by is not None:
-        ours = ours @ np.array([*by, (0.0, 0.0, 1.0)])
     if np.array_equal(ours, np.eye(3)):
         return UvMap()
     return UvMap(matrix=ours[:2].tolist())

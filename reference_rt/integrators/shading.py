@@ -1,6 +1,6 @@
 """From a hit to the input of the BSDF: the point, its shading frame, its texture lookups."""
 
-from reference_rt.accel.geometry import Geometry, coordinates, tangents
+from reference_rt.accel.geometry import Geometry, coordinates, on_triangle, tangents
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import Hit, Ray, SurfacePoint
 from reference_rt.core.vec3 import Frame, Vec3, frame_from_normal, to_local
@@ -11,7 +11,7 @@ from reference_rt.materials import Materials, Shading, is_oriented, prepare, use
 from reference_rt.materials.material import oriented_frame
 from reference_rt.materials.textured import evaluate_textures, lookup_cache_size
 from reference_rt.shapes.shape import Tangents
-from reference_rt.textures import At, Textures
+from reference_rt.textures import NOWHERE, At, Textures
 
 _NO_COLOUR = Vec3(-1.0, -1.0, -1.0)
 
@@ -44,7 +44,7 @@ def shade_point(
 def place(scene: KernelScene, m: int, ray: Ray, hit: Hit) -> At:
     """Texture coordinates at a hit for material m; any, if it has no textures."""
     if not uses_textures(scene.materials, m):
-        return At(scene.textures, 0.0, 0.0, _NO_COLOUR)
+        return At(scene.textures, 0.0, 0.0, _NO_COLOUR, NOWHERE)
     return texture_place(scene.textures, scene.geometry, ray, hit)
 
 
@@ -52,9 +52,9 @@ def place(scene: KernelScene, m: int, ray: Ray, hit: Hit) -> At:
 def texture_place(textures: Textures | None, geometry: Geometry, ray: Ray, hit: Hit) -> At:
     """Texture coordinates at a hit; computed only if the scene has textures."""
     if is_absent(textures):
-        return At(textures, 0.0, 0.0, _NO_COLOUR)
+        return At(textures, 0.0, 0.0, _NO_COLOUR, NOWHERE)
     found = coordinates(geometry, ray, hit)
-    return At(textures, found.u, found.v, found.colour)
+    return At(textures, found.u, found.v, found.colour, on_triangle(hit))
 
 
 @kernel

@@ -26,7 +26,7 @@ from reference_rt.core.vec3 import (
 )
 from reference_rt.jit.kernel import kernel
 from reference_rt.shapes.shape import Tangents
-from reference_rt.textures import At, ColourParameter, Palette
+from reference_rt.textures import At, ColourParameter, OnTriangle, Palette
 
 
 class Material(Description):
@@ -156,7 +156,7 @@ class Shading(NamedTuple):
     flat_leaves: FloatArray
 
 
-SCATTER_FLOATS, SCATTER_INTEGERS = 27 * BLOCK, 2 * BLOCK
+SCATTER_FLOATS, SCATTER_INTEGERS = 30 * BLOCK, 2 * BLOCK
 
 
 class ScatterBlock(NamedTuple):
@@ -201,15 +201,17 @@ def asked_in(block: ScatterBlock, j: int, n: Vec3) -> Asked:
 @kernel
 def put_place(block: ScatterBlock, j: int, at: At) -> None:
     """The place for path j's texture lookups; of materials without textures none is stored."""
+    on: Any = at.on
     block.numbers[9 * BLOCK + j], block.numbers[10 * BLOCK + j] = at.u, at.v
     put_vector(block.numbers, 11, j, at.colour)
+    put_vector(block.numbers, 27, j, Vec3(float(on.row), on.u, on.v))
 
 
 @kernel
 def place_in(block: ScatterBlock, j: int, textures: Any) -> At:
     numbers = block.numbers
-    u, v = numbers[9 * BLOCK + j], numbers[10 * BLOCK + j]
-    return At(textures, u, v, vector_of(numbers, 11, j))
+    u, v, on = numbers[9 * BLOCK + j], numbers[10 * BLOCK + j], vector_of(numbers, 27, j)
+    return At(textures, u, v, vector_of(numbers, 11, j), OnTriangle(int(on.x), on.y, on.z))
 
 
 @kernel

@@ -54,11 +54,11 @@ def _textures(name: str, materials: Mapping[str, Material], palette: Palette) ->
     return found.union(*(_textures(base, materials, palette) for base in _bases(material)))
 
 
-def uses_textures(name: str, materials: Mapping[str, Material]) -> bool:
-    """Whether a material uses any texture, also for heights."""
+def textures_of(name: str, materials: Mapping[str, Material]) -> set[str]:
+    """The names of the textures that a material uses, also for heights."""
     material = materials[name]
-    asked = [uses_textures(base, materials) for base in _bases(material)]
-    return bool(texture_names(material)) or any(asked)
+    found = {*texture_names(material).values()}
+    return found.union(*(textures_of(base, materials) for base in _bases(material)))
 
 
 def _bases(material: Material) -> list[str]:
@@ -84,4 +84,4 @@ def evaluate_textures(textured: Textured, m: int, at: At, colours: FloatArray) -
     for s in range(first, first + textured.number[m]):
         k = textured.texture[s]
         colours[3 * k], colours[3 * k + 1], colours[3 * k + 2] = lookup(k, at)
-    return At(CachedLookups(colours), at.u, at.v, at.colour)
+    return At(CachedLookups(colours), at.u, at.v, at.colour, None)

@@ -16,7 +16,7 @@ from reference_rt.materials import Emissive
 from reference_rt.scene.build_geometry import assemble
 from reference_rt.scene.build_lights import light_tables
 from reference_rt.scene.build_materials import material_tables
-from reference_rt.scene.build_textures import texture_tables
+from reference_rt.scene.build_textures import texture_tables, with_uv_sets
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes.meshes.triangle_table import Triangles, shared, spread
 
@@ -63,7 +63,8 @@ def build_tables(scene: SceneModel) -> SceneTables:
             geometry = _with_triangles(geometry, spread)  # which may be numbered as lights
         materials = material_tables(scene, palette, _has_material(geometry, numbers[None]))
         lights = light_tables(scene, geometry, palette)
-        geometry = _with_triangles(geometry, shared)
+        textures = with_uv_sets(scene, textures, geometry.shapes.triangles)
+        geometry = _with_triangles(geometry, _as_in_scenes)
         return SceneTables(geometry, materials, lights, textures)
 
 
@@ -72,6 +73,10 @@ def _with_triangles(geometry: Geometry, change: Callable[[Triangles], Triangles]
     if shapes.triangles is None:
         return geometry
     return geometry._replace(shapes=shapes._replace(triangles=change(shapes.triangles)))
+
+
+def _as_in_scenes(triangles: Triangles) -> Triangles:
+    return shared(triangles)._replace(more_uvs=None)
 
 
 def _has_material(geometry: Geometry, number: int) -> bool:

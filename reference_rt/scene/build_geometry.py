@@ -10,14 +10,16 @@ from reference_rt.accel.geometry import Geometry
 from reference_rt.accel.leaf import SOLID
 from reference_rt.core.arrays import Bounds, FloatArray, IntArray
 from reference_rt.core.transform import identity
+from reference_rt.materials.textured import textures_of
 from reference_rt.scene.build_hierarchies import ExpandedInstance, HierarchyBuilder, TableRows
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes import TABLES, TRIANGLE, Shape, Shapes, csg
 from reference_rt.shapes.csg import NOT, OR, Parts, Solid, Solids
 from reference_rt.shapes.instances import Instance, composed
 from reference_rt.shapes.meshes.topology import describe_boundary
-from reference_rt.shapes.meshes.triangle_table import shared
+from reference_rt.shapes.meshes.triangle_table import Triangles, more_sets, shared
 from reference_rt.shapes.shape import TabulationContext, outward
+from reference_rt.textures.tables import largest_uv_set
 from reference_rt.util.memory import give_back
 
 _CODES = {table: code for code, _, table, _ in TABLES}
@@ -103,11 +105,14 @@ class _Assembly:
         # (kind, row, number of the tree) of each operand.
         self.operands: list[tuple[int, int, int]] = []
         self.expansions: dict[str, tuple[IntArray, FloatArray]] = {}
+        self.uv_sets = _uv_sets(scene, materials)
 
     def add(self, shape: Shape, place: TabulationContext) -> TableRows:
         """Add a primitive shape's rows to their table."""
         table = shape.tabulate(place)
         code = _CODES[type(table)]
+        if place.material in self.uv_sets:
+            self.check_uv_sets(table, place.material)
         first = self.rows[code]
         self.rows[code] += len(table.face)
         self.tables[code].append(table)
@@ -121,6 +126,16 @@ class _Assembly:
                 raise self.scene.error(
                     "its coordinates overflow; expected finite numbers",
                     *self.path_of(int(part.owner[0])),
+                )
+
+    def check_uv_sets(self, table: Any, material: int) -> None:
+        """Raise ValueError for a shape without the texture coordinates of its material."""
+        sets = more_sets(table) if isinstance(table, Triangles) else 0
+        for texture, number in self.uv_sets[material].items():
+            if number > sets:
+                raise ValueError(
+                    f"the texture '{texture}' of its material has uv_set {number}; expected a mesh "
+                    f"whose 'more_uv' has {number} sets of texture coordinates or more, got {sets}"
                 )
 
     def member(self, shape: Shape, owner: int, material: str | None) -> TableRows:
@@ -263,6 +278,19 @@ class _Assembly:
             trees.insert(0, np.array([len(self.trees) - 1]))
             maps.insert(0, identity()[None])
         return np.concatenate(trees), np.concatenate(maps)
+
+
+def _uv_sets(scene: SceneModel, materials: dict[str | None, int]) -> dict[int, dict[str, int]]:
+    """By the row of a material: its textures by sets of texture coordinates that meshes may lack,
+    and the largest number of these."""
+    numbers = {name: largest_uv_set(name, scene.textures) for name in scene.textures}
+    if not any(numbers.values()):
+        return {}
+    of_materials = {
+        materials[name]: {of: numbers[of] for of in textures_of(name, scene.materials)}
+        for name in scene.materials
+    }
+    return {row: found for row, found in of_materials.items() if any(found.values())}
 
 
 def _type_of(shape: Shape) -> str:

@@ -17,7 +17,7 @@ from reference_rt.materials.nested.paths import (
     scattering_of,
     traits,
 )
-from reference_rt.materials.textured import textured_table, uses_textures
+from reference_rt.materials.textured import textured_table, textures_of
 from reference_rt.scene.model import SceneModel
 from reference_rt.textures import Palette
 from reference_rt.textures.parameter import join
@@ -56,7 +56,7 @@ def material_tables(scene: SceneModel, palette: Palette, default: bool) -> Mater
         rows.append(row)
         found_traits.append(traits(paths, materials))
     smooth, uses_u_lobe, behind, oriented = np.ascontiguousarray(np.array(found_traits, np.int64).T)
-    asks = np.array([uses_textures(name, materials) for name in materials], np.int64)
+    asks = np.array([bool(textures_of(name, materials)) for name in materials], np.int64)
     return Materials(
         kind=np.array(kinds),
         row=np.array(rows),

@@ -6,9 +6,11 @@ from typing import Any
 import numpy as np
 
 from reference_rt.scene.model import SceneModel
+from reference_rt.shapes.meshes.triangle_table import Triangles
 from reference_rt.textures import TABLES as TEXTURE_TABLES
 from reference_rt.textures import Palette, Product, Textures, bitmap, product
 from reference_rt.textures.parameter import joined
+from reference_rt.textures.tables import UvSets
 
 
 def texture_tables(scene: SceneModel) -> tuple[Textures | None, Palette]:
@@ -49,3 +51,14 @@ def texture_tables(scene: SceneModel) -> tuple[Textures | None, Palette]:
     }
     textures = Textures(np.array(kinds), np.array(rows), np.array(maps), **tables)
     return textures, Palette(numbers, greatest)
+
+
+def with_uv_sets(
+    scene: SceneModel, textures: Textures | None, triangles: Triangles | None
+) -> Textures | None:
+    """The textures with the sets of texture coordinates that they use beside the meshes' own."""
+    if textures is None or triangles is None or triangles.more_uvs is None:
+        return textures
+    numbers = np.array([texture.uv_set for texture in scene.textures.values()])
+    sets = UvSets(numbers, triangles.more_uvs) if numbers.any() else None
+    return textures._replace(sets=sets)

@@ -18,14 +18,15 @@ from reference_rt.core.model import AS_DIGEST, Description, as_linear, name_of
 from reference_rt.integrators import AnyIntegrator, Direct
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.lights import TABLES as LIGHT_TABLES
-from reference_rt.lights import Ambient, AnyLight, Constant, EnvironmentMap
-from reference_rt.materials import AnyMaterial, Emissive, Material, Wrapper
+from reference_rt.lights import Ambient, AnyLight, Constant, EnvironmentMap, Projector
+from reference_rt.materials import AnyMaterial, Bump, Emissive, Material, NormalMap, Wrapper
 from reference_rt.materials.nested.paths import material_paths
 from reference_rt.sampling import AnySampler, Grid, Sobol
 from reference_rt.shapes import Shape
 from reference_rt.shapes.csg import AnyShape, Solid
 from reference_rt.shapes.instances import Instance
 from reference_rt.textures import AnyTexture, Product, texture_names
+from reference_rt.textures.tables import largest_uv_set
 from reference_rt.util import yaml_text
 from reference_rt.util.errors import (
     ReferenceUnavailableError,
@@ -45,6 +46,15 @@ which each operation takes two."""
 
 _NAMES = (str, str | None)
 """The types of fields that only name something."""
+
+
+_ALONG = "expected 0: tilted normals follow the mesh's 'uv', along which its tangents are"
+_OWN_UV = {
+    NormalMap: _ALONG,
+    Bump: _ALONG,
+    Projector: "expected 0: an image that a light projects has no mesh",
+}
+"""What has textures by no other coordinates than the surface's own, and why."""
 
 
 def no_such(kind: str, name: str, known: Iterable[str], instead: str = "") -> str:
@@ -158,6 +168,8 @@ class SceneModel(Description):
                 instead = "" if only_names else f"numbers{as_linear(texture)}, or "
                 message = no_such("texture", texture, self.textures, instead)
                 raise SceneError(message, (*path, *field))
+            if (why := _OWN_UV.get(type(part))) and largest_uv_set(texture, self.textures):
+                raise SceneError(f"'{texture}' has another 'uv_set' than 0; {why}", (*path, *field))
 
     def _check_parts(self, name: str, material: Material) -> None:
         """Check that the textures and materials that a material names exist and fit."""

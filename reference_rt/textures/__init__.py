@@ -8,7 +8,9 @@ range; and, where it depends on (u, v), `lookup(table, row, u, v)`, after the te
 To add a texture: its module, and its lines in `tables.py`.
 """
 
+from reference_rt.textures.lookup import NOWHERE as NOWHERE
 from reference_rt.textures.lookup import At as At
+from reference_rt.textures.lookup import OnTriangle as OnTriangle
 from reference_rt.textures.parameter import NO_TEXTURES as NO_TEXTURES
 from reference_rt.textures.parameter import ColourParameter as ColourParameter
 from reference_rt.textures.parameter import Colours as Colours

@@ -13,7 +13,7 @@ from reference_rt.textures.texture import MayBeTexture, Texture
 
 class Product(Texture):
     """The product of textures and a colour, such as an image times vertex colours; its own `uv` map
-    is ignored."""
+    and `uv_set` are ignored."""
 
     EXAMPLES: ClassVar[Examples] = (
         {"of": ("texture",)},

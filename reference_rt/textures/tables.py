@@ -4,6 +4,7 @@ A new texture has a line in `AnyTexture` and one in `Textures`; all else follows
 Its import as itself makes it a name of `reference_rt.textures`.
 """
 
+from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple, get_args
 
 from pydantic import Field
@@ -19,9 +20,18 @@ from reference_rt.textures.vertex_colours import VertexColours as VertexColours
 AnyTexture = Annotated[Checker | Bitmap | VertexColours | Product, Field(discriminator="type")]
 
 
+class UvSets(NamedTuple):
+    """number (n,): the set of texture coordinates of each texture, 0 for the surface's own;
+    corners (m, 3 2 k): those of the sets 1 to k, see `Triangles.more_uvs`."""
+
+    number: IntArray
+    corners: FloatArray
+
+
 class Textures(NamedTuple):
     """kind (n,), row (n,): the table and row of each texture;  uv (n, 6): its map, see `UvMap`;  a
-    table for each type, None for types that the scene lacks."""
+    table for each type, None for types that the scene lacks;  sets: None where all textures have
+    the surface's own coordinates."""
 
     kind: IntArray
     row: IntArray
@@ -30,6 +40,7 @@ class Textures(NamedTuple):
     bitmaps: Annotated[bitmap.Bitmaps | None, bitmap]
     vertex_colours: Annotated[vertex_colours.VertexColourTable | None, vertex_colours]
     products: Annotated[product.Products | None, product] = None
+    sets: UvSets | None = None
 
 
 TABLES: tuple[tuple[int, str, Any, Any], ...] = tuple(
@@ -40,5 +51,14 @@ TABLES: tuple[tuple[int, str, Any, Any], ...] = tuple(
 
 _CODES = {module: code for code, _, _, module in TABLES}
 CHECKER, BITMAP, PRODUCT = _CODES[checker], _CODES[bitmap], _CODES[product]
+
+
+def largest_uv_set(name: str, textures: Mapping[str, Any]) -> int:
+    """The largest number of a set of texture coordinates that a texture depends on."""
+    texture = textures[name]
+    if isinstance(texture, Product):
+        return max(largest_uv_set(of, textures) for of in texture.of)
+    return 0 if isinstance(texture, VertexColours) else int(texture.uv_set)
+
 
 by_code = ByCode(Textures)

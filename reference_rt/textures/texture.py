@@ -78,6 +78,8 @@ class Texture(Description):
 
     uv: UvMap = UvMap()
     """The map from the surface's coordinates (u, v) to the texture's.  Default: none."""
+    uv_set: Annotated[int, Field(ge=0)] = 0
+    """Which of a mesh's texture coordinates these are: 0 its `uv`, k the set k of `more_uv`."""
 
     def tabulate(self, folder: Any) -> Any:
         """One row of the texture's table.  Raises ValueError (what is wrong, what was expected)."""

@@ -13,7 +13,7 @@ from reference_rt.textures.texture import Texture
 
 
 class VertexColours(Texture):
-    """The colours of a mesh's vertices, interpolated; the `uv` map is ignored."""
+    """The colours of a mesh's vertices, interpolated; the `uv` map and the `uv_set` are ignored."""
 
     EXAMPLES: ClassVar[Examples] = ({}, {"without": (0.2, 0.4, 0.6), "scale": 0.5})
     type: Literal["vertex_colours"] = "vertex_colours"

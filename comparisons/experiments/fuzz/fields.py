@@ -221,6 +221,7 @@ RANGES: dict[str, Callable[[Draw], Any]] = {
     "cutoff_angle": lambda draw: draw.between(25.0, 80.0),
     "beam_width": lambda draw: draw.between(5.0, 19.9),
     "rotate": lambda draw: draw.between(-180.0, 180.0),
+    "uv_set": lambda _draw: 0,  # not all shapes of a material have another
     "uv.scale": lambda draw: draw.pick((0.5, 1.0, 2.0, 5.0, -1.0)),
     "bump.scale": lambda draw: draw.between(0.02, 0.3),
     "bitmap.scale": lambda draw: draw.pick((1.0, 0.5, 1.0)),

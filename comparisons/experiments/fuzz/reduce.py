@@ -220,7 +220,7 @@ def fewer_vertices(scene: Data) -> Iterator[Data]:
         smaller = copy_of(scene)
         mesh = _shape(smaller, which)
         mesh["faces"] = [[number[v] for v in face] for face in faces]
-        for field in ("vertices", "normals", "uv", "colours"):
+        for field in ("vertices", "normals", "uv", "more_uv", "colours"):
             if field in mesh:
                 mesh[field] = [mesh[field][v] for v in used]
         yield smaller

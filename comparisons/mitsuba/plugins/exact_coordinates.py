@@ -24,6 +24,9 @@ of constant z, as on the diagonals of a saddle, the tangents of a mesh have any 
 This plugin gives the nested material the surface's own uv and derivatives, computed at the point
 that was hit, and the shading frame whose x axis follows dp/du.
 It is not for instances, in which it does not know the place of the surface.
+
+A texture by a mesh's further texture coordinates, of which Mitsuba has none: attributes of vertices
+in their place, `{"type": "texture_of_set"}`.
 """
 
 import math
@@ -365,7 +368,48 @@ def _register_coordinates(mi: Any) -> None:
     mi.register_bsdf("exact_coordinates", ExactCoordinates)
 
 
+# ---- further texture coordinates of meshes -------------------------------------------------------
+
+
+def _register_sets(mi: Any) -> None:
+    class TextureOfSet(mi.Texture):  # type: ignore[misc]
+        """The texture `of` by other coordinates than the surface's: those that a mesh has at its
+        vertices as the attribute with this name."""
+
+        def __init__(self, properties: Any) -> None:
+            super().__init__(properties)
+            self.of = properties["of"]
+            self.attribute = str(properties["attribute"])
+
+        def there(self, si: Any, active: Any) -> Any:
+            found = mi.SurfaceInteraction3f(si)
+            uv = si.shape.eval_attribute_3(self.attribute, si, active)
+            found.uv = mi.Point2f(uv.x, uv.y)
+            return found
+
+        def eval(self, si: Any, active: Any = True) -> Any:
+            return self.of.eval(self.there(si, active), active)
+
+        def eval_3(self, si: Any, active: Any = True) -> Any:
+            return self.of.eval_3(self.there(si, active), active)
+
+        def eval_1(self, si: Any, active: Any = True) -> Any:
+            return self.of.eval_1(self.there(si, active), active)
+
+        def mean(self) -> Any:
+            return self.of.mean()
+
+        def is_spatially_varying(self) -> bool:
+            return True
+
+        def to_string(self) -> str:
+            return f"TextureOfSet[{self.attribute}, {self.of}]"
+
+    mi.register_texture("texture_of_set", TextureOfSet)
+
+
 def register(mi: Any) -> None:
-    """Define both materials for the current variant, and register them."""
+    """Define these for the current variant, and register them."""
     _register_bump(mi)
     _register_coordinates(mi)
+    _register_sets(mi)

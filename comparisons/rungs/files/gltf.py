@@ -1,8 +1,10 @@
 """The numbers of a glTF file against a second reading of its JSON, with glTF's own defaults.
 
 Mitsuba reads no glTF: it gets the scene that we read.  What each surface, lamp and camera is made
-of is compared here; where meshes stand is not."""
+of is compared here, and by which texture coordinates each image is shown; where meshes stand is
+not."""
 
+import base64
 import json
 import math
 import struct
@@ -10,6 +12,10 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+import numpy.typing as npt
 
 from comparisons.rungs.files.findings import Findings, text
 
@@ -46,11 +52,12 @@ Value = tuple[str, Any, Any]
 def check_gltf(path: Path, scene: Any, findings: Findings) -> list[str]:
     """What the scene has otherwise than the file;  path: that it was read from."""
     try:
-        root = _json(path)
+        root, binary = _parts(path)
+        shown = [*_coordinates(root, _Buffers(root, binary, path.parent), scene)]
     except (OSError, ValueError, struct.error):  # it was changed after it was read
         findings.unread.append(f"{path.suffix.lower()} that cannot be read again")
         return []
-    values = [*_materials(root, scene), *_lamps(root, scene), *_camera(root, scene)]
+    values = [*_materials(root, scene), *shown, *_lamps(root, scene), *_camera(root, scene)]
     findings.count("values of glTF", len(values))
     return [
         f"{place}: {path.name} says {_words(said)}, the rendered scene has {_words(ours)}"
@@ -59,12 +66,13 @@ def check_gltf(path: Path, scene: Any, findings: Findings) -> list[str]:
     ]
 
 
-def _json(path: Path) -> Any:
-    content = path.read_bytes()
+def _parts(path: Path) -> tuple[Any, bytes]:
+    """The JSON, and the bytes of the binary chunk."""
+    content, binary = path.read_bytes(), b""
     if content[:4] == b"glTF":
         (length,) = struct.unpack("<I", content[12:16])
-        content = content[20 : 20 + length]
-    return json.loads(content)
+        content, binary = content[20 : 20 + length], content[28 + length :]
+    return json.loads(content), binary
 
 
 def _get(part: Any, place: str) -> Any:
@@ -162,6 +170,111 @@ def _factor(ours: Any, said: Any, scene: Any) -> Any:
     if isinstance(said, list):
         return texture.factor if texture.type == "product" else (1.0, 1.0, 1.0)
     return texture.scale
+
+
+# ---- texture coordinates -------------------------------------------------------------------------
+
+SLOTS = (
+    (f"{PBR}/baseColorTexture", "gltf_pbr", "base_color"),
+    (f"{PBR}/metallicRoughnessTexture", "gltf_pbr", "roughness"),
+    (f"{PBR}/metallicRoughnessTexture", "gltf_pbr", "metallic"),
+    (f"{SPECULAR}/specularTexture", "gltf_pbr", "specular"),
+    (f"{SPECULAR}/specularColorTexture", "gltf_pbr", "specular_color"),
+    ("normalTexture", "normal_map", "normals"),
+    ("emissiveTexture", "emissive", "radiance"),
+)
+"""Where an image is in glTF, and in which field of which of our materials."""
+
+Pairs = npt.NDArray[np.float64]
+
+COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5126: "<f4"}
+
+
+class _Buffers:
+    """The buffers of a file, by their numbers."""
+
+    def __init__(self, root: Any, binary: bytes, folder: Path) -> None:
+        self.root, self.binary, self.folder = root, binary, folder
+
+    def data(self, number: int) -> bytes:
+        uri = self.root["buffers"][number].get("uri")
+        if uri is None:
+            return self.binary
+        if uri.startswith("data:"):
+            return base64.b64decode(uri.partition(",")[2])
+        return (self.folder / unquote(uri)).read_bytes()
+
+    def pairs(self, number: int) -> Pairs | None:
+        """An accessor's rows (n, 2); None where they are sparse, compressed or without data."""
+        accessor = self.root["accessors"][number]
+        if "sparse" in accessor or "bufferView" not in accessor:
+            return None
+        view = self.root["bufferViews"][accessor["bufferView"]]
+        if "extensions" in view:
+            return None
+        kind = np.dtype(COMPONENTS[accessor["componentType"]])
+        begin = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        steps = (view.get("byteStride", 2 * kind.itemsize), kind.itemsize)
+        size, data = (accessor["count"], 2), self.data(view["buffer"])
+        rows = np.ndarray(size, kind, data, begin, steps).astype(np.float64)
+        if kind.kind != "f" and accessor.get("normalized", False):
+            rows = np.maximum(rows / np.iinfo(kind).max, -1.0)
+        return rows
+
+
+def _coordinates(root: Any, buffers: _Buffers, scene: Any) -> Iterator[Value]:
+    """Of each image of a material and each mesh that it is on, the pair that differs most."""
+    meshes = [*scene.shapes, *(one for some in scene.groups.values() for one in some)]
+    primitives = [one for mesh in root.get("meshes", []) for one in mesh["primitives"]]
+    materials = root.get("materials", [])
+    names = [m.get("name") or f"material {k}" for k, m in enumerate(materials)]
+    for k, name in enumerate(names):
+        if names.count(name) > 1 or name not in scene.materials:
+            continue
+        on = [one for one in meshes if one.type == "mesh" and one.material == name]
+        parts = [p for p in primitives if p.get("material") == k and p.get("mode", 4) > 3]
+        layers = _layers(scene, name)
+        for place, layer, field in SLOTS:
+            info = _get(materials[k], place)
+            images = _images(getattr(layers.get(layer), field, None), scene)
+            if info is None or not images:
+                continue
+            said = [one for p in parts if (one := _said(p, info, buffers)) is not None]
+            for mesh in on:
+                ours = _of_set(mesh, images[0].uv_set)
+                rows = [one for one in said if ours is not None and len(one) == len(ours)]
+                if ours is not None and len(rows) == len(parts):
+                    off = [np.abs(one - ours).max(axis=1) for one in rows]
+                    best = min(range(len(rows)), key=lambda n: float(off[n].max()))
+                    most = int(off[best].argmax())
+                    where = f"materials[{k}] '{name}', {place}, coordinates {most}"
+                    yield where, rows[best][most].tolist(), ours[most].tolist()
+
+
+def _said(primitive: Any, info: Any, buffers: _Buffers) -> Pairs | None:
+    """The coordinates (n, 2) of an image on a primitive, v from the bottom."""
+    own = _get(info, "extensions/KHR_texture_transform/texCoord")
+    name = f"TEXCOORD_{info.get('texCoord', 0) if own is None else own}"
+    if "extensions" in primitive or name not in primitive["attributes"]:
+        return None
+    rows = buffers.pairs(primitive["attributes"][name])
+    return None if rows is None else rows * [1.0, -1.0] + [0.0, 1.0]
+
+
+def _of_set(mesh: Any, uv_set: int) -> Pairs | None:
+    if uv_set == 0:
+        return mesh.uv  # type: ignore[no-any-return]
+    return mesh.more_uv[:, 2 * uv_set - 2 : 2 * uv_set]  # type: ignore[no-any-return]
+
+
+def _images(name: Any, scene: Any) -> list[Any]:
+    """The bitmaps of a parameter."""
+    if not isinstance(name, str):
+        return []
+    texture = scene.textures[name]
+    if texture.type == "product":
+        return [one for of in texture.of for one in _images(of, scene)]
+    return [texture] if texture.type == "bitmap" else []
 
 
 # ---- lamps and cameras ---------------------------------------------------------------------------

@@ -78,11 +78,15 @@ def _compare(where: str, table: Any, second: Corners, m: affine.Affine, findings
         if second.bent is not None:
             bent = (second.bent[kept][:, order] + 2.0**-46) * condition
     uv = second.uv
-    of_uv = 4.0 * FLOAT32 * float(np.abs(uv).max(initial=1.0)) if uv is not None else 0.0
+    of_uv, of_more = (
+        4.0 * FLOAT32 * float(np.abs(c).max(initial=1.0)) if c is not None else 0.0
+        for c in (uv, second.more_uv)
+    )
     for column, what, ours, theirs, most in (
         ("points", "is at", table.vertices, None, rounding),
         ("normals", "has the normal", table.normals, normals, bent),
         ("uv", "has the uv", table.uvs, uv, of_uv),
+        ("more_uv", "has the uv of further sets", table.more_uvs, second.more_uv, of_more),
         ("colours", "has the colour", table.colours, second.colours, 4.0 * FLOAT32),
     ):
         expected = corners[kept] if column == "points" else None

@@ -128,7 +128,7 @@ class Seen:
         if isinstance(texture, VertexColours):
             mixed = _vertex_colours(looked)
             return np.where(mixed[:, :1] >= 0.0, texture.scale * mixed, texture.without)
-        return self._looked_up(name, looked.uv)
+        return self._looked_up(name, _coordinates(looked, texture.uv_set))
 
     def _shown(self, name: str | None) -> tuple[float, float, float] | str:
         """The colour of a material; of a nested one, that of its first base."""
@@ -145,7 +145,8 @@ class Seen:
 
         mi = mitsuba()
         if name not in self._textures:
-            described = translate_texture(self._scene.textures[name], name, self._context, Use())
+            texture = self._scene.textures[name].model_copy(update={"uv_set": 0})
+            described = translate_texture(texture, name, self._context, Use())
             self._textures[name] = mi.load_dict(described)
         texture = self._textures[name]
 
@@ -163,11 +164,25 @@ def _vertex_colours(looked: _Looked) -> FloatArray:
     table = looked.leaf.table
     if looked.leaf.field != "triangles" or table.colours is None:
         return none
-    row = looked.leaf.row_of(looked.primitive)
-    weights = _barycentrics(table.vertices[row], looked.local)
-    corners = table.colours[row].reshape(-1, 3, 3)
-    mixed = np.einsum("nk,nki->ni", weights, corners)
+    mixed, corners = _mixed(looked, table.colours)
     return np.where(corners[:, :1, 0] >= 0.0, mixed, none)
+
+
+def _coordinates(looked: _Looked, uv_set: int) -> FloatArray:
+    """Texture coordinates (n, 2) of a set."""
+    table = looked.leaf.table
+    if uv_set == 0 or looked.leaf.field != "triangles" or table.more_uvs is None:
+        return looked.uv
+    mixed, _ = _mixed(looked, table.more_uvs)
+    return mixed[:, 2 * uv_set - 2 : 2 * uv_set]
+
+
+def _mixed(looked: _Looked, at_corners: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """What vertices have (faces, 3 k), interpolated (n, k), and at the corners (n, 3, k)."""
+    row = looked.leaf.row_of(looked.primitive)
+    weights = _barycentrics(looked.leaf.table.vertices[row], looked.local)
+    corners = at_corners[row].reshape(len(row), 3, -1)
+    return np.einsum("nk,nki->ni", weights, corners), corners
 
 
 def _barycentrics(vertices: FloatArray, p: FloatArray) -> FloatArray:

@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from reference_rt import shapes as any_shape
-from reference_rt.accel.geometry import colour
+from reference_rt.accel.geometry import colour, on_triangle
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import Hit, Ray, SurfacePoint
 from reference_rt.core.vec3 import Vec3, dot
@@ -13,7 +13,7 @@ from reference_rt.jit.links import is_absent
 from reference_rt.lights.light import NO_LIGHT, LightSample
 from reference_rt.shapes import Shapes
 from reference_rt.shapes.shape import LightPoint
-from reference_rt.textures import At, Colours, Textures, colour_at
+from reference_rt.textures import NOWHERE, At, Colours, Textures, colour_at
 
 
 class Areas(NamedTuple):
@@ -70,10 +70,10 @@ def _texture_coordinates(
     """The texture coordinates at a point q of light i."""
     none = Vec3(-1.0, -1.0, -1.0)
     if is_absent(textures):
-        return At(textures, 0.0, 0.0, none)
+        return At(textures, 0.0, 0.0, none, NOWHERE)
     hit = Hit(1.0, areas.kind[i], areas.row[i], q.u, q.v, -1)
     u, v = any_shape.uv(shapes, Ray(p, w, math.inf), hit)
-    return At(textures, u, v, colour(shapes, hit, none))
+    return At(textures, u, v, colour(shapes, hit, none), on_triangle(hit))
 
 
 @kernel

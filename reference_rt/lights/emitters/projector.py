@@ -16,6 +16,7 @@ from reference_rt.lights.light import LightSample, from_position
 from reference_rt.lights.selection.bounds import LightBounds, of_points
 from reference_rt.textures import (
     NO_TEXTURES,
+    NOWHERE,
     At,
     ColourParameter,
     Colours,
@@ -84,7 +85,7 @@ def colour_in(
     if not place.z > 0.0:
         return Vec3(1.0, 1.0, 1.0)
     none = Vec3(-1.0, -1.0, -1.0)
-    at = At(textures, 0.5 + 0.5 * place.x, 0.5 + 0.5 * place.y, none)
+    at = At(textures, 0.5 + 0.5 * place.x, 0.5 + 0.5 * place.y, none, NOWHERE)
     return colour_at(images.colour, i, at)
 
 

@@ -50,7 +50,7 @@ from reference_rt.textures import At, Colours, Palette, colour_at
 
 _NODES = 128
 
-_NOWHERE = At(None, 0.0, 0.0, Vec3(0.0, 0.0, 0.0))
+_NOWHERE = At(None, 0.0, 0.0, Vec3(0.0, 0.0, 0.0), None)
 
 _LEAST_MIRRORED = 1e-3
 """The least specular reflectance that lobe probabilities assume: more than the error of T."""

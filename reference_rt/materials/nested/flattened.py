@@ -41,7 +41,7 @@ from reference_rt.materials.nested.tilted import (
     shadowing_alpha2,
 )
 from reference_rt.shapes.shape import Tangents
-from reference_rt.textures import At, Numbers, Palette, Textures, number_at
+from reference_rt.textures import At, Numbers, OnTriangle, Palette, Textures, number_at
 from reference_rt.textures.parameter import join
 
 
@@ -172,7 +172,8 @@ def prepare(flat_leaves: Any, shading: Shading, at: At) -> None:
     if is_absent(flat_leaves):
         return
     textures: Any = at.textures
-    _prepare(flat_leaves, shading, textures, at.u, at.v, at.colour)
+    on: Any = at.on
+    _prepare(flat_leaves, shading, textures, at.u, at.v, at.colour, on)
 
 
 @flattened_materials.operation
@@ -183,8 +184,9 @@ def _prepare(
     u: float,
     v: float,
     colour: Vec3,
+    on: OnTriangle,
 ) -> None:
-    at = At(textures, u, v, colour)
+    at = At(textures, u, v, colour, on)
     m = shading.point.material
     for k in range(flat_leaves.number[m]):
         found = _leaf_at_hit(flat_leaves, flat_leaves.first[m] + k, shading, at)

@@ -29,7 +29,7 @@ from reference_rt.scene.build import BuiltScene
 from reference_rt.scene.model import no_such
 from reference_rt.shapes import Sphere
 from reference_rt.shapes.shape import Tangents
-from reference_rt.textures import At, Textures
+from reference_rt.textures import NOWHERE, At, Textures
 from reference_rt.util.errors import Brief, SceneError
 
 
@@ -59,7 +59,7 @@ def _shading(
     zero, z = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 1.0)
     frame = Frame(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), z)
     tangents = Tangents(Vec3(at[5], at[6], at[7]), Vec3(at[8], at[9], at[10]))
-    place = At(textures, at[0], at[1], Vec3(at[2], at[3], at[4]))
+    place = At(textures, at[0], at[1], Vec3(at[2], at[3], at[4]), NOWHERE)
     looked = evaluate_textures(materials.textured, m, place, kept)
     point = SurfacePoint(zero, z, z, 0.0, m, -1)
     flat_leaves = kept[lookup_cache_size(materials.textured) :]

@@ -9,7 +9,7 @@ from pydantic import model_validator
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.diagnosis import FieldError
-from reference_rt.core.model import AS_DIGEST, Examples, Floats2, Floats3, Integers3
+from reference_rt.core.model import AS_DIGEST, Examples, Floats2, Floats2s, Floats3, Integers3
 from reference_rt.core.transform import IDENTITY, Affine
 from reference_rt.shapes.meshes.files import MeshData, read_mesh
 from reference_rt.shapes.meshes.files.data import RawMesh, checked
@@ -45,12 +45,13 @@ class Mesh(Shape):
             **_TETRAHEDRON,
             "normals": ((-1, -1, -1), (1, 0, 0), (0, 1, 0), (0, 0, 1)),
             "uv": ((0, 0), (1, 0), (0, 1), (1, 1)),
+            "more_uv": ((0, 0), (0, 2), (3, 0), (3, 2)),
             "colours": ((1, 1, 1), (1, 0, 0), (0, 1, 0), (0, 0, 1)),
         },
         {**_TETRAHEDRON, "normals": ((-1, -1, -1), *np.eye(3)), "face_normals": True},
     )
     array_fields: ClassVar[frozenset[str]] = frozenset(
-        ("vertices", "faces", "normals", "uv", "colours")
+        ("vertices", "faces", "normals", "uv", "more_uv", "colours")
     )
 
     type: Literal["mesh"] = "mesh"
@@ -66,6 +67,9 @@ class Mesh(Shape):
     normals are geometric."""
     uv: Floats2 | None = None
     """Texture coordinates (n, 2); (0, 0) is the lower left corner of an image."""
+    more_uv: Floats2s | None = None
+    """Further sets of texture coordinates (n, 2 k): of each vertex u and v of set 1, then of set 2
+    and so on, for textures with that `uv_set`.  Default: none."""
     colours: Floats3 | None = None
     """Vertex colours (n, 3), linear sRGB of at least 0."""
     face_normals: bool = False
@@ -106,7 +110,16 @@ class Mesh(Shape):
             return read_mesh(folder / self.file)
         assert self.vertices is not None
         assert self.faces is not None
-        return checked(RawMesh(self.vertices, self.faces, self.normals, self.uv, self.colours))
+        return checked(
+            RawMesh(
+                self.vertices,
+                self.faces,
+                self.normals,
+                self.uv,
+                self.colours,
+                more_uv=self.more_uv,
+            )
+        )
 
     def tabulate(self, context: TabulationContext) -> Triangles:
         m = self.map_in(context)
@@ -131,6 +144,7 @@ class Mesh(Shape):
             )
         normals = self._normals(data, faces, m)
         uvs, colours = _at_corners(data.uv, faces), _at_corners(data.colours, faces)
+        more_uvs = _at_corners(data.more_uv, faces)
         del data  # a large mesh is held once
         is_used = np.zeros(len(points), bool)
         is_used[faces] = True
@@ -140,7 +154,9 @@ class Mesh(Shape):
             points = points[is_used]
             corners = (np.cumsum(is_used, dtype=np.int32) - np.int32(1))[faces]
         del faces
-        return facing(m, table_of(points, corners, context, normals, uvs, colours, numbers))
+        return facing(
+            m, table_of(points, corners, context, normals, uvs, colours, more_uvs, numbers)
+        )
 
     def makes_normals(self, data: MeshData) -> bool:
         """Whether the mesh has vertex normals that its data do not have."""

@@ -17,8 +17,9 @@ class Triangles(NamedTuple):
     """n triangles: points (m, 3), and corners (n, 3), int32, the rows of v0 v1 v2 in these; unit
     vertex normals (n, 9), texture coordinates (n, 6) and linear sRGB colours (n, 9; -1 for none) of
     the vertices, each None if no triangle has any; the columns of `placement.owners`, int32, with
-    the number in the shape or in the mesh's file as face.  Of a scene, owner, material and light
-    have one row where they are the same for all: see `shared`.
+    the number in the shape or in the mesh's file as face; more_uvs (n, 3 2 k), the sets 1 to k of
+    texture coordinates, of each vertex one after the other.  Of a scene, owner, material and light
+    have one row where they are the same for all: see `shared`; more_uvs are the textures'.
 
     Each triangle's vertices in a row of their own take 72 bytes, in place of 24 or so.
     """
@@ -32,6 +33,7 @@ class Triangles(NamedTuple):
     material: IdArray
     light: IdArray
     face: IdArray
+    more_uvs: FloatArray | None = None
 
     @property
     def vertices(self) -> FloatArray:
@@ -50,6 +52,7 @@ def table_of(
     normals: FloatArray | None = None,
     uvs: FloatArray | None = None,
     colours: FloatArray | None = None,
+    more_uvs: FloatArray | None = None,
     face: IntArray | None = None,
 ) -> Triangles:
     """Triangles of one shape: see `Triangles` and `shared`; `face` defaults to 0, 1, 2, ..."""
@@ -63,6 +66,7 @@ def table_of(
         material=np.array([context.material], np.int32),
         light=np.array([-1], np.int32),
         face=np.arange(len(corners), dtype=np.int32) if face is None else face.astype(np.int32),
+        more_uvs=more_uvs,
     )
 
 
@@ -95,6 +99,7 @@ def facing(m: transform.Affine, triangles: Triangles) -> Triangles:
         normals=None if triangles.normals is None else _exchanged(triangles.normals),
         uvs=_exchanged(uvs),
         colours=None if triangles.colours is None else _exchanged(triangles.colours),
+        more_uvs=None if triangles.more_uvs is None else _exchanged(triangles.more_uvs),
     )
 
 
@@ -132,11 +137,27 @@ def align(parts: Sequence[Triangles]) -> list[Triangles]:
             else part
             for part in parts
         ]
+    if sets := max(map(more_sets, parts)):
+        parts = [part._replace(more_uvs=_padded(part, sets)) for part in parts]
     starts = np.cumsum([0] + [len(part.points) for part in parts], dtype=np.int32)
     return [
         part if start == 0 else part._replace(corners=part.corners + start)
         for part, start in zip(parts, starts[:-1], strict=True)
     ]
+
+
+def more_sets(triangles: Triangles) -> int:
+    """The number of sets of texture coordinates beyond the triangles' own."""
+    return 0 if triangles.more_uvs is None else triangles.more_uvs.shape[1] // 6
+
+
+def _padded(triangles: Triangles, sets: int) -> FloatArray:
+    """`more_uvs` with so many sets; those that no texture looks up are 0."""
+    found = np.zeros((len(triangles.face), 3, 2 * sets))
+    if triangles.more_uvs is not None:
+        own = triangles.more_uvs.reshape(len(found), 3, -1)
+        found[:, :, : own.shape[2]] = own
+    return found.reshape(len(found), -1)
 
 
 def _flat_normals(triangles: Triangles) -> FloatArray:

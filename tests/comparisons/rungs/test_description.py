@@ -60,7 +60,7 @@ KINDS = {
     "pair": r"number or 2 numbers", "pair or texture": r"number .*2 numbers or a texture's name",
     "number or texture": r"number .*or a texture's name",
     "colour or texture": r"colour .*or a texture's name", "turn": "keys below",
-    "rows": r"a list of [23] (numbers|integers)|2 rows of 3 numbers|a list",
+    "rows": r"a list of [23] (numbers|integers)( or more)?|2 rows of 3 numbers|a list",
     "rings": r"a list of a list of 2 or 3 numbers", "transform": r"a list of \[transforms\].*",
     "uv": r"\[uv\].*", "film": r"\[film\].*",
 }  # fmt: skip

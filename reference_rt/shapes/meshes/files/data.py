@@ -41,6 +41,8 @@ class MeshData:
     """Names of ignored parts of the file, as the format calls them."""
     doubtful: tuple[str, ...] = ()
     """What other programs read otherwise: concave polygons, attributes of some corners."""
+    more_uv: FloatArray | None = None
+    """(n, 2 k), finite: uv of the sets 1 to k."""
 
 
 class RawMesh(NamedTuple):
@@ -53,6 +55,7 @@ class RawMesh(NamedTuple):
     colours: npt.NDArray[Any] | None = None
     ignored: tuple[str, ...] = ()
     doubtful: tuple[str, ...] = ()
+    more_uv: npt.NDArray[Any] | None = None
 
 
 def checked(mesh: RawMesh) -> MeshData:
@@ -62,7 +65,7 @@ def checked(mesh: RawMesh) -> MeshData:
         raise FieldError(field, " is empty; expected vertices and faces")
     vertices = np.ascontiguousarray(mesh.vertices, np.float64)
     faces = np.ascontiguousarray(mesh.faces, np.int64)
-    for name in ("normals", "uv", "colours"):
+    for name in ("normals", "uv", "more_uv", "colours"):
         values = getattr(mesh, name)
         if values is not None and len(values) != len(vertices):
             raise FieldError(
@@ -77,10 +80,13 @@ def checked(mesh: RawMesh) -> MeshData:
             f": face {bad} has index {faces[bad][outside[bad]][0]}, out of range; "
             f"expected 0 to {len(vertices) - 1}",
         )
-    uv = colours = None
+    uv = more_uv = colours = None
     if mesh.uv is not None:
         uv = np.ascontiguousarray(mesh.uv, np.float64)
         _expect_finite("uv", uv, "the uv of vertex {} is not finite; expected two finite numbers")
+    if mesh.more_uv is not None:
+        more_uv = np.ascontiguousarray(mesh.more_uv, np.float64)
+        _expect_finite("more_uv", more_uv, "the uv of vertex {} are not finite; expected numbers")
     if mesh.colours is not None:
         colours = np.ascontiguousarray(mesh.colours, np.float64)
         _expect_finite(
@@ -88,7 +94,8 @@ def checked(mesh: RawMesh) -> MeshData:
             np.where(colours < 0.0, np.nan, colours),
             "the colour of vertex {} is negative or not finite; expected numbers of at least 0",
         )
-    return MeshData(vertices, faces, _unit(mesh.normals), uv, colours, mesh.ignored, mesh.doubtful)
+    said = mesh.ignored, mesh.doubtful
+    return MeshData(vertices, faces, _unit(mesh.normals), uv, colours, *said, more_uv=more_uv)
 
 
 def _expect_finite(field: str, rows: FloatArray, message: str) -> None:

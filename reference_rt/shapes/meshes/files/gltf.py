@@ -10,7 +10,7 @@ them.  A buffer may be a file, in the mesh's folder or below it.
 import base64
 import json
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -32,13 +32,15 @@ _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # points and lines are 0 to 3
 _READ = ("POSITION", "NORMAL", "TEXCOORD_0", "COLOR_0")
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 
+_QUANTIZED = "KHR_mesh_quantization"  # texture coordinates may be integers that are no fractions
+
 # Extensions that a file may require although they are unknown here: they do not change the shape.
 _HARMLESS = (
     "KHR_materials_",
     "KHR_texture_",
     "KHR_lights_",
     "EXT_texture_",
-    "KHR_mesh_quantization",
+    _QUANTIZED,
     compression.DRACO,
     *compression.MESHOPT,
 )
@@ -156,25 +158,27 @@ class GltfFile:
         names = [key for key in ("materials", "animations", "skins") if self.root.get(key)]
         return (*names, *(["points or lines"] if self.has_lines else []))
 
-    def primitive(self, primitive: dict[str, Any], uv_set: int = 0) -> RawMesh:
-        """The triangles of a primitive.  uv_set: the number of its texture coordinates."""
+    def primitive(self, primitive: dict[str, Any], uv_sets: Sequence[int] = (0,)) -> RawMesh:
+        """The triangles of a primitive.  uv_sets: the numbers of its texture coordinates, those of
+        our mesh's `uv` first; of the others what it lacks is (0, 0)."""
         attributes, packed = primitive["attributes"], self.packed(primitive)
         of_draco = {} if packed is None else packed[1]
         points = self.accessor(attributes.get("POSITION"), (3,), packed=of_draco.get("POSITION"))
-        normals, uv, colours = (
+        fractions = _QUANTIZED not in self.root.get("extensionsUsed", [])  # else they say so
+        normals, colours, *sets = (
             self.accessor(attributes[name], widths, fraction, of_draco.get(name))
             if name in attributes
             else None
             for name, widths, fraction in (
                 ("NORMAL", (3,), False),
-                (f"TEXCOORD_{uv_set}", (2,), True),
                 ("COLOR_0", (3, 4), True),
+                *((f"TEXCOORD_{n}", (2,), fractions) for n in uv_sets),
             )
         )
-        if any(a is not None and len(a) != len(points) for a in (normals, uv, colours)):
+        if any(a is not None and len(a) != len(points) for a in (normals, colours, *sets)):
             raise ValueError("the attributes of a primitive have different lengths")
-        if uv is not None:
-            uv = np.column_stack([uv[:, 0], 1.0 - uv[:, 1].astype(np.float64)])  # from the top
+        uv, *more = (None if one is None else _from_below(one) for one in sets)
+        nothing = np.zeros((len(points), 2))
         if packed is None:
             corners = np.arange(len(points))
             if "indices" in primitive:
@@ -188,7 +192,15 @@ class GltfFile:
         if colours is not None and colours.shape[1] == 4 and np.any(colours[:, 3] < 1.0):
             ignored.append("alpha of COLOR_0")
         rgb = None if colours is None else colours[:, :3]
-        return RawMesh(points, faces, normals, uv, rgb, tuple(map(str, ignored)))
+        return RawMesh(
+            points,
+            faces,
+            normals,
+            uv,
+            rgb,
+            tuple(map(str, ignored)),
+            more_uv=np.hstack([nothing if m is None else m for m in more]) if more else None,
+        )
 
     def packed(self, primitive: dict[str, Any]) -> tuple[IntArray, dict[str, Rows]] | None:
         """Triangles and attributes that Draco compressed; None where there are none, or where the
@@ -349,6 +361,11 @@ def _natural(values: dict[str, Any], key: str, default: int | None = None) -> in
     if type(value) is not int or value < 0:
         raise ValueError(f"'{key}' is {str(value)[:20]}; expected an integer of at least 0")
     return value
+
+
+def _from_below(uv: Rows) -> Rows:
+    """Texture coordinates whose v counts from the bottom: glTF's counts from the top."""
+    return np.column_stack([uv[:, 0], 1.0 - uv[:, 1].astype(np.float64)])
 
 
 def _faces(corners: npt.NDArray[np.int64], mode: int) -> npt.NDArray[Any]:

@@ -3,11 +3,11 @@
 It reads the element `vertex` with x y z, nx ny nz, uv (u v, s t or texture_u texture_v) and a
 colour, and the element `face`, or `tristrips`, with its list vertex_indices or vertex_index;
 everything else is ignored, and named.  Texture coordinates of a face's corners, its list texcoord,
-come before those of vertices.  A colour is red green blue, or r g b; or diffuse_red and so on; or
-as Mitsuba writes it, color_0 color_1 color_2, and in the other forms that it reads, color_r and
-vertex_color_x among them; the first of these that the file has.  Colours of integers are sRGB-
-encoded, 255 or 65535 being 1: as displayed, which is what scanners and modellers write.  Colours of
-floats are linear: as computed."""
+come before those of vertices; u1 v1, u2 v2, ... are those of further sets.  A colour is red green
+blue, or r g b; or diffuse_red and so on; or as Mitsuba writes it, color_0 color_1 color_2, and in
+the other forms that it reads, color_r and vertex_color_x among them; the first of these that the
+file has.  Colours of integers are sRGB-encoded, 255 or 65535 being 1: as displayed, which is what
+scanners and modellers write.  Colours of floats are linear: as computed."""
 
 import re
 import struct
@@ -225,10 +225,11 @@ def read(content: bytes) -> RawMesh:
             if points is None:
                 raise ValueError("its element 'vertex' lacks x, y or z; expected these")
             normal, uv, rgb = (_first(table, sets) for sets in ((_NORMAL,), _UV, _RGB))
+            more = _further_uv(table)
             ignored += [
                 f"vertex {name}"
                 for name in table
-                if name not in ("x", "y", "z", *normal, *uv, *rgb)
+                if name not in ("x", "y", "z", *normal, *uv, *more, *rgb)
             ]
             mesh = RawMesh(
                 points,
@@ -236,6 +237,7 @@ def read(content: bytes) -> RawMesh:
                 _together(table, normal),
                 _together(table, uv),
                 _colours(table, rgb, element),
+                more_uv=_together(table, more),
             )
         elif element.name == "face" and element.rows > 0:
             start = position
@@ -297,8 +299,17 @@ def _parted(
         normals=None if mesh.normals is None else mesh.normals[which],
         uv=uv[first],
         colours=None if mesh.colours is None else mesh.colours[which],
+        more_uv=None if mesh.more_uv is None else mesh.more_uv[which],
     )
     return parted, (vertex.reshape(-1), counts)
+
+
+def _further_uv(table: dict[str, Array]) -> tuple[str, ...]:
+    """The names of the texture coordinates of sets 1, 2, ..."""
+    found: tuple[str, ...] = ()
+    while {*(pair := (f"u{len(found) // 2 + 1}", f"v{len(found) // 2 + 1}"))} <= table.keys():
+        found += pair
+    return found
 
 
 def _of_strips(corners: IntArray, counts: IntArray) -> IntArray:
