@@ -59,8 +59,8 @@ the second one then finds them compiled."""
 
 LIMIT = 5.0
 """CPU seconds that a fast test should take at most, its fixtures and child processes included, on
-an idle machine (two cores of an Intel Xeon with AVX-512).  A test during which a kernel was compiled
-into the cache is not judged: it is cheaper the next time."""
+an idle machine (two cores of an Intel Xeon with AVX-512).  A test during which a kernel was
+compiled into the cache is not judged: it is cheaper the next time."""
 
 WORDING = Path(__file__).with_name("wording.json")
 """Whole messages, by the test that shows each (fixture `wording`)."""
