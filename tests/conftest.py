@@ -5,6 +5,7 @@ parametrized test slow but for n cases.  The run prints the tests that took most
 fast ones that took more than LIMIT; with `--judge-costs` it fails for these.
 """
 
+import gc
 import json
 import os
 import random
@@ -106,6 +107,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if zlib.crc32(item.nodeid.encode()) % 10 == tenth % 10]
     places = {name: k for k, name in enumerate(LONGEST_FIRST)}
     items.sort(key=lambda item: places.get(Path(item.path).stem, len(places)))
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_finish() -> None:
+    """What collection has made stays: the garbage collector need not look at it again."""
+    gc.freeze()
 
 
 def _spread(name: str, cases: list[pytest.Item], most: int) -> list[pytest.Item]:
