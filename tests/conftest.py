@@ -97,7 +97,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     functions: dict[str, list[pytest.Item]] = defaultdict(list)
     for item in items:
-        if item.get_closest_marker("cases") is not None:
+        is_slow = item.get_closest_marker("slow") is not None
+        if item.get_closest_marker("cases") is not None and not is_slow:
             functions[item.nodeid.partition("[")[0]].append(item)
     for name, cases in functions.items():
         (most,) = cases[0].get_closest_marker("cases").args

@@ -121,6 +121,7 @@ def test_errors_of_radiance_are_within_the_tolerance_behind_the_curve(name: str)
         assert np.all(error <= 1.05 * 1e-4 * steep * np.maximum(shown, floor))
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("name", CURVES)
 def test_curves_are_recognised(name: str) -> None:
     """From codes, a fifth of which shows something else."""
