@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from comparisons.gate import edges
-from comparisons.gate.edges import RULES, Edges, edges_rung, look_at
+from comparisons.gate.edges import RULES, Edges, Look, edges_rung, look_at
 from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.question import Question
@@ -165,6 +165,20 @@ def test_the_tip_of_a_triangle_that_was_moved() -> None:
     found = judged(scene, scene.picture(RULES["8 samples"], moved))
     assert found.status == "agree", found.reason
     assert found.numbers["choices"] == 1
+
+
+def test_of_many_wrong_pixels_none_is_taken_for_a_tip(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor looked at as one, which takes longer than all the rest."""
+    looked = []
+
+    def noting(look: Look, law: object, row: FloatArray, *more: FloatArray) -> object:
+        looked.append(len(row))
+        return np.ones(len(row), np.bool_)
+
+    monkeypatch.setattr(edges, "_are_tips", noting)
+    scene = Triangles(1)
+    assert judged(scene, 1.1 * scene.picture()).status == "differ"
+    assert looked == [0]
 
 
 def nearest(
