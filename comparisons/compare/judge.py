@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from comparisons import statistics
 from comparisons.compare import diagnosis
@@ -285,14 +286,17 @@ def likeliest_cause(
 ) -> Cause | None:
     """The likeliest cause of a difference; single lights, and paths of other lengths, are rendered
     only if needed."""
-    fits = diagnosis.Fits(images)
-    plain = diagnosis.likeliest(images, fits=fits)
-    is_dark = images.candidate.mean() <= LITTLE * images.reference.mean()
-    if diagnosis.is_sure(plain) and not is_dark:
-        return plain
-    if lights is None and lengths is None:
-        return plain
-    singles = {} if lights is None else lights()
-    if lengths is None:
-        return diagnosis.likeliest(images, singles, fits=fits)
-    return diagnosis.likeliest(images, singles, lengths, fits)
+    # The fits' matrices are small: on two cores, threads of BLAS that wait for each other busily
+    # took four times the CPU time and three times as long (2026-11-28).
+    with threadpool_limits(1, user_api="blas"):
+        fits = diagnosis.Fits(images)
+        plain = diagnosis.likeliest(images, fits=fits)
+        is_dark = images.candidate.mean() <= LITTLE * images.reference.mean()
+        if diagnosis.is_sure(plain) and not is_dark:
+            return plain
+        if lights is None and lengths is None:
+            return plain
+        singles = {} if lights is None else lights()
+        if lengths is None:
+            return diagnosis.likeliest(images, singles, fits=fits)
+        return diagnosis.likeliest(images, singles, lengths, fits)

@@ -80,7 +80,7 @@ AROUND = 48
 a triangle is thinner than SNAP, and may be on a sample once it is moved."""
 
 MOST_TIPS = 1 << 8
-"""Pixels that are looked at so: of a picture with more, not tips are wrong."""
+"""Pixels that are looked at so: a picture with more has other faults, and none is looked at."""
 
 CHOICES = 0.02
 """Share of edge pixels, or one of them, of which a rule may leave MOST_LEFT, or that show what only
@@ -261,7 +261,8 @@ def edges_rung(
         seen.step[:, None], law.beyond(values, *seen.edge), law.beyond(values, low, high)
     )
     wrong = np.asarray(outside.any(axis=-1))
-    tips = np.flatnonzero(wrong)[:MOST_TIPS]
+    tips = np.flatnonzero(wrong)
+    tips = tips[: len(tips) if len(tips) <= MOST_TIPS else 0]
     tips = tips[_are_tips(edges.look, law, row[tips], column[tips], values[tips])]
     wrong[tips], outside[tips] = False, 0.0
     numbers = {

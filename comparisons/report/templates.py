@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +54,7 @@ def around(path: Path, name: str) -> tuple[str, str]:
     return before, after
 
 
+@cache
 def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -> Template:
     """The template `name` in a folder of `comparisons`; it may include files of `report`.
 

@@ -7,13 +7,15 @@ from pathlib import Path
 import pytest
 from command_line import invoke
 
+from comparisons.truth.case import chosen
+
 ROOT = Path(__file__).parents[2]
 sys.path.append(str(ROOT / "docs"))
 from docs_pages import blocks_of, run  # noqa: E402
 
 PAGES = sorted((ROOT / "docs" / "course").glob("*.md"))
-MEASURING = re.compile("reference-rt (stability|methods|converge|compare|suite|bench) ")
-"""Commands of minutes, which their own tests run: here their options are read."""
+MEASURING = re.compile("reference-rt (stability|methods|converge|compare|suite|bench|truth) ")
+"""Commands of minutes, or of cases that their own tests render: here their options are read."""
 
 pytestmark = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 
@@ -44,6 +46,9 @@ def test_what_is_shown_runs(page: Path, tmp_path: Path, monkeypatch: pytest.Monk
         words = line.partition("#")[0].split()
         assert words[0] == "reference-rt", line
         help_only = ["--help"] if MEASURING.match(line) else []
+        if words[1] == "truth":
+            names = words[2 : words.index("--renderer")]
+            assert [case.name for case in chosen(names)] == names
         result = invoke(*words[1:], *help_only, catch_exceptions=False)
         expected = re.search(r"# exit (\d)", line)
         assert result.exit_code == int(expected[1] if expected else 0), result.output

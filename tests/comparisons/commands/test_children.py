@@ -177,7 +177,8 @@ def test_nohup_goes_on(tmp_path):
 
 def started_in(source):
     """Calls of subprocess in a source, each with whether it is tied to the parent."""
-    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+    text = source.read_text(encoding="utf-8")
+    for node in ast.walk(ast.parse(text)) if "subprocess" in text else ():
         if (
             isinstance(node, ast.Call)
             and isinstance(node.func, ast.Attribute)

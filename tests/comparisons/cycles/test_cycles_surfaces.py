@@ -30,6 +30,7 @@ OFF = 4.0 * (1.0 - np.cos(np.pi / FINE))
 """How far, over the radius, a triangle may lie off a surface that is curved along u and v."""
 
 
+@pytest.mark.cases(len(SHAPES))
 @pytest.mark.parametrize("steps", MAPS)
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.type)
 def test_rays_hit_ours_where_the_triangles_are(shape, steps):

@@ -40,7 +40,7 @@ SERIES = pytest.mark.parametrize(
 def test_ours_holds(name, series, tmp_path):
     """A few cases at the last point of the quick sweep."""
     one = family(name).by_name[series]
-    cases = min(one.cases["quick"], 300)
+    cases = min(one.cases["quick"], 100)
     found = measured(name, series, (one.quick or one.values)[-1], tmp_path, cases)[OURS]
     assert found.cases + found.open > 0
     assert found.failures == 0, found.examples

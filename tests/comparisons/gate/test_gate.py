@@ -128,6 +128,8 @@ def test_pictures_without_noise(suffix: str) -> None:
     assert result.exit_code == 0, result.output
     assert status(found, "statistics") == "agree"
     assert ("8-bit sRGB" in str(found["cases"][0]["notes"])) == (suffix == "png")
+    if suffix == "npy":
+        return  # the rest of both sorts of values: of 8 bits and of floating point
     result, _ = run(written("wrong", 1.02 * picture), "--scene", "ball.yaml")
     assert result.exit_code != 0
     result, _ = run(written("wrong", 1.02 * picture), "--scene", "ball.yaml", "--tolerance", "0.03")

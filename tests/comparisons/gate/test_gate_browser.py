@@ -71,14 +71,19 @@ def test_codes_of_a_canvas(page: Path) -> None:
     assert not found.radiance[1:].any()
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("<script>render = 1 / 0</script>", "time limit of 15 s .* waits for window.render to be"),
-        (
+        pytest.param(
+            "<script>render = 1 / 0</script>",
+            "time limit of 15 s .* waits for window.render to be",
+            marks=pytest.mark.slow,  # it waits, in another process
+        ),
+        pytest.param(
             rendering("await new Promise(() => {})"),
             "limit of 15 s .* waits for window.render to re",
+            marks=pytest.mark.slow,
         ),
         (rendering("for (;;);"), "time limit of 3 s"),
         (rendering("const x = null; return x.y"), "TypeError: Cannot read properties of null"),

@@ -53,20 +53,31 @@ def judged(scene: Triangles, curve: ToneCurve, candidate: FloatArray) -> RungRes
     return edges_rung(candidate, curve(reference), edges, displayed=True)
 
 
-@pytest.mark.parametrize("name", CURVES)
-def test_right_pictures_agree_and_faults_are_seen(name: str) -> None:
-    """Saturated colours, with which ACES and AgX make mixtures brighter or darker than both."""
-    curve = ToneCurve(name, CURVES[name], 2.0)
+def saturated(name: str) -> tuple[Triangles, ToneCurve]:
+    """Colours with which ACES and AgX make mixtures brighter or darker than both."""
     scene = Triangles(list(CURVES).index(name))
     scene.colours **= 3.0
-    samples = [RULES["4 samples"], OTHERS["3 x 3"], RULES["8 samples"]]
-    for space, some in zip(SPACES, samples, strict=True):
-        found = judged(scene, curve, displayed(scene, curve, some, space))
-        assert found.status == "agree", (space, found.reason)
-        assert found.numbers["edge"] > 200
-    wrong = displayed(scene, curve, samples[0], shift=(0.5, 0.0))
+    return scene, ToneCurve(name, CURVES[name], 2.0)
+
+
+@pytest.mark.cases(len(CURVES))
+@pytest.mark.parametrize("space", SPACES)
+@pytest.mark.parametrize("name", CURVES)
+def test_right_pictures_agree(name: str, space: str) -> None:
+    scene, curve = saturated(name)
+    samples = [RULES["4 samples"], OTHERS["3 x 3"], RULES["8 samples"]][SPACES.index(space)]
+    found = judged(scene, curve, displayed(scene, curve, samples, space))
+    assert found.status == "agree", found.reason
+    assert found.numbers["edge"] > 200
+
+
+@pytest.mark.cases(3)
+@pytest.mark.parametrize("name", CURVES)
+def test_faults_are_seen(name: str) -> None:
+    scene, curve = saturated(name)
+    wrong = displayed(scene, curve, RULES["4 samples"], shift=(0.5, 0.0))
     assert judged(scene, curve, wrong).status == "differ"
-    wrong = displayed(scene, curve, samples[0], gain=1.05)
+    wrong = displayed(scene, curve, RULES["4 samples"], gain=1.05)
     assert judged(scene, curve, wrong).numbers["inside_wrong"] > 100
 
 
@@ -110,6 +121,7 @@ def test_errors_of_radiance_are_within_the_tolerance_behind_the_curve(name: str)
         assert np.all(error <= 1.05 * 1e-4 * steep * np.maximum(shown, floor))
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("name", CURVES)
 def test_curves_are_recognised(name: str) -> None:
     """From codes, a fifth of which shows something else."""

@@ -233,10 +233,7 @@ def look_of(part: SimpleNamespace) -> dict[str, int] | None:
     return part.look.get("normalTexture")  # type: ignore[no-any-return]
 
 
-NORMALS = rt.NormalMap.model_fields
-
-
-@pytest.mark.parametrize("follow_v", [False, True] if "follow_v" in NORMALS else [False])
+@pytest.mark.parametrize("follow_v", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_a_picture_of_the_file_is_ours(scene: rt.Scene, tmp_path: Path, follow_v: bool) -> None:
     """Camera, triangles, instances (mirrored, sheared), textures and their maps, vertex colours,
     normal maps, lights."""
@@ -262,7 +259,6 @@ def following_v(scene: rt.Scene) -> rt.Scene:
     return scene.changed(materials=dict(scene.materials) | {"rough": rough})
 
 
-@pytest.mark.skipif("follow_v" not in NORMALS, reason="scenes of glTF are not read")
 def test_the_file_is_read_as_our_scene(scene: rt.Scene, tmp_path: Path) -> None:
     scene = following_v(scene)
     write_gltf(scene, tmp_path / "out.glb")
@@ -273,7 +269,6 @@ def test_the_file_is_read_as_our_scene(scene: rt.Scene, tmp_path: Path) -> None:
     assert error <= 2e-6 * expected.max()  # as above
 
 
-@pytest.mark.skipif("follow_v" not in NORMALS, reason="scenes of glTF are not read")
 def test_its_own_material_is_read_as_it_was(tmp_path: Path) -> None:
     """Colours with a factor, a mask with a cutoff, and numbers from two channels of one image."""
     rng = np.random.default_rng(1)

@@ -86,6 +86,7 @@ def assert_same_hits(scene: Scene, file, folder, o, d, textured=None) -> None:
         assert np.quantile(off.max(axis=1), 0.99) < COORDINATE_OFF
 
 
+@pytest.mark.cases(max(len(MATERIALS), len(MAPS)))
 @pytest.mark.parametrize("material", MATERIALS)
 @pytest.mark.parametrize("steps", MAPS)
 def test_shapes_are_where_ours_are(steps, material, tmp_path):

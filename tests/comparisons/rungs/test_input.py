@@ -127,7 +127,8 @@ def test_replicates_that_are_the_same() -> None:
 @pytest.mark.cases(2)
 @pytest.mark.parametrize("background", [0.0, 1.0])
 @pytest.mark.parametrize("pixels", [1, 2, 4, 8, 64, 512])
-def test_pictures_with_few_noisy_pixels(pixels: int, background: float) -> None:
+@pytest.mark.parametrize("pairs", [10, pytest.param(50, marks=pytest.mark.slow)])
+def test_pictures_with_few_noisy_pixels(pairs: int, pixels: int, background: float) -> None:
     """Of which each has two values, half of the time: pictures are flat, black or the same again
     by chance."""
     rng = np.random.default_rng(pixels)
@@ -138,7 +139,7 @@ def test_pictures_with_few_noisy_pixels(pixels: int, background: float) -> None:
         flat.reshape(16, -1, 3)[:, 7 : 7 + pixels] += noise
         return flat
 
-    for _ in range(50):
+    for _ in range(pairs):
         candidate, reference = pictures(), pictures()
         assert input_rung(candidate, reference).status == "agree"
     for wrong in (candidate[2], np.full_like(candidate[2], background)):

@@ -113,7 +113,9 @@ def assert_all_agree(solid, o, d, mesh):
     return t
 
 
-@pytest.mark.parametrize("depth", range(1, 7))
+@pytest.mark.parametrize(
+    "depth", [1, 2, 3, 4, *(pytest.param(depth, marks=pytest.mark.slow) for depth in (5, 6))]
+)
 def test_random_trees(depth, mesh):
     """Laws of sets and coincident faces: F7 of the stability suites."""
     hits = 0
