@@ -48,9 +48,7 @@ def files(scene: Scene) -> RungResult:
     unread = sorted(set(findings.unread))
     numbers: dict[str, Any] = {"checked": findings.checked, "unread": unread, "values": values}
     if findings.differences:
-        more = len(findings.differences) - 1
-        others = f"; and {more} more" if more else ""
-        return RungResult("files", "differ", findings.differences[0] + others, numbers)
+        return RungResult("files", "differ", _first(findings), numbers)
     if not findings.checked and not values:
         return RungResult(
             "files", "not-applicable", "no file or shape has a second source", numbers
@@ -60,6 +58,21 @@ def files(scene: Scene) -> RungResult:
     left_out = f"; without a second source: {', '.join(unread)}"
     reason = f"as second sources say: {facts}{left_out if unread else ''}"
     return RungResult("files", "agree", reason, numbers)
+
+
+def misread(scene: Scene) -> RungResult | None:
+    """The rung for who only needs our numbers to be the description's: what a second reading of the
+    scene's text says otherwise, None where it says nothing else."""
+    findings = Findings()
+    values = _check_description(scene, findings)
+    if not findings.differences:
+        return None
+    return RungResult("files", "differ", _first(findings), {"values": values})
+
+
+def _first(findings: Findings) -> str:
+    more = len(findings.differences) - 1
+    return findings.differences[0] + (f"; and {more} more" if more else "")
 
 
 ALONE = ("camera", "film", "sampler", "integrator")

@@ -9,7 +9,7 @@ import pytest
 from scipy import ndimage
 
 from comparisons.compare.diagnosis import likeliest, of_rungs
-from comparisons.compare.diagnosis.brightness import hypotheses
+from comparisons.compare.diagnosis.brightness import FITS
 from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.results.case import FloatArray, Images, RungResult
 from reference_rt.rendering.image import srgb
@@ -384,7 +384,7 @@ def test_no_broken_rung_has_no_cause() -> None:
 @pytest.mark.parametrize(("gain", "is_named"), [(2.015, True), (2.05, False), (1.9, False)])
 def test_a_factor_is_named_within_one_percent(gain, is_named):
     reference = np.random.default_rng(1).uniform(0.1, 1.0, (24, 24, 3))
-    found = next(h for h in hypotheses(Misfit(Images(gain * reference, reference)), {}))
+    found = next(h for h in FITS[0](Misfit(Images(gain * reference, reference))))
     assert ("what it should be" in found.evidence) == is_named
 
 
@@ -393,5 +393,6 @@ def test_pictures_of_8_bits_are_told_by_how_many_values_they_have():
     reference = np.random.default_rng(1).uniform(0.0, 1.0, (64, 64, 3))
     for levels, is_possible in ((200, True), (255, True), (300, False)):
         candidate = np.round(levels * reference) / levels
-        causes = {h.family for h in hypotheses(Misfit(Images(candidate, reference)), {})}
+        misfit = Misfit(Images(candidate, reference))
+        causes = {h.family for fit in FITS for h in fit(misfit)}
         assert ("8 bits" in causes) == is_possible
