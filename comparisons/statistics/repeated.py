@@ -46,14 +46,15 @@ class Rounding:
         self._x, self.coarse = x, True
         levels = np.unique(x[0])
         if len(levels) <= FEW_VALUES and len(levels := np.unique(x)) <= FEW_VALUES:
-            self._places = np.searchsorted(levels, x)
-            ends = [np.clip(self._places + k, 0, len(levels) - 1) for k in (-1, 1)]
+            places = np.searchsorted(levels, x)
+            ends = [np.clip(places + k, 0, len(levels) - 1) for k in (-1, 1)]
             self._step = np.asarray(levels[ends[1]] - levels[ends[0]])
+            self._places, self._most = places.astype(np.float64), np.ones_like(x)
             return
-        self._places = x
         with np.errstate(over="ignore"):
             self.coarse = bool(np.array_equal(x.astype(np.float16), x))
         self._step = HALF_STEP * np.abs(x) + 2.0**-24 if self.coarse else FINE * np.abs(x)
+        self._places, self._most = x, self._step
 
     @property
     def step(self) -> FloatArray:
@@ -62,9 +63,7 @@ class Rounding:
 
     def beyond(self, i: int, j: int) -> int:
         """The number of pixels of two replicates that differ by more than rounding."""
-        most = np.maximum(self._step[i], self._step[j])
-        if self._places is not self._x:
-            most = np.ones_like(most)
+        most = np.maximum(self._most[i], self._most[j])
         apart = np.abs(self._places[i] - self._places[j]) > most
         return int(np.count_nonzero(apart.any(axis=-1)))
 

@@ -43,17 +43,16 @@ def pairs(misfit: Misfit) -> Iterator[tuple[Hypothesis, Misfit]]:
     what each can know, beyond what colours alone explain."""
     misfit, likely = _likely_moves(misfit)
     small = misfit.sampled()
-    found: list[Contender] = []
+    first = list(possible([one for move in likely for one in _joined(move, misfit, small)]))
+    yield from first
+    again: list[Contender] = []
     for move in likely:
-        first = _joined(move, misfit, small)
-        found += first
-        if move.warp is None:
+        of_move = [one for one in first if one[0].family.startswith(f"{move.family}{JOINED}")]
+        if move.warp is None or not of_move:
             continue
         # Any colours may make up for positions that are a little off, a simple cause may not.
-        seen = move.sampled(misfit, small)
-        simple = min(
-            (one for contender in first for one, _ in contender.early),
-            key=lambda one: _more_likely((seen.left(one.picture), one)),
+        simple, _ = min(
+            of_move, key=lambda one: _more_likely((one[1].left(one[0].picture), one[0]))
         )
         if simple.of is None:
             continue
@@ -61,8 +60,8 @@ def pairs(misfit: Misfit) -> Iterator[tuple[Hypothesis, Misfit]]:
             move.family, move.warp.amounts
         ):
             if warp.order == move.warp.order:
-                found += _joined(of_warp(warp, misfit.reference.shape), misfit, small)
-    yield from possible(found)
+                again += _joined(of_warp(warp, misfit.reference.shape), misfit, small)
+    yield from possible(again)
 
 
 def _joined(move: Move, misfit: Misfit, small: Misfit) -> list[Contender]:
