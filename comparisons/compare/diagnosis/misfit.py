@@ -69,8 +69,7 @@ class Misfit:
         error2 = np.zeros_like(self.reference) if images.error is None else images.error**2
         own = images.reference_error
         self._reference_error2 = 0.5 * error2 if own is None else own**2
-        # Few replicates estimate the variance badly; neighbouring pixels have similar ones.
-        error2 = np.maximum(error2, ndimage.uniform_filter(error2, (3, 3, 1)))
+        error2 = _at_least_around(error2)
         size = np.maximum(np.abs(self.candidate), np.abs(self.reference))
         size = ndimage.maximum_filter(size, (3, 3, 1))
         # Most of a picture may be black, and a warp may show something there.
@@ -154,6 +153,7 @@ class Misfit:
     def noisier(self, variance: FloatArray) -> "Misfit":
         """The same for predicted pictures whose values have noise of this variance."""
         found = copy.copy(self)
+        variance = _at_least_around(variance)
         found._scales = [scale.noisier(variance) for scale in self._scales]
         found._measure(self._difference)
         return found
@@ -304,6 +304,11 @@ class Misfit:
             if scale.clearness(self._difference) > CLEARLY:
                 squares = scale.binned(self._difference) ** 2 - scale.error2
                 yield scale.block, np.asarray((scale.weights * squares).sum(axis=-1))
+
+
+def _at_least_around(variance: FloatArray) -> FloatArray:
+    """Few replicates estimate the variance badly; neighbouring pixels have similar ones."""
+    return np.maximum(variance, ndimage.uniform_filter(variance, (3, 3, 1)))
 
 
 def spline(channel: FloatArray, order: int) -> FloatArray:

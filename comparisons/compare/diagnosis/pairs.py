@@ -47,18 +47,19 @@ def pairs(misfit: Misfit) -> Iterator[tuple[Hypothesis, Misfit]]:
     yield from first
     again: list[Contender] = []
     for move in likely:
-        of_move = [one for one in first if one[0].family.startswith(f"{move.family}{JOINED}")]
+        of_move = [
+            one
+            for one in first
+            if one[0].of is not None and one[0].family.startswith(f"{move.family}{JOINED}")
+        ]
         if move.warp is None or not of_move:
             continue
         # Any colours may make up for positions that are a little off, a simple cause may not.
         simple, _ = min(
             of_move, key=lambda one: _more_likely((one[1].left(one[0].picture), one[0]))
         )
-        if simple.of is None:
-            continue
-        for warp in Search(misfit, misfit.reference, simple.of).fitted(
-            move.family, move.warp.amounts
-        ):
+        search = Search(misfit, misfit.reference, simple.of)
+        for warp in search.fitted(move.family, move.warp.amounts):
             if warp.order == move.warp.order:
                 again += _joined(of_warp(warp, misfit.reference.shape), misfit, small)
     yield from possible(again)
