@@ -88,7 +88,7 @@ def input_rung(
             text += (
                 f"; successive replicates of the {whose} make up for each other (correlation "
                 f"{order.correlation:+.2f}), as antithetic pairs do: their mean is better than "
-                "their spread says, and means of pairs would show by how much"
+                "their spread says; of 16 or more in pairs the pairs' means are compared"
             )
     return _result("agree", text, numbers)
 
