@@ -308,7 +308,7 @@ class Misfit:
 
 def _at_least_around(variance: FloatArray) -> FloatArray:
     """Few replicates estimate the variance badly; neighbouring pixels have similar ones."""
-    return np.maximum(variance, ndimage.uniform_filter(variance, (3, 3, 1)))
+    return np.asarray(np.maximum(variance, ndimage.uniform_filter(variance, (3, 3, 1))))
 
 
 def spline(channel: FloatArray, order: int) -> FloatArray:
