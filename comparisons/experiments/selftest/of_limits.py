@@ -29,6 +29,7 @@ from reference_rt.rendering import query
 from reference_rt.rendering.image import display
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import Grid
 from reference_rt.shapes import Disk, Rectangle
 
 STRESS = (
@@ -285,7 +286,7 @@ def answers(
     right: Evidence | None = None
     before = _own_picture(small)
     other = small.resolved_sampler
-    if not small.integrator.deterministic:
+    if not isinstance(other, Grid):
         other = other.model_copy(update={"seed": other.seed + 1})
     noise = _change(before, _own_picture(small.changed(sampler=other)))
     for fault in faults:
