@@ -61,7 +61,7 @@ def gate_pictures(
         rendered = replace(rendered, still=edges)
     evidence = Evidence(
         question.name,
-        (),
+        () if question.misread is None else (question.misread,),
         rendered,
         seconds={},
         notes=(*notes, *reference.notes),

@@ -6,6 +6,7 @@ from comparisons.compare.darkness import Darkness
 from comparisons.compare.judge import Lights
 from comparisons.compare.path_length import Lengths
 from comparisons.gate.edges import Edges
+from comparisons.results.case import RungResult
 from comparisons.rungs.witness import Witness
 
 LIMIT = 0.005
@@ -20,7 +21,7 @@ class Question:
     lights, lengths: for the diagnosis of a difference;  edges: for pictures without noise;
     witness: a third renderer, where there is no rim;  rim: how many of the outermost pixels are
     left out on each side;  darkness: why pictures of the scene may be black, None where it is not
-    known.
+    known;  misread: what our reference has otherwise than the scene's text, None where nothing.
     """
 
     limit: float = LIMIT
@@ -31,6 +32,7 @@ class Question:
     witness: Witness | None = None
     rim: int = 0
     darkness: Darkness | None = None
+    misread: RungResult | None = None
 
 
 USUAL = Question()

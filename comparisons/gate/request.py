@@ -27,7 +27,7 @@ from comparisons.gate.shown_curve import estimated
 from comparisons.gate.terms import missing_terms
 from comparisons.gate.tone_curves import ESTIMATE, ToneCurve, curve_of
 from comparisons.renderers import WitnessName
-from comparisons.results.case import Case, Cause, FloatArray
+from comparisons.results.case import Case, Cause, FloatArray, RungResult
 from comparisons.results.headline import UP_TO
 from comparisons.rungs.witness import Witness, witness_of
 from comparisons.statistics import Margins
@@ -158,6 +158,15 @@ class Judge:
         shown = self.curve(self.linear.pictures)
         return replace(self.linear, pictures=shown, notes=(*self.linear.notes, note))
 
+    @cached_property
+    def misread(self) -> RungResult | None:
+        """What our own rendering, if that is the reference, has otherwise than the scene's text."""
+        if self.scene is None or self.request.references or self.request.baseline:
+            return None
+        from comparisons.rungs.files import misread  # its second readers take a while to load
+
+        return misread(self.scene)
+
     def case(
         self, candidates: Sequence[Picture], notes: Sequence[str] = (), looks: Looks | None = None
     ) -> Case:
@@ -169,7 +178,7 @@ class Judge:
             where = str(self.curve).replace(":", " at exposure ")
             reason = f"{UP_TO}the tone curve {where}, estimated: {case.reason}"
             case = replace(case, reason=reason)
-        if case.verdict != "differ":
+        if case.verdict != "differ" or self.misread is not None:
             return case
         toned = None if request.tone_curve == ESTIMATE else self._toned(candidates, case)
         if toned is not None or request.references or request.baseline:
@@ -245,6 +254,7 @@ class Judge:
             self._witness(),
             request.rim,
             None if scene is None else partial(why_dark, scene),
+            self.misread,
         )
         return gate_pictures(candidates, self.reference, question, notes, looks)
 

@@ -68,7 +68,8 @@ def question_without_rim(question: Question) -> Question:
         assert lengths is not None
         rim = ((pixels, pixels), (pixels, pixels), (0, 0))
         for one in lengths(np.pad(reference, rim)):
-            yield replace(one, picture=_inner(one.picture, pixels))
+            noise = None if one.noise is None else _inner(one.noise, pixels)
+            yield replace(one, picture=_inner(one.picture, pixels), noise=noise)
 
     return replace(
         question,

@@ -14,7 +14,7 @@ from comparisons.results.case import FloatArray, RungResult, Status
 from comparisons.statistics.metrics import nonfinite_pixels, white_level
 from comparisons.statistics.odd_replicate import odd_replicate
 from comparisons.statistics.order import successive
-from comparisons.statistics.repeated import may_be_flat, may_be_the_same, same_pairs
+from comparisons.statistics.repeated import Rounding, may_be_flat, may_be_the_same, same_pairs
 from comparisons.statistics.shared_noise import common_noise, correlated_pair
 
 DIM = 1e-3
@@ -88,7 +88,7 @@ def input_rung(
             text += (
                 f"; successive replicates of the {whose} make up for each other (correlation "
                 f"{order.correlation:+.2f}), as antithetic pairs do: their mean is better than "
-                "their spread says, and means of pairs would show by how much"
+                "their spread says; of 16 or more in pairs the pairs' means are compared"
             )
     return _result("agree", text, numbers)
 
@@ -217,6 +217,25 @@ def _repeated(a: FloatArray, b: FloatArray) -> str | None:
                 f"{_replicates(which, len(x))} of the {name} are the same bit for bit; expected "
                 "independent noise, a seed of its own for each"
             )
+    if not any(same.values()):
+        return _repeated_but_for_rounding(a, b)
+    return None
+
+
+def _repeated_but_for_rounding(a: FloatArray, b: FloatArray) -> str | None:
+    """Replicates that differ from others by rounding alone, although the other side's do not."""
+    sides = {"candidate": Rounding(a), "reference": Rounding(b)}
+    same = {name: side.repeats() for name, side in sides.items()}
+    if all(same.values()):
+        return None
+    for name, other in (("candidate", "reference"), ("reference", "candidate")):
+        if same[name] and not sides[name].may_repeat(same[name], sides[other]):
+            which = sorted({k for pair in same[name] for k in pair})
+            count = len(a if name == "candidate" else b)
+            return (
+                f"{_replicates(which, count)} of the {name} are the same as others but for "
+                "rounding; expected independent noise, a seed of its own for each"
+            )
     return None
 
 
@@ -271,7 +290,10 @@ def _sharing_noise(a: FloatArray, b: FloatArray) -> str | None:
             f"replicates {i} and {j} of the candidate share noise (correlation {correlation:.2f}); "
             f"{INDEPENDENT}"
         )
-    common = common_noise(a, b) if len(b) > 1 else None
+    rounding = Rounding(a)
+    is_rounded = rounding.coarse and len(rounding.repeats()) == math.comb(len(a), 2)
+    hidden = rounding.step if is_rounded else None
+    common = common_noise(a, b, hidden) if len(b) > 1 else None
     if common is not None and common > COMMON:
         share = common / (1.0 + common)
         return (

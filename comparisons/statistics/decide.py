@@ -11,6 +11,7 @@ import numpy.typing as npt
 from comparisons.results.case import FloatArray, RungResult, Status
 from comparisons.statistics.advice import noise_free_candidate, wanted
 from comparisons.statistics.cells import POWER, TILE, Margins
+from comparisons.statistics.order import by_pairs
 from comparisons.statistics.ranks import Uniformity, uniformity
 from comparisons.statistics.reading import UnlikePicturesError, read
 from comparisons.statistics.scales import IMAGE, PIXELS, SCALES, TILES, Pair, Place, Scale
@@ -118,7 +119,8 @@ def compare(
     pictures = b.mean[np.newaxis] if isinstance(b, Known) else b
     if not a.any() and not pictures.any():
         return RungResult("statistics", "not-applicable", "every picture of either side is black")
-    tested = findings(a, b, tile, margins, level)
+    other = b if isinstance(b, Known) else by_pairs(b)
+    tested = findings(by_pairs(a), other, tile, margins, level)
     alone = noise_free_candidate(b, margins, level) if fixed_reference else None
     return _verdict(tested, a, pictures, limit, alone)
 

@@ -101,6 +101,27 @@ def successive(pictures: FloatArray) -> Successive | None:
     return Successive(forward, by, makes_up)
 
 
+def by_pairs(pictures: FloatArray) -> FloatArray:
+    """The means of pairs (0 and 1, 2 and 3, ...) that make up for each other, as antithetic ones
+    do; the pictures themselves where these are no such pairs.
+
+    Pairs are independent of each other, so that the spread of their means is the error of the
+    whole mean, which that of single pictures overstates.  It is so of independent pictures, too:
+    that pairs are found by their correlation makes no error, but where it is found by chance.
+    Of fewer than FEWEST pairs the means know their spread worse than the pictures know theirs.
+    """
+    if len(pictures) < 2 * FEWEST or len(pictures) % 2:
+        return pictures
+    z = deviations(pictures[:MOST])
+    links = np.diagonal(_correlations(z, z), 1)
+    if not links[::2].max() < links[1::2].min():
+        return pictures
+    order = successive(pictures)
+    if order is None or not order.makes_up:
+        return pictures
+    return np.asarray(0.5 * (pictures[::2] + pictures[1::2]))
+
+
 def _none_alike(pairs: FloatArray) -> bool:
     """Whether pictures at no distance in the order are alike: two that take turns with two others
     make up for these, but are of less use than they seem."""

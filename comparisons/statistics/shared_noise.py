@@ -145,22 +145,28 @@ def _highest_by_chance(correlations: FloatArray, pixels: int) -> float:
     return max(CORRELATED, ordinary + max(times * scatter, 2.0 * float(below.max())))
 
 
-def common_noise(candidate: FloatArray, reference: FloatArray) -> float | None:
+def common_noise(
+    candidate: FloatArray, reference: FloatArray, step: FloatArray | None = None
+) -> float | None:
     """The variance of the error common to all replicates of the candidate, over the variance of one
     replicate; None if that error does not look like noise.
 
-    Both (replicates, height, width, 3).  Unlike the error of a wrong picture, noise is independent
-    between pixels, present everywhere, and unlike the picture and its gradient.  So is the rounding
-    of texels that one side stores as half floats: what that may make is subtracted.  The error must
-    exceed what the scatter of the replicates' own differences makes, which is large where all
-    pixels use the same random numbers.
+    Both (replicates, height, width, 3).  step (height, width, 3): that of the rounding that alone
+    makes the candidate's replicates differ; the variance is then that of the reference's.
+
+    Unlike the error of a wrong picture, noise is independent between pixels, present everywhere,
+    and unlike the picture and its gradient.  So is the rounding of texels that one side stores as
+    half floats: what that may make is subtracted.  The error must exceed what the scatter of the
+    replicates' own differences makes, which is large where all pixels use the same random numbers.
     """
     sides = (candidate, reference)
     variances = [x.var(axis=0, ddof=1) for x in sides]
-    own = variances[0].sum(axis=-1)
+    own = variances[0 if step is None else 1].sum(axis=-1)
     difference = candidate.mean(axis=0) - reference.mean(axis=0)
     noise = sum(v.sum(axis=-1) / len(x) for v, x in zip(variances, sides, strict=True))
     noise = noise + ((HALF * reference.mean(axis=0)) ** 2).sum(axis=-1)
+    if step is not None:
+        noise = noise + (0.25 * step**2).sum(axis=-1)  # a value is half a step off at most
     noisy = own > 1e-12 * float((reference**2).mean())
     if np.count_nonzero(noisy) < FEWEST_PIXELS:
         return None
@@ -173,7 +179,7 @@ def common_noise(candidate: FloatArray, reference: FloatArray) -> float | None:
     if not float(ratios.mean()) > 5.0 * scatter:  # one false alarm in a million, were it normal
         return None
     squares = float((difference[noisy] ** 2).sum())
-    by_chance = sum(_factor_by_chance(x, noisy) for x in sides)
+    by_chance = sum(_factor_by_chance(x, noisy) for x in (sides if step is None else sides[1:]))
     if not math.log(max(squares, 1e-300) / float(noise[noisy].sum())) > by_chance:
         return None
     if not (share > 0.0 and float(np.median(ratios)) > EVERYWHERE * float(ratios.mean()) > 0.0):

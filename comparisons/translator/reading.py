@@ -23,7 +23,7 @@ from comparisons.mitsuba.parse import Parsed, module, parse_dict, parse_file
 from comparisons.shapes.reading import read_shape
 from comparisons.translator.moved import mirror
 from reference_rt.sampling import AnySampler, Grid, Sobol
-from reference_rt.scene.model import SceneModel
+from reference_rt.scene.model import WITHOUT_LINES, SceneModel
 from reference_rt.util.errors import SceneError, SceneWarning
 
 # ---- what our scenes lack ------------------------------------------------------------------------
@@ -106,7 +106,7 @@ def read_file(
             warnings.warn(SceneWarning(text), stacklevel=3)
     else:
         scene = _scene(parsed, cls)
-    scene._source, scene._defaults = (str(path), _WITHOUT_LINES), dict(defaults or {})
+    scene._source, scene._defaults = (str(path), WITHOUT_LINES), dict(defaults or {})
     scene._allows_missing = allow_missing
     return scene
 
@@ -172,13 +172,10 @@ def _scene(parsed: Parsed, cls: type[M]) -> M:
             shapes=tuple(reading.shapes),
             lights=tuple(reading.lights),
         )
-    scene._folder, scene._source = parsed.folder, (parsed.file, _WITHOUT_LINES)
+    scene._folder, scene._source = parsed.folder, (parsed.file, WITHOUT_LINES)
     for note in reading.notes:
         warnings.warn(SceneWarning(note), stacklevel=4)
     return scene
 
-
-_WITHOUT_LINES = "]"
-"""In place of a scene's text: it is no YAML, so that errors found later name no line of it."""
 
 _KINDS = ("Sensor", "Shape", "Emitter", "Integrator", "Medium", "Volume", "PhaseFunction")

@@ -27,7 +27,7 @@ from reference_rt.gltf.document import (
 )
 from reference_rt.gltf.surfaces import Reading, Surfaces
 from reference_rt.lights import AnyLight, Constant, Directional, EnvironmentMap, Point, Spot
-from reference_rt.scene.model import SceneModel
+from reference_rt.scene.model import WITHOUT_LINES, SceneModel
 from reference_rt.shapes import Mesh
 from reference_rt.shapes.csg import AnyShape
 from reference_rt.shapes.instances import Instance
@@ -99,13 +99,9 @@ def read_file(
         warnings.warn(SceneWarning(f"{text}; left out"), stacklevel=3)
     for note in reading.notes:
         warnings.warn(SceneWarning(f"{path}: {note}"), stacklevel=3)
-    scene._folder, scene._source = path.parent, (str(path), _WITHOUT_LINES)
+    scene._folder, scene._source = path.parent, (str(path), WITHOUT_LINES)
     scene._defaults, scene._allows_missing = options, allow_missing
     return scene
-
-
-_WITHOUT_LINES = "]"
-"""In place of a scene's text: it is no YAML, so that errors found later name no line of it."""
 
 
 def _opened(path: Path) -> Reading:

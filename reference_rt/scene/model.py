@@ -44,6 +44,10 @@ MOST_NESTED = 100
 which each operation takes two."""
 
 
+WITHOUT_LINES = "]"
+"""In place of the text of a scene that was read from another program's file: it is no YAML, so that
+errors found later name no line of it."""
+
 _NAMES = (str, str | None)
 """The types of fields that only name something."""
 
@@ -245,6 +249,14 @@ class SceneModel(Description):
     def source_file(self) -> Path | None:
         """The file that the scene was read from; None for a scene of Python."""
         return None if self._source is None else Path(self._source[0])
+
+    @property
+    def source_text(self) -> str | None:
+        """The YAML or JSON that the scene was read from; None for a scene of Python, and for one of
+        another program's file."""
+        if self._source is None or self._source[1] == WITHOUT_LINES:
+            return None
+        return self._source[1]
 
     @property
     def defaults(self) -> dict[str, str]:

@@ -8,10 +8,13 @@ the one place (row, tile, pixels) that holds the difference; otherwise a simple 
 most of it, as a part; or None.  A cause must also reproduce the bias of each channel's mean, and
 those of blocks (`Misfit.reproduces`).
 
-To add a hypothesis about colours, yield it from `brightness`, `colour` or `tones`: the picture that
-the candidate would be, and how many parameters were fitted.  One with as many or fewer is its
-rival, unless it is of the same family.  What happens to positions is a `Move` of `place`, or a row
-of `warps.WARPS`.
+A sample of the pixels shows which causes can be: only these are fitted to the whole picture
+(`contest`).
+
+To add a hypothesis about colours, yield it from one of the `FITS` of `brightness`, `colour` or
+`tones`: the picture that the candidate would be, and how many parameters were fitted.  One with as
+many or fewer is its rival, unless it is of the same family.  What happens to positions is a `Move`
+of `place`, or a row of `warps.WARPS`.
 """
 
 from comparisons.compare.diagnosis.pictures import IN_PART, Fits, is_sure, likeliest

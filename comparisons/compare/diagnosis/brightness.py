@@ -34,25 +34,14 @@ LITTLE = 0.01
 light does, and says less: it is no rival."""
 
 
-def hypotheses(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hypothesis]:
-    """All of them, fitted."""
-    gain = _gain(misfit)
-    if not lights or gain.picture.mean() > LITTLE * misfit.reference.mean():
-        yield gain
-    yield from _gains(misfit)
-    yield from _vignette(misfit)
-    yield from _limits(misfit)
-    yield from _lights(misfit, lights)
-
-
-def _gain(misfit: Misfit) -> Hypothesis:
+def _gain(misfit: Misfit) -> Iterator[Hypothesis]:
     r = misfit.reference
     gain = 1.0 + misfit.amount(r)
     evidence = f"the candidate is {gain:.4g} times the reference ({100.0 * (gain - 1.0):+.3g} %)"
     for factor, name in REMARKABLE.items():
         if abs(gain / factor - 1.0) < NEAR:
             evidence += f", {name} what it should be"
-    return of_pixels("gain", f"constant gain of {gain:.4g}", evidence, lambda p: gain * p, r, 1)
+    yield of_pixels("gain", f"constant gain of {gain:.4g}", evidence, lambda p: gain * p, r, 1)
 
 
 def _gains(misfit: Misfit) -> Iterator[Hypothesis]:
@@ -103,7 +92,7 @@ def _vignette(misfit: Misfit) -> Iterator[Hypothesis]:
 
 
 def _limits(misfit: Misfit) -> Iterator[Hypothesis]:
-    r, top = misfit.reference, float(misfit.candidate.max())
+    r, top = misfit.reference, misfit.top
     above = r > top
     if above.any() and top > 0.0:
         count = int(np.count_nonzero(above))
@@ -125,7 +114,17 @@ ONE = 0.1
 """How close to -1 or +1 the excess of a light must be for it to be called lost or doubled."""
 
 
-def _lights(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hypothesis]:
+FITS = (_gain, _gains, _vignette, _limits)
+"""What is fitted to any two pictures."""
+
+
+def is_of_light(gain: Hypothesis, misfit: Misfit) -> bool:
+    """Whether a gain leaves so little light that a lost light says more."""
+    return gain.family == "gain" and gain.picture.mean() <= LITTLE * misfit.reference.mean()
+
+
+def of_lights(misfit: Misfit, lights: Mapping[str, FloatArray]) -> Iterator[Hypothesis]:
+    """Single lights, lost or of another strength."""
     r = misfit.reference
     for name, light in lights.items():
         if light.shape != r.shape or not np.isfinite(light).all() or not light.any():

@@ -1,7 +1,7 @@
 """Hypotheses about colours: exchanged channels, saturation, matrices."""
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
@@ -17,12 +17,6 @@ A_MATRIX = "a matrix of colours"
 
 LUMINANCE = to_xyz(SRGB)[1]
 """The share of red, green and blue of sRGB in the luminance."""
-
-
-def hypotheses(misfit: Misfit) -> Iterator[Hypothesis]:
-    """All of them, fitted."""
-    yield from _permutations(misfit)
-    yield from _matrices(misfit)
 
 
 def _permutations(misfit: Misfit) -> Iterator[Hypothesis]:
@@ -55,11 +49,13 @@ def _known_matrices() -> Iterator[tuple[str, FloatArray]]:
     yield "grey: the mean of the channels in each", np.full((3, 3), 1.0 / 3.0)
 
 
-def _matrices(misfit: Misfit) -> Iterator[Hypothesis]:
+def _known(name: str, known: FloatArray, misfit: Misfit) -> Iterator[Hypothesis]:
+    evidence = f"the candidate's colours are those of the reference, as {name}"
+    yield of_pixels("known matrix", name, evidence, partial(_times, known), misfit.reference, 0)
+
+
+def _saturation(misfit: Misfit) -> Iterator[Hypothesis]:
     r = misfit.reference
-    for name, matrix in _known_matrices():
-        evidence = f"the candidate's colours are those of the reference, as {name}"
-        yield of_pixels("known matrix", name, evidence, partial(_times, matrix), r, 0)
     grey = (r @ LUMINANCE)[..., None] * np.ones(3)
     saturation = 1.0 + misfit.amount(r - grey)
     evidence = f"colours are {saturation:.3g} times as far from grey as the reference's"
@@ -72,6 +68,10 @@ def _matrices(misfit: Misfit) -> Iterator[Hypothesis]:
         r,
         1,
     )
+
+
+def _matrix(misfit: Misfit) -> Iterator[Hypothesis]:
+    r = misfit.reference
     matrix = misfit.regression(r).T
     rows = "; ".join(" ".join(f"{v:.3g}" for v in row) for row in matrix)
     evidence = f"the candidate's colours are the reference's times the matrix ({rows})"
@@ -80,3 +80,12 @@ def _matrices(misfit: Misfit) -> Iterator[Hypothesis]:
 
 def _times(matrix: FloatArray, picture: FloatArray) -> FloatArray:
     return np.asarray(picture @ matrix.T)
+
+
+FITS: tuple[Callable[[Misfit], Iterator[Hypothesis]], ...] = (
+    _permutations,
+    *(partial(_known, name, matrix) for name, matrix in _known_matrices()),
+    _saturation,
+    _matrix,
+)
+"""What is fitted to any two pictures."""

@@ -8,6 +8,7 @@ import numpy as np
 from scipy import ndimage, optimize
 
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.diagnosis.sample import chosen_pixels
 from comparisons.results.case import FloatArray, Images
 from comparisons.statistics.cells import divisor
 
@@ -68,28 +69,26 @@ class Misfit:
         error2 = np.zeros_like(self.reference) if images.error is None else images.error**2
         own = images.reference_error
         self._reference_error2 = 0.5 * error2 if own is None else own**2
-        # Few replicates estimate the variance badly; neighbouring pixels have similar ones.
-        error2 = np.maximum(error2, ndimage.uniform_filter(error2, (3, 3, 1)))
+        error2 = _at_least_around(error2)
         size = np.maximum(np.abs(self.candidate), np.abs(self.reference))
         size = ndimage.maximum_filter(size, (3, 3, 1))
         # Most of a picture may be black, and a warp may show something there.
         least = max(float(np.median(size)), FLOOR * float(size.mean()))
         floor2 = FLOOR**2 * np.maximum(size, least) ** 2 + 1e-300
-        side = min(error2.shape[:2])
-        scales = [
-            _Scale(block, error2, floor2)
-            for block in BLOCKS
-            if block == 1 or side >= FEWEST_BLOCKS * block
-        ]
+        self.top = float(self.candidate.max())
+        """The brightest value of the candidate."""
         self._inside: FloatArray | float = 1.0
         self._rounding = ROUNDING * size + _gaps(self.candidate)
-        self._scales = scales
+        self._scales = _scales(error2, floor2)
+        self._splines: dict[int, list[FloatArray]] = {}
         self._measure(self.candidate - self.reference)
 
     def _measure(self, difference: FloatArray) -> None:
         self._difference = difference
-        self._scale = max(self._scales, key=lambda scale: scale.clearness(difference))
-        self.clear = self._scale.clearness(difference) > CLEARLY
+        clearness = [scale.clearness(difference) for scale in self._scales]
+        self._scale = self._scales[int(np.argmax(clearness))]
+        self.clear = max(clearness) > CLEARLY
+        self._clear_scales = [k for k, clear in enumerate(clearness) if clear > CLEARLY]
         self.excess = self._scale.excess(difference)
         """How much the squares exceed those of noise alone."""
 
@@ -99,11 +98,50 @@ class Misfit:
         found._measure(self._rest(picture))
         return found
 
+    def sampled(self) -> "Misfit":
+        """The same at `chosen_pixels` alone; itself where these are all."""
+        chosen = chosen_pixels(self.reference.shape)
+        if chosen.size == self.reference.size // 3:
+            return self
+
+        def at(values: FloatArray) -> FloatArray:
+            return np.asarray(values.reshape(-1, 3)[chosen])
+
+        found = copy.copy(self)
+        found.candidate, found.reference = at(self.candidate), at(self.reference)
+        found._reference_error2, found._rounding = at(self._reference_error2), at(self._rounding)
+        found._scales = _scales(*(at(values) for values in self._scales[0].of_pixels))
+        found._splines = {}
+        if not isinstance(self._inside, float):
+            found._inside = at(self._inside)
+        found._measure(at(self._difference))
+        return found
+
+    def splines(self, order: int) -> list[FloatArray]:
+        """The reference's channels, as `ndimage.map_coordinates` takes them without `prefilter`."""
+        if order not in self._splines:
+            self._splines[order] = [spline(self.reference[..., k], order) for k in range(3)]
+        return self._splines[order]
+
+    def shares(self, picture: FloatArray) -> list[FloatArray]:
+        """The squares that `picture` as the reference leaves beyond noise, relative to the
+        difference's, of the values at each scale at which the difference is clear; none where
+        nothing differs inside of what is compared."""
+        scales = [self._scales[k] for k in self._clear_scales]
+        total = [scale.excess(self._difference) for scale in scales]
+        if min(total, default=0.0) <= 0.0:
+            return []
+        left = self._rest(picture)
+        return [
+            scale.weights * (scale.binned(left) ** 2 - scale.error2) / all_of_it
+            for scale, all_of_it in zip(scales, total, strict=True)
+        ]
+
     def seen(self, reference: FloatArray, inside: FloatArray | None = None) -> "Misfit":
         """The same of the reference seen through a warp, which shows nothing but `inside` (1 there,
         0 elsewhere): nothing else is compared."""
         found = copy.copy(self)
-        found.reference = reference
+        found.reference, found._splines = reference, {}
         if inside is not None and not inside.all():
             found._inside = inside
             found._scales = [scale.within(inside) for scale in self._scales]
@@ -115,6 +153,7 @@ class Misfit:
     def noisier(self, variance: FloatArray) -> "Misfit":
         """The same for predicted pictures whose values have noise of this variance."""
         found = copy.copy(self)
+        variance = _at_least_around(variance)
         found._scales = [scale.noisier(variance) for scale in self._scales]
         found._measure(self._difference)
         return found
@@ -128,18 +167,28 @@ class Misfit:
         """Whether what a hypothesis leaves of the difference of pixels, and of blocks, is no more
         than noise, rounding, and how far it may be inexact."""
         left = self._rest(hypothesis.picture)
-        slack = self._rounding if hypothesis.slack is None else self._rounding + hypothesis.slack()
-        left = np.sign(left) * np.maximum(np.abs(left) - slack, 0.0)
         leaves = max(hypothesis.leaves, NO_MATTER)
         # What changes colours changes the noise of the reference in them.
         noise = (
             self._inside * (hypothesis.slope(self.reference) ** 2 - 1.0) * self._reference_error2
         )
-        return all(
-            scale.excess(left) - scale.noise_of(noise)
-            <= leaves * max(scale.excess(self._difference), 0.0) + NO_MORE * scale.scatter
+        permitted = [
+            scale.noise_of(noise)
+            + leaves * max(scale.excess(self._difference), 0.0)
+            + NO_MORE * scale.scatter
             for scale in self._scales
-        )
+        ]
+
+        def is_noise(left: FloatArray) -> bool:
+            return all(
+                scale.excess(left) <= most
+                for scale, most in zip(self._scales, permitted, strict=True)
+            )
+
+        if is_noise(left):
+            return True
+        slack = self._rounding if hypothesis.slack is None else self._rounding + hypothesis.slack()
+        return is_noise(np.sign(left) * np.maximum(np.abs(left) - slack, 0.0))
 
     def reproduces(self, picture: FloatArray) -> bool:
         """Whether `picture` as the reference leaves no more than REST of the bias of any channel's
@@ -193,15 +242,31 @@ class Misfit:
         difference = self._scale.binned(self._inside * rest)
         return float((w * along * difference).sum()) / power if power else 0.0
 
-    def rising(self, columns: FloatArray) -> FloatArray:
-        """The factors >= 0 of (height, width, 3, columns), the same for all channels, whose sum is
-        nearest to the candidate's pixels."""
-        root = np.sqrt(self.weights)[..., None]
-        weighted = np.concatenate([columns, self.candidate[..., None]], axis=-1) * root
-        # The normal equations, whose root is as small as the number of columns.
-        rows = weighted.reshape(-1, weighted.shape[-1])
-        triangle = np.asarray(np.linalg.qr(rows, mode="r"))
-        return np.asarray(optimize.nnls(triangle[:, :-1], triangle[:, -1])[0])
+    def rising(self, knots: FloatArray) -> FloatArray:
+        """At the knots, the values of the curve that rises everywhere, straight between two knots,
+        by which the reference is nearest to the candidate's pixels."""
+        steps = len(knots) - 1
+        r = np.clip(self.reference, knots[0], knots[-1]).ravel()
+        k = np.clip(np.searchsorted(knots, r, side="right") - 1, 0, steps - 1)
+        t = (r - knots[k]) / np.diff(knots)[k]
+        w, y = self.weights.ravel(), self.candidate.ravel()
+        # Normal equations of the values at the knots, of which each pixel knows two.
+        normal = np.zeros((steps + 1, steps + 1))
+        right = np.zeros(steps + 1)
+        for at, by in ((k, 1.0 - t), (k + 1, t)):
+            right += np.bincount(at, w * by * y, steps + 1)
+            for other, also in ((k, 1.0 - t), (k + 1, t)):
+                cells = np.bincount(at * (steps + 1) + other, w * by * also, (steps + 1) ** 2)
+                normal += cells.reshape(steps + 1, steps + 1)
+        # Of the first value, and of the steps, which are not negative; nor is the first.
+        sums = np.tril(np.ones((steps + 1, steps + 1)))
+        normal, right = sums.T @ normal @ sums, sums.T @ right
+        size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+        values, vectors = np.linalg.eigh(normal / np.outer(size, size))
+        root = np.sqrt(np.maximum(values, 1e-12 * values[-1]))
+        rows = root[:, None] * vectors.T
+        wanted = (vectors.T @ (right / size)) / root
+        return np.asarray(sums @ (optimize.nnls(rows, wanted)[0] / size))
 
     def nearest(self, columns: FloatArray) -> FloatArray:
         """The factors of (height, width, 3, columns), the same for all channels, whose sum is
@@ -241,6 +306,27 @@ class Misfit:
                 yield scale.block, np.asarray((scale.weights * squares).sum(axis=-1))
 
 
+def _at_least_around(variance: FloatArray) -> FloatArray:
+    """Few replicates estimate the variance badly; neighbouring pixels have similar ones."""
+    return np.asarray(np.maximum(variance, ndimage.uniform_filter(variance, (3, 3, 1))))
+
+
+def spline(channel: FloatArray, order: int) -> FloatArray:
+    """The coefficients by which a picture is interpolated."""
+    if order == 1:
+        return np.ascontiguousarray(channel)
+    return np.asarray(ndimage.spline_filter(channel, order, mode="nearest"))
+
+
+def _scales(error2: FloatArray, floor2: FloatArray) -> list["_Scale"]:
+    side = min(error2.shape[:2])
+    return [
+        _Scale(block, error2, floor2)
+        for block in BLOCKS
+        if block == 1 or side >= FEWEST_BLOCKS * block
+    ]
+
+
 def _gaps(candidate: FloatArray) -> FloatArray | float:
     """The width of a code of 8 bits, linear or sRGB, where so few values occur that they are
     rounded."""
@@ -253,7 +339,7 @@ class _Scale:
     """Sums of squares over pixels, or over blocks of them."""
 
     def __init__(self, block: int, error2: FloatArray, floor2: FloatArray) -> None:
-        self.block, self._of_pixels = block, (error2, floor2)
+        self.block, self.of_pixels = block, (error2, floor2)
         # The noise of pixels is independent and averages out; the floor does not.
         self.error2 = self.binned(error2) / block**2
         self.weights = 1.0 / (self.error2 + self.binned(floor2))
@@ -262,11 +348,11 @@ class _Scale:
 
     def within(self, inside: FloatArray) -> "_Scale":
         """The same where there is no noise but `inside`, 1 there and 0 elsewhere."""
-        error2, floor2 = self._of_pixels
+        error2, floor2 = self.of_pixels
         return _Scale(self.block, inside * error2, floor2)
 
     def noisier(self, variance: FloatArray) -> "_Scale":
-        error2, floor2 = self._of_pixels
+        error2, floor2 = self.of_pixels
         return _Scale(self.block, error2 + variance, floor2)
 
     def binned(self, x: FloatArray) -> FloatArray:
@@ -275,8 +361,9 @@ class _Scale:
         if b == 1:
             return x
         h, w = (n // b for n in x.shape[:2])
-        blocks = x[: h * b, : w * b].reshape(h, b, w, b, -1)
-        return np.asarray(blocks.mean(axis=(1, 3)))
+        # One axis after the other: both at once take four times as long.
+        rows = x[: h * b, : w * b].reshape(h, b, -1).sum(axis=1)
+        return np.asarray(rows.reshape(h, w, b, -1).sum(axis=2) / b**2)
 
     def noise_of(self, error2: FloatArray) -> float:
         """The squares of other noise, whose variance in pixels is this."""

@@ -9,11 +9,15 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from comparisons.compare.diagnosis import brightness, colour, tones
+from comparisons.compare.diagnosis.contest import Contender, Fit, possible
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.diagnosis.misfit import NO_MATTER, Misfit
 from comparisons.compare.diagnosis.place import Move, filters, moves, of_warp
 from comparisons.compare.diagnosis.tints import Tint, by_distribution
-from comparisons.compare.diagnosis.warps import Search, chosen_pixels
+from comparisons.compare.diagnosis.warps import Search
+
+COLOURS: tuple[Fit, ...] = (*brightness.FITS, *colour.FITS, *tones.FITS)
+"""Hypotheses about colours alone."""
 
 JOINED = ", then "
 """Between the names of both."""
@@ -34,55 +38,62 @@ RIVAL = 10.0
 """Those leave at most this many times what the best one leaves."""
 
 
-def of_colours(misfit: Misfit) -> Iterator[Hypothesis]:
-    """Hypotheses about colours alone."""
-    yield from brightness.hypotheses(misfit, {})
-    yield from colour.hypotheses(misfit)
-    yield from tones.hypotheses(misfit)
-
-
 def pairs(misfit: Misfit) -> Iterator[tuple[Hypothesis, Misfit]]:
-    """All of two causes, fitted, and the misfit that compares what each can know, beyond what
-    colours alone explain."""
-    likely, misfit = _likely_moves(misfit)
+    """All of two causes that `chosen_pixels` leave possible, fitted, and the misfit that compares
+    what each can know, beyond what colours alone explain."""
+    misfit, likely = _likely_moves(misfit)
+    small = misfit.sampled()
+    first = list(possible([one for move in likely for one in _joined(move, misfit, small)]))
+    yield from first
+    again: list[Contender] = []
     for move in likely:
-        seen = move.seen(misfit)
-        first = [_joined(move, one, seen) for one in of_colours(seen)]
-        yield from first
-        simple, _ = min(first, key=lambda one: _more_likely((seen.left(one[0].picture), one[0])))
-        if move.warp is None or simple.of is None:
+        of_move = [
+            one
+            for one in first
+            if one[0].of is not None and one[0].family.startswith(f"{move.family}{JOINED}")
+        ]
+        if move.warp is None or not of_move:
             continue
         # Any colours may make up for positions that are a little off, a simple cause may not.
+        simple, _ = min(
+            of_move, key=lambda one: _more_likely((one[1].left(one[0].picture), one[0]))
+        )
         search = Search(misfit, misfit.reference, simple.of)
         for warp in search.fitted(move.family, move.warp.amounts):
-            if warp.order != move.warp.order:
-                continue
-            again = of_warp(warp, misfit.reference.shape)
-            seen = again.seen(misfit)
-            yield from (_joined(again, one, seen) for one in of_colours(seen))
+            if warp.order == move.warp.order:
+                again += _joined(of_warp(warp, misfit.reference.shape), misfit, small)
+    yield from possible(again)
 
 
-def _joined(move: Move, one: Hypothesis, seen: Misfit) -> tuple[Hypothesis, Misfit]:
-    both = replace(
-        one,
-        family=f"{move.family}{JOINED}{one.family}",
-        name=f"{move.name}{JOINED}{one.name}",
-        evidence=f"{move.evidence}; then {one.evidence}",
-        parameters=move.parameters + one.parameters,
-        leaves=max(move.leaves, one.leaves),
-        slack=move.slack(one.picture),
-    )
-    return both, seen
+def _joined(move: Move, misfit: Misfit, small: Misfit) -> list[Contender]:
+    """The move, and then any of the colours."""
+
+    def after(fit: Fit) -> Fit:
+        return lambda seen: (both(one) for one in fit(seen))
+
+    def both(one: Hypothesis) -> Hypothesis:
+        return replace(
+            one,
+            family=f"{move.family}{JOINED}{one.family}",
+            name=f"{move.name}{JOINED}{one.name}",
+            evidence=f"{move.evidence}; then {one.evidence}",
+            parameters=move.parameters + one.parameters,
+            leaves=max(move.leaves, one.leaves),
+            slack=move.slack(one.picture),
+        )
+
+    return list(move.then(map(after, COLOURS), misfit, small))
 
 
-def _likely_moves(misfit: Misfit) -> tuple[list[Move], Misfit]:
-    """Those that leave least in any colours, and the misfit beyond what colours alone explain."""
+def _likely_moves(misfit: Misfit) -> tuple[Misfit, list[Move]]:
+    """The misfit beyond what colours alone explain, and the moves that leave least in any
+    colours."""
     r = misfit.reference
-    pixels = chosen_pixels(r.shape)
-    wanted, weights = (x.reshape(-1, 3)[pixels] for x in (misfit.candidate, misfit.weights))
+    small = misfit.sampled()
+    wanted, weights = (x.reshape(-1, 3) for x in (small.candidate, small.weights))
 
     def tint(move: Move) -> Tint:
-        return Tint(move.at(r, pixels), wanted, weights)
+        return Tint(move.colours(misfit), wanted, weights)
 
     def improved(move: Move) -> Iterator[Move]:
         """Fitted again, now that its pixels show which colours became which."""
@@ -99,19 +110,20 @@ def _likely_moves(misfit: Misfit) -> tuple[list[Move], Misfit]:
                         yield move
 
     def left(move: Move) -> float:
-        seen = move.seen(misfit)
+        seen = move.sampled(misfit, small)
         return seen.left(tint(move).of(seen.reference))
 
-    still = Tint(r.reshape(-1, 3)[pixels], wanted, weights).of(r)
+    still = Tint(small.reference.reshape(-1, 3), wanted, weights).of(r)
     misfit = misfit.beyond(still)
     if not (misfit.clear and misfit.excess > 0.0):
-        return [], misfit
+        return misfit, []
+    small = misfit.sampled()
     bases = (still, by_distribution(misfit.candidate, r))
     tried = [(tint(move).squares, move) for base in bases for move in moves(misfit, base)]
     again = [one for _, move in _best_of_each(tried)[:TRIED] for one in improved(move)]
     likely = _best_of_each((left(move), move) for move in again)
     most = min(FAR_MORE, RIVAL * (max(likely[0][0], 0.0) + NO_MATTER))
-    return [move for rest, move in likely[:MOST_MOVES] if rest < most], misfit
+    return misfit, [move for rest, move in likely[:MOST_MOVES] if rest < most]
 
 
 def _best_of_each(found: Iterable[tuple[float, Move]]) -> list[tuple[float, Move]]:

@@ -4,11 +4,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from comparisons.compare.diagnosis import brightness, colour, place, tones
+from comparisons.compare.diagnosis import brightness, place
 from comparisons.compare.diagnosis.colour import A_MATRIX
+from comparisons.compare.diagnosis.contest import Fitted, contenders, possible
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.diagnosis.misfit import NO_MATTER, REST, Misfit
-from comparisons.compare.diagnosis.pairs import pairs
+from comparisons.compare.diagnosis.pairs import COLOURS, pairs
 from comparisons.compare.diagnosis.spots import (
     FEW_PIXELS,
     ONE_PIXEL,
@@ -74,10 +75,12 @@ class Fits:
         return Misfit(self._images)
 
     @cached_property
-    def singles(self) -> list[tuple[Hypothesis, Misfit]]:
-        """Hypotheses about colours or positions, but for those of brightness."""
-        colours = (*colour.hypotheses(self.misfit), *tones.hypotheses(self.misfit))
-        return [*((one, self.misfit) for one in colours), *place.hypotheses(self.misfit)]
+    def singles(self) -> list[Fitted]:
+        """Hypotheses about colours or positions that the sample leaves possible."""
+        small = self.misfit.sampled()
+        colours = contenders(COLOURS, small, lambda: self.misfit)
+        found = list(possible([*colours, *place.fits(self.misfit, small)]))
+        return [*found, *((one, self.misfit) for one in place.sharpened(self.misfit))]
 
     @cached_property
     def two(self) -> "list[_Ranked]":
@@ -107,8 +110,8 @@ def likeliest(
     if not (misfit.clear and misfit.excess > 0.0):
         return None
     singles = [
-        *((h, misfit) for h in brightness.hypotheses(misfit, lights or {})),
-        *fits.singles,
+        *(one for one in fits.singles if not (lights and brightness.is_of_light(one[0], misfit))),
+        *((one, misfit) for one in brightness.of_lights(misfit, lights or {})),
         *_rendered(misfit, also(misfit.reference)),
     ]
     ranked = _ranked(singles)

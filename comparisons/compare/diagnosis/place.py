@@ -1,15 +1,16 @@
 """Hypotheses about positions: mirrors, shifts, lenses, filters."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
-import numpy.typing as npt
 from scipy import ndimage, optimize
 
+from comparisons.compare.diagnosis.contest import Contender, Fit, contenders
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.diagnosis.misfit import REST, Misfit
+from comparisons.compare.diagnosis.sample import chosen_pixels
 from comparisons.compare.diagnosis.warps import FARTHEST, Search, Warp, grid
 from comparisons.results.case import FloatArray
 
@@ -17,32 +18,50 @@ from comparisons.results.case import FloatArray
 @dataclass(frozen=True)
 class Move:
     """What happens to positions.  family, name, evidence, parameters, leaves: as in `Hypothesis`;
-    of: a picture to which it happens;  warp: what was fitted, None for an exact one."""
+    of: a picture to which it happens, or  warp: what was fitted."""
 
     family: str
     name: str
     evidence: str
     parameters: int
-    of: Callable[[FloatArray], FloatArray]
+    of: Callable[[FloatArray], FloatArray] | None = None
     leaves: float = 0.0
     warp: Warp | None = None
 
     def seen(self, misfit: Misfit) -> Misfit:
         """The misfit of the reference to which it happens."""
-        if self.warp is None:
-            return misfit.seen(self.of(misfit.reference))
-        return misfit.seen(*self.warp.seen(misfit.reference))
+        if self.warp is not None:
+            return misfit.seen(*self.warp.seen(misfit))
+        assert self.of is not None
+        return misfit.seen(self.of(misfit.reference))
 
-    def at(self, picture: FloatArray, pixels: npt.NDArray[np.int64]) -> FloatArray:
-        """(pixels, 3): what some pixels of the picture show, by their flat numbers; NaN outside."""
-        if self.warp is None:
-            return np.asarray(self.of(picture).reshape(-1, 3)[pixels])
-        values, inside = self.warp.at(picture, *(x.ravel()[pixels] for x in grid(picture.shape)))
-        return np.where(inside > 0.0, values, np.nan)
+    def sampled(self, misfit: Misfit, small: Misfit) -> Misfit:
+        """The same at `chosen_pixels`;  small: the misfit of these."""
+        return self.seen(misfit) if small is misfit else small.seen(*self._at(misfit))
 
-    def alone(self, seen: Misfit) -> Hypothesis:
+    def then(self, fits: Iterable[Fit], misfit: Misfit, small: Misfit) -> Iterator[Contender]:
+        """What is fitted to the reference to which it happens."""
+        early = self.sampled(misfit, small)
+        return contenders(
+            fits, early, cache(lambda: early if small is misfit else self.seen(misfit))
+        )
+
+    def colours(self, misfit: Misfit) -> FloatArray:
+        """(pixels, 3): what `chosen_pixels` show; NaN outside."""
+        values, inside = self._at(misfit)
+        return (values if inside is None else np.where(inside > 0.0, values, np.nan)).reshape(-1, 3)
+
+    def _at(self, misfit: Misfit) -> tuple[FloatArray, FloatArray | None]:
+        shape = misfit.reference.shape
+        chosen = chosen_pixels(shape)
+        if self.warp is not None:
+            return self.warp.at(misfit, *grid(shape, chosen))
+        assert self.of is not None
+        return np.asarray(self.of(misfit.reference).reshape(-1, 3)[chosen]), None
+
+    def alone(self, seen: Misfit) -> Iterator[Hypothesis]:
         """That nothing else happens;  seen: as above."""
-        return Hypothesis(
+        yield Hypothesis(
             self.family,
             self.name,
             self.evidence,
@@ -57,12 +76,10 @@ class Move:
         return None if self.warp is None else partial(self.warp.slack, picture)
 
 
-def hypotheses(misfit: Misfit) -> Iterator[tuple[Hypothesis, Misfit]]:
-    """All of them, fitted, and the misfit that compares what each can know."""
+def fits(misfit: Misfit, small: Misfit) -> Iterator[Contender]:
+    """Moves alone;  small: of the sample."""
     for move in moves(misfit, misfit.reference):
-        seen = move.seen(misfit)
-        yield move.alone(seen), seen
-    yield from ((one, misfit) for one in _sharpened(misfit))
+        yield from move.then([move.alone], misfit, small)
 
 
 def moves(misfit: Misfit, base: FloatArray) -> Iterator[Move]:
@@ -101,7 +118,7 @@ def moves(misfit: Misfit, base: FloatArray) -> Iterator[Move]:
 
 def of_warp(warp: Warp, shape: tuple[int, ...]) -> Move:
     name, evidence = warp.told(shape)
-    return Move(warp.family, name, evidence, warp.parameters, lambda p: warp.seen(p)[0], 0.0, warp)
+    return Move(warp.family, name, evidence, warp.parameters, warp=warp)
 
 
 def _turns(shape: tuple[int, ...]) -> Iterator[Move]:
@@ -156,19 +173,31 @@ def _halved_smoothly(p: FloatArray) -> FloatArray:
     return np.stack(channels, axis=-1)
 
 
+NARROWEST, SMALL = 0.15, (0.3, 0.8)
+"""Widths of Gaussians in pixels: one that changes nothing, and two, one of which is less than twice
+as far from the square of any right one as no blur is."""
+
+
 def filters(misfit: Misfit, base: FloatArray) -> Iterator[Move]:
     """Blurs, fitted so that `base` becomes the candidate."""
 
     def blurred(p: FloatArray, sigma: float) -> FloatArray:
         return np.asarray(ndimage.gaussian_filter(p, (sigma, sigma, 0.0), mode="nearest"))
 
-    fit = optimize.minimize_scalar(
-        lambda s: misfit.squares(blurred(base, float(s))),
-        bounds=(0.15, 3.0),
-        method="bounded",
-        options={"xatol": 0.01, "maxiter": 25},
-    )
-    sigma = float(fit.x)
+    def squares(sigma: float) -> float:
+        return misfit.squares(blurred(base, sigma))
+
+    # Hardly any picture is blurred: squares fall towards the right width from 0 on, so that one of
+    # few widths is better than none.
+    sigma = NARROWEST
+    if min(map(squares, SMALL)) < misfit.squares(base):
+        fit = optimize.minimize_scalar(
+            squares,
+            bounds=(NARROWEST, 3.0),
+            method="bounded",
+            options={"xatol": 0.01, "maxiter": 25},
+        )
+        sigma = float(fit.x)
     evidence = f"the candidate is the reference through a Gaussian of sigma {sigma:.2g} pixels"
     # A filter is only nearly a Gaussian.
     yield Move(
@@ -181,7 +210,7 @@ def filters(misfit: Misfit, base: FloatArray) -> Iterator[Move]:
     )
 
 
-def _sharpened(misfit: Misfit) -> Iterator[Hypothesis]:
+def sharpened(misfit: Misfit) -> Iterator[Hypothesis]:
     r = misfit.reference
     detail = r - ndimage.gaussian_filter(r, (0.7, 0.7, 0.0), mode="nearest")
     amount = misfit.amount(detail)

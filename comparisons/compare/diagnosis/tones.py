@@ -29,14 +29,17 @@ NEAR = 0.03
 """How near a fitted gamma must be to a customary one to be called by it."""
 
 
-def hypotheses(misfit: Misfit) -> Iterator[Hypothesis]:
-    """All of them, fitted."""
+def _gamma(misfit: Misfit) -> Iterator[Hypothesis]:
     r = np.maximum(misfit.reference, 0.0)
-    gamma = _fitted(misfit, lambda g: r**g)
+    gamma = _fitted(misfit, lambda of, g: _positive(of.reference) ** g)
     evidence = f"the candidate is the reference to the power of {gamma:.4g}"
     yield of_pixels(
         "gamma", f"gamma of {gamma:.4g}", evidence, lambda p: _positive(p) ** gamma, r, 1
     )
+
+
+def _encodings(misfit: Misfit) -> Iterator[Hypothesis]:
+    r = np.maximum(misfit.reference, 0.0)
     for encoded in (_encoded, lambda p: _encoded(_shown(p))):
         yield of_pixels(
             "sRGB",
@@ -54,9 +57,15 @@ def hypotheses(misfit: Misfit) -> Iterator[Hypothesis]:
         r,
         0,
     )
-    seen = _shown if misfit.candidate.max() <= 1.0 else _positive
-    shown = seen(r)
-    decoded = _fitted(misfit, lambda g: _encoded(shown) ** g)
+
+
+def _seen(misfit: Misfit) -> Callable[[FloatArray], FloatArray]:
+    return _shown if misfit.top <= 1.0 else _positive
+
+
+def _decoded(misfit: Misfit) -> Iterator[Hypothesis]:
+    r, seen = np.maximum(misfit.reference, 0.0), _seen(misfit)
+    decoded = _fitted(misfit, lambda of, g: _encoded(seen(of.reference)) ** g)
     yield of_pixels(
         "encoding",
         f"sRGB decoded by a gamma of {decoded:.2g}" if _is_customary(decoded) else A_CURVE,
@@ -65,7 +74,11 @@ def hypotheses(misfit: Misfit) -> Iterator[Hypothesis]:
         r,
         1,
     )
-    encoded_by = 1.0 / _fitted(misfit, lambda g: linear(shown**g))
+
+
+def _encoded_by(misfit: Misfit) -> Iterator[Hypothesis]:
+    r, seen = np.maximum(misfit.reference, 0.0), _seen(misfit)
+    encoded_by = 1.0 / _fitted(misfit, lambda of, g: linear(seen(of.reference) ** g))
     yield of_pixels(
         "encoding",
         f"a gamma of {encoded_by:.2g} decoded as sRGB" if _is_customary(encoded_by) else A_CURVE,
@@ -75,10 +88,13 @@ def hypotheses(misfit: Misfit) -> Iterator[Hypothesis]:
         r,
         1,
     )
+
+
+def _known(misfit: Misfit) -> Iterator[Hypothesis]:
+    r = np.maximum(misfit.reference, 0.0)
     for name, curve in KNOWN.items():
         evidence = f"the candidate is the reference through {name}: it is made for a display"
         yield of_pixels("known curve", name, evidence, curve, r, 0)
-    yield from _any_curve(misfit, r)
 
 
 def _positive(p: FloatArray) -> FloatArray:
@@ -115,31 +131,62 @@ def _is_customary(gamma: float) -> bool:
     return any(abs(gamma - known) < NEAR for known in CUSTOMARY)
 
 
-def _fitted(misfit: Misfit, mapped: Callable[[float], FloatArray]) -> float:
-    """The exponent, between 0.3 and 3.3, with the least misfit."""
-    fit = optimize.minimize_scalar(
-        lambda g: misfit.squares(mapped(math.exp(g))),
-        bounds=(-1.2, 1.2),
-        method="bounded",
-        options={"xatol": 1e-4},
-    )
-    return math.exp(float(fit.x))
+def _fitted(misfit: Misfit, mapped: Callable[[Misfit, float], FloatArray]) -> float:
+    """The exponent, between 0.3 and 3.3, with the least misfit: of the whole picture, next to that
+    of the sample.  mapped: what a misfit's reference becomes by it."""
+
+    def squares(of: Misfit, g: float) -> float:
+        return of.squares(mapped(of, math.exp(g)))
+
+    def searched(of: Misfit) -> float:
+        fit = optimize.minimize_scalar(
+            lambda g: squares(of, float(g)),
+            bounds=(-1.2, 1.2),
+            method="bounded",
+            options={"xatol": 1e-4},
+        )
+        return float(fit.x)
+
+    small = misfit.sampled()
+    about = searched(small)
+    if small is misfit:
+        return math.exp(about)
+    # The lowest point of the parabola through three.
+    low, middle, high = (squares(misfit, about + k * NEXT) for k in (-1, 0, 1))
+    bend = low - 2.0 * middle + high
+    if bend > 0.0 and abs(low - high) < 2.0 * bend:
+        return math.exp(about + 0.5 * NEXT * (low - high) / bend)
+    return math.exp(searched(misfit))
 
 
-def _any_curve(misfit: Misfit, r: FloatArray) -> Iterator[Hypothesis]:
-    """A power with a gain, and a curve that rises everywhere."""
-    gamma = _fitted(misfit, lambda g: _factor(misfit, r**g) * r**g)
+NEXT = 0.01
+"""Distance of exponents whose squares make a parabola, relative to them: a sample knows an exponent
+to less in any noise in which it is told from 1."""
+
+
+def _power(misfit: Misfit) -> Iterator[Hypothesis]:
+    """With a gain."""
+    r = np.maximum(misfit.reference, 0.0)
+
+    def power(of: Misfit, g: float) -> FloatArray:
+        curve = _positive(of.reference) ** g
+        return _factor(of, curve) * curve
+
+    gamma = _fitted(misfit, power)
     factor = _factor(misfit, r**gamma)
     evidence = f"the candidate is the reference to the power of {gamma:.4g}, times a constant"
     name = f"tone curve: the power of {gamma:.3g}"
     yield of_pixels("power", name, evidence, lambda p: factor * _positive(p) ** gamma, r, 2)
+
+
+def _any_curve(misfit: Misfit) -> Iterator[Hypothesis]:
+    """A curve that rises everywhere."""
+    r = np.maximum(misfit.reference, 0.0)
     even = np.linspace(0.0, 1.0, KNOTS + 1)
     knots = np.unique([*np.quantile(r, even), *(r.min() + even * np.ptp(r))])
     if len(knots) < 3:
         return
-    slopes = np.clip(r[..., None] - knots[:-1], 0.0, np.diff(knots))
-    columns = np.concatenate([np.ones((*r.shape, 1)), slopes], axis=-1)
-    curve = columns @ misfit.rising(columns)
+    curve = np.interp(r, knots, misfit.rising(knots))
     told = ", ".join(
         f"{r.flat[k]:.3g} to {curve.flat[k]:.3g}"
         for k in (int(np.abs(r - q).argmin()) for q in np.quantile(r, [0.1, 0.5, 0.9, 1.0]))
@@ -151,3 +198,7 @@ def _any_curve(misfit: Misfit, r: FloatArray) -> Iterator[Hypothesis]:
 def _factor(misfit: Misfit, picture: FloatArray) -> float:
     """The constant by which the picture has the least misfit."""
     return 1.0 + misfit.amount(picture, misfit.candidate - picture)
+
+
+FITS = (_gamma, _encodings, _decoded, _encoded_by, _known, _power, _any_curve)
+"""What is fitted to any two pictures."""

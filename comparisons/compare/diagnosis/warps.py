@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from comparisons.compare.diagnosis.misfit import Misfit
+from comparisons.compare.diagnosis.misfit import Misfit, spline
+from comparisons.compare.diagnosis.sample import chosen_pixels
 from comparisons.results.case import FloatArray
 
 Field = Callable[[FloatArray, FloatArray], tuple[FloatArray | float, FloatArray | float]]
@@ -59,10 +60,6 @@ field of view taken for that of the other axis, or of half of it."""
 FARTHER = 0.2
 """Largest change of a distance from the middle that is found from a start: a fifth."""
 
-POINTS = 1 << 12
-"""Pixels by which amounts are fitted, of larger pictures at random: they are known to a hundredth
-of a pixel in noise of a tenth of the steps between neighbours."""
-
 STILL = 0.05
 """Pixels by which a channel must be moved, and channels differ, to be moved by themselves, and a
 corner, to be distorted."""
@@ -90,22 +87,20 @@ class Warp:
         by = -np.array([[x], [y]])
         return self.family == "shift" and bool(np.abs(self.amounts - by).max() < STILL)
 
-    def seen(self, picture: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The picture through the warp, and 1 where a pixel shows what is inside of the picture, 0
+    def seen(self, misfit: Misfit) -> tuple[FloatArray, FloatArray]:
+        """The reference through the warp, and 1 where a pixel shows what is inside of it, 0
         elsewhere."""
-        found, inside = self.at(picture, *grid(picture.shape))
-        return found, inside
+        return self.at(misfit, *grid(misfit.reference.shape))
 
-    def at(
-        self, picture: FloatArray, y: FloatArray, x: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+    def at(self, misfit: Misfit, y: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The same at points (y, x) of `grid`, (..., 3)."""
-        height, width = picture.shape[:2]
+        shape = misfit.reference.shape
+        height, width = shape[:2]
+        splines = misfit.splines(self.order)
         found, inside = np.empty((*y.shape, 3)), np.empty((*y.shape, 3))
         for k in range(3):
-            points = _points(self.fields, self.amounts[:, k], y, x, _middle(picture.shape))
-            spline = _spline(picture[..., k], self.order)
-            found[..., k] = _interpolated(spline, points, self.order)
+            points = _points(self.fields, self.amounts[:, k], y, x, _middle(shape))
+            found[..., k] = _interpolated(splines[k], points, self.order)
             down, right = points
             inside[..., k] = (np.abs(down - 0.5 * (height - 1)) <= 0.5 * height) & (
                 np.abs(right - 0.5 * (width - 1)) <= 0.5 * width
@@ -134,7 +129,7 @@ class Warp:
 class Search:
     """The amounts with the least misfit between `base`, seen through a warp, and the candidate.
 
-    base: the reference in the candidate's colours, or the reference itself where `colours` gives
+    base: the reference in the candidate's colours, or the misfit's reference where `colours` gives
     the candidate's for any (points, 3): colours change after positions, and at edges that is not
     the same.
     """
@@ -147,9 +142,8 @@ class Search:
     ) -> None:
         shape = base.shape
         self._shape, self._corner = shape, _corner(shape)
-        chosen = chosen_pixels(shape)
-        y, x = grid(shape)
-        self._grid = y.ravel()[chosen], x.ravel()[chosen]
+        chosen = chosen_pixels(shape).ravel()
+        self._grid = grid(shape, chosen)
         self._weights = misfit.weights.reshape(-1, 3)[chosen]
         self._levels = []
         for blur, steps in STEPS if colours is None else STEPS[-1:]:
@@ -161,11 +155,13 @@ class Search:
                 if blur:
                     a, b = (ndimage.gaussian_filter(p, blur, mode="nearest") for p in (a, b))
                 wanted.append(a.ravel()[chosen])
-                splines.append(_spline(b, 3))
-                slopes.append([np.asarray(slope) for slope in np.gradient(b)])
+                if colours is None:
+                    splines.append(spline(b, 3))
+                    slopes.append([np.asarray(slope) for slope in np.gradient(b)])
+            splines = splines or misfit.splines(3)
             level = _Level(np.stack(wanted, axis=-1), splines, slopes, 3, colours)
             self._levels.append((steps, level))
-        plain = [np.ascontiguousarray(base[..., k]) for k in range(3)]
+        plain = [spline(base[..., k], 1) for k in range(3)]
         self._plain = replace(self._levels[-1][1], splines=plain, slopes=[], order=1)
 
     def warps(self, rolled: tuple[int, int]) -> Iterator[Warp]:
@@ -288,14 +284,6 @@ class _Level:
         ]
 
 
-def chosen_pixels(shape: tuple[int, ...]) -> npt.NDArray[np.int64]:
-    """POINTS of the pixels, flat, or all."""
-    pixels = shape[0] * shape[1]
-    if pixels <= POINTS:
-        return np.arange(pixels)
-    return np.random.default_rng(0).choice(pixels, POINTS, replace=False)
-
-
 def _corner(shape: tuple[int, ...]) -> float:
     return max(0.5 * math.hypot(shape[0] - 1, shape[1] - 1), 1.0)
 
@@ -304,10 +292,16 @@ def _middle(shape: tuple[int, ...]) -> tuple[float, float, float]:
     return 0.5 * (shape[0] - 1), 0.5 * (shape[1] - 1), _corner(shape)
 
 
-def grid(shape: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
-    """Rows and columns from the middle, in units of its distance from a corner."""
-    y, x = np.mgrid[: shape[0], : shape[1]].astype(np.float64)
+def grid(
+    shape: tuple[int, ...], pixels: npt.NDArray[np.int64] | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Rows and columns from the middle, in units of its distance from a corner, of pixels by their
+    flat numbers, or of all (height, width)."""
+    height, width = shape[:2]
+    if pixels is None:
+        pixels = np.arange(height * width).reshape(height, width)
     down, right, corner = _middle(shape)
+    y, x = (part.astype(np.float64) for part in np.divmod(pixels, width))
     return (y - down) / corner, (x - right) / corner
 
 
@@ -326,15 +320,9 @@ def _points(
     return np.stack([at_y, at_x])
 
 
-def _spline(channel: FloatArray, order: int) -> FloatArray:
-    if order == 1:
-        return np.ascontiguousarray(channel)
-    return np.asarray(ndimage.spline_filter(channel, order, mode="nearest"))
-
-
-def _interpolated(spline: FloatArray, points: FloatArray, order: int) -> FloatArray:
+def _interpolated(coefficients: FloatArray, points: FloatArray, order: int) -> FloatArray:
     return np.asarray(
-        ndimage.map_coordinates(spline, points, order=order, mode="nearest", prefilter=False)
+        ndimage.map_coordinates(coefficients, points, order=order, mode="nearest", prefilter=False)
     )
 
 

@@ -19,6 +19,6 @@ share nothing with them:
 What no second source reads is counted, and named.
 """
 
-from comparisons.rungs.files.rung import files
+from comparisons.rungs.files.rung import files, misread
 
-__all__ = ["files"]
+__all__ = ["files", "misread"]

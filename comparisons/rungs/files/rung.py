@@ -16,7 +16,6 @@ from comparisons.rungs.files.gltf import check_gltf
 from comparisons.rungs.files.images import check_bitmap, check_environment
 from comparisons.rungs.files.meshes import check_mesh
 from comparisons.shapes import type_of
-from comparisons.translator.reference import file_of
 from reference_rt.lights import EnvironmentMap
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Mesh, Triangle
@@ -48,9 +47,7 @@ def files(scene: Scene) -> RungResult:
     unread = sorted(set(findings.unread))
     numbers: dict[str, Any] = {"checked": findings.checked, "unread": unread, "values": values}
     if findings.differences:
-        more = len(findings.differences) - 1
-        others = f"; and {more} more" if more else ""
-        return RungResult("files", "differ", findings.differences[0] + others, numbers)
+        return RungResult("files", "differ", _first(findings), numbers)
     if not findings.checked and not values:
         return RungResult(
             "files", "not-applicable", "no file or shape has a second source", numbers
@@ -60,6 +57,21 @@ def files(scene: Scene) -> RungResult:
     left_out = f"; without a second source: {', '.join(unread)}"
     reason = f"as second sources say: {facts}{left_out if unread else ''}"
     return RungResult("files", "agree", reason, numbers)
+
+
+def misread(scene: Scene) -> RungResult | None:
+    """The rung for who only needs our numbers to be the description's: what a second reading of the
+    scene's text says otherwise, None where it says nothing else."""
+    findings = Findings()
+    values = _check_description(scene, findings)
+    if not findings.differences:
+        return None
+    return RungResult("files", "differ", _first(findings), {"values": values})
+
+
+def _first(findings: Findings) -> str:
+    more = len(findings.differences) - 1
+    return findings.differences[0] + (f"; and {more} more" if more else "")
 
 
 ALONE = ("camera", "film", "sampler", "integrator")
@@ -79,15 +91,15 @@ def _check_description(scene: Scene, findings: Findings) -> int:
             again = type(scene).load(path, scene.defaults, scene.allows_missing)
             there = check_gltf(path, again, Findings())
             findings.differences += [one for one in wrong if one in there]
-    elif scene._source is not None and file_of(scene) is None:
+    elif scene.source_text is not None:
         try:
-            said = second_reading(scene._source[1])
+            said = second_reading(scene.source_text)
         except ValueError as error:
             findings.unread.append(str(error))
     found = Description(scene, said)
     wrong = found.differences
-    if wrong and said is not None and scene._source is not None:
-        ours = load_any(scene._source[1])
+    if wrong and said is not None and scene.source_text is not None:
+        ours = load_any(scene.source_text)
         if all(one.startswith(ALONE) for one in wrong):
             ours, said = ({key: of[key] for key in ALONE if key in of} for of in (ours, said))
         there = Description(type(scene).model_validate(ours), said).differences

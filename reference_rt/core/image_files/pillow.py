@@ -99,6 +99,8 @@ def open_with_pillow(file: Beginning) -> ImageFile:
     bits = struct.unpack(">B", head[24:25])[0] if is_png else 8
     with _opened(file.path) as image:
         mode, info = str(image.mode), image.info
+        if image.format == "TIFF":
+            _check_strips(image)
         packed = str(image.tile[0][3]) if image.tile else ""
         is_deep = bits == 16 or any(";16" in str(tile[3]) for tile in image.tile)
         if is_deep and not is_png and mode not in _GREY_OF_16:
@@ -120,6 +122,20 @@ def open_with_pillow(file: Beginning) -> ImageFile:
             mode=mode,
             packed=packed,
             gamma=gamma,
+        )
+
+
+def _check_strips(image: Any) -> None:
+    """Raise ValueError for a file whose strips leave pixels out: Pillow makes these black, however
+    many a damaged header asks for."""
+    held = 0
+    for tile in image.tile:
+        left, top, right, bottom = tile[1]
+        held += max(0, min(right, image.width) - left) * max(0, min(bottom, image.height) - top)
+    if held < image.width * image.height:
+        raise ValueError(
+            f"cannot be read: its strips hold {held} of {image.width} x {image.height} pixels; "
+            "expected a whole image"
         )
 
 

@@ -47,9 +47,31 @@ def _hit(p: FloatArray, d: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.minimum(floor, ball), ball < floor
 
 
+def _around(n: FloatArray, rng: np.random.Generator, uniform: bool = False) -> FloatArray:
+    """Directions on the side of the normals, by the density of the cosine or uniform."""
+    first, angle = rng.random(len(n)), 2.0 * np.pi * rng.random(len(n))
+    z = first if uniform else np.sqrt(1.0 - first)
+    aside = np.sqrt(1.0 - z * z)
+    other = np.where(abs(n[:, :1]) > 0.9, [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
+    s = np.cross(n, other)
+    s /= np.linalg.norm(s, axis=1)[:, None]
+    d = s * (aside * np.cos(angle))[:, None] + n * z[:, None]
+    return d + np.cross(n, s) * (aside * np.sin(angle))[:, None]
+
+
+OF_ALL_LIGHTS = (
+    "samples of the sky",
+    "no shadows of any light",
+    "no shadows at the first surface",
+    "no shadows at later surfaces",
+    "no pi for any light",
+)
+"""With these, the first of which is no mistake, the sky's light is found by samples of it."""
+
+
 def picture(spp: int, seed: int, mistake: str = "") -> FloatArray:
     """(height, width, 3).  mistake: "no shadows", "uniform", "no pi", "no cosine", "1 / d",
-    "twice", "one bounce less" or none."""
+    "twice", "one bounce less", one of OF_ALL_LIGHTS or none."""
     rng = np.random.default_rng(seed)
     forward = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
     right = np.cross(forward, [0.0, 1.0, 0.0])
@@ -68,7 +90,8 @@ def picture(spp: int, seed: int, mistake: str = "") -> FloatArray:
     for edge in range(edges):
         t, is_ball = _hit(p, d)
         missed = alive & ~np.isfinite(t)
-        colour[missed] += weight[missed] * SKY * (2.0 if edge and mistake == "twice" else 1.0)
+        if edge == 0 or mistake not in OF_ALL_LIGHTS:
+            colour[missed] += weight[missed] * SKY * (2.0 if edge and mistake == "twice" else 1.0)
         alive &= np.isfinite(t)
         if edge + 1 == edges:
             break
@@ -81,18 +104,19 @@ def picture(spp: int, seed: int, mistake: str = "") -> FloatArray:
         to_light /= distance[:, None]
         cosine = np.maximum((n * to_light).sum(axis=1), 0.0)
         beyond, _ = _hit(p + 1e-5 * n, to_light)
-        lit = alive & (cosine > 0.0) & ((beyond > distance) | (mistake == "no shadows"))
+        where = "the first surface" if edge == 0 else "later surfaces"
+        no_shadows = mistake in ("no shadows of any light", f"no shadows at {where}")
+        lit = alive & (cosine > 0.0)
+        lit &= (beyond > distance) | no_shadows | (mistake == "no shadows")
         factor = np.ones_like(cosine) if mistake == "no cosine" else cosine
         factor = factor / distance ** (1.0 if mistake == "1 / d" else 2.0)
-        factor = factor / (1.0 if mistake == "no pi" else np.pi)
+        factor = factor / (1.0 if mistake.startswith("no pi") else np.pi)
         colour[lit] += (weight * albedo * factor[:, None] * INTENSITY)[lit]
-        first, angle = rng.random(count), 2.0 * np.pi * rng.random(count)
-        z = first if mistake == "uniform" else np.sqrt(1.0 - first)
-        aside = np.sqrt(1.0 - z * z)
-        other = np.where(abs(n[:, :1]) > 0.9, [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
-        s = np.cross(n, other)
-        s /= np.linalg.norm(s, axis=1)[:, None]
-        d = s * (aside * np.cos(angle))[:, None] + n * z[:, None]
-        d += np.cross(n, s) * (aside * np.sin(angle))[:, None]
+        if mistake in OF_ALL_LIGHTS:
+            beyond, _ = _hit(p + 1e-5 * n, _around(n, rng))
+            seen = alive & (~np.isfinite(beyond) | no_shadows)
+            times = np.pi if mistake == "no pi for any light" else 1.0
+            colour[seen] += times * SKY * (weight * albedo)[seen]
+        d = _around(n, rng, mistake == "uniform")
         weight, p = weight * albedo, p + 1e-5 * n
     return colour.reshape(spp, HEIGHT, WIDTH, 3).mean(axis=0)

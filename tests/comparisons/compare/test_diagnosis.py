@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from comparisons.compare.diagnosis import likeliest, of_rungs
-from comparisons.compare.diagnosis.brightness import hypotheses
+from comparisons.compare.diagnosis import brightness, likeliest, of_rungs, tones
+from comparisons.compare.diagnosis.contest import contenders, possible
 from comparisons.compare.diagnosis.misfit import Misfit
+from comparisons.compare.diagnosis.sample import POINTS
 from comparisons.results.case import FloatArray, Images, RungResult
 from reference_rt.rendering.image import srgb
 from reference_rt.rendering.render import render
@@ -317,6 +318,21 @@ def test_a_cause_reproduces_each_channel_and_each_block() -> None:
     assert not changed.reproduces(falls_to_the_right(1.1 * clean))
 
 
+def test_only_what_a_sample_leaves_possible_is_fitted_to_the_whole_picture() -> None:
+    """A gamma leaves much of a gain; in noise that hides both, the whole picture decides."""
+    rng = np.random.default_rng(3)
+    reference = rng.uniform(0.5, 1.0, (96, 96, 3)) * np.linspace(0.1, 2.0, 96)[:, None, None]
+    error = np.full(reference.shape, 0.01)
+    noise = error * rng.normal(size=reference.shape)
+    for gain, families in ((1.2, ["gain"]), (1.0005, ["gain", "gamma"])):
+        misfit = Misfit(Images(gain * reference + noise, reference, error))
+        small = misfit.sampled()
+        assert small.reference.size == 3 * POINTS < reference.size
+        fits = (brightness.FITS[0], tones.FITS[0])
+        found = possible(list(contenders(fits, small, lambda misfit=misfit: misfit)))
+        assert [one.family for one, _ in found] == families
+
+
 def test_what_is_no_single_cause_has_no_name() -> None:
     rng = np.random.default_rng(7)
     pattern = ndimage.gaussian_filter(rng.normal(size=(96, 96, 3)), (4.0, 4.0, 0.0))
@@ -384,7 +400,7 @@ def test_no_broken_rung_has_no_cause() -> None:
 @pytest.mark.parametrize(("gain", "is_named"), [(2.015, True), (2.05, False), (1.9, False)])
 def test_a_factor_is_named_within_one_percent(gain, is_named):
     reference = np.random.default_rng(1).uniform(0.1, 1.0, (24, 24, 3))
-    found = next(h for h in hypotheses(Misfit(Images(gain * reference, reference)), {}))
+    found = next(h for h in brightness.FITS[0](Misfit(Images(gain * reference, reference))))
     assert ("what it should be" in found.evidence) == is_named
 
 
@@ -393,5 +409,6 @@ def test_pictures_of_8_bits_are_told_by_how_many_values_they_have():
     reference = np.random.default_rng(1).uniform(0.0, 1.0, (64, 64, 3))
     for levels, is_possible in ((200, True), (255, True), (300, False)):
         candidate = np.round(levels * reference) / levels
-        causes = {h.family for h in hypotheses(Misfit(Images(candidate, reference)), {})}
+        misfit = Misfit(Images(candidate, reference))
+        causes = {h.family for fit in brightness.FITS for h in fit(misfit)}
         assert ("8 bits" in causes) == is_possible

@@ -21,7 +21,15 @@ NAMES = {
     "1 / d": "light of points falls with the distance, not with its square",
     "twice": "light is counted twice: by samples of lights, and where paths meet them",
     "one bounce less": "paths are one edge too short",
+    "no shadows of any light": "without shadows",
+    "no shadows at the first surface": "without shadows at the first surface",
+    "no shadows at later surfaces": "without shadows at later surfaces",
+    "no pi for any light": "direct light is not divided by pi",
 }
+
+
+def test_each_mistake_is_tried() -> None:
+    assert {*mistaken_paths.CHANGES, mistaken_paths.UNIFORM} <= {*NAMES.values()}
 
 
 @cache
@@ -44,8 +52,9 @@ def test_a_mistake_is_named(mistake: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_right_path_tracer_has_none() -> None:
-    assert diagnosis.likeliest(images(""), {}, path_lengths(Scene.parse(SCENE))) is None
+@pytest.mark.parametrize("sky", ["", "samples of the sky"])
+def test_a_right_path_tracer_has_none(sky: str) -> None:
+    assert diagnosis.likeliest(images(sky), {}, path_lengths(Scene.parse(SCENE))) is None
 
 
 def test_the_parts_are_those_of_our_picture() -> None:

@@ -63,6 +63,13 @@ def test_a_fault_is_left_out_for_a_reason_that_is_told(monkeypatch: pytest.Monke
         assert found.left_out.startswith(("our picture changes by", "the scene does not have"))
 
 
+def test_what_noise_alone_changes_as_much_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The corridor is nearly symmetric, and its light is noisy."""
+    monkeypatch.setattr(of_limits, "gather", pytest.fail)
+    (found,) = planted("white_corridor", [BY_NAME["picture mirrored"]])
+    assert found.left_out.startswith("our picture changes by")
+
+
 def test_a_fault_that_changes_the_picture_is_planted(monkeypatch: pytest.MonkeyPatch) -> None:
     planted: list[Scene] = []
 

@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import invoke
+from faulty_sources import plant
 from gate_checks import SCENE, files, pictures, run, status, write
 from junitparser import JUnitXml
 
+from comparisons.experiments.selftest import SourceFault
 from comparisons.gate import reference_cache
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.image import srgb, write_png
@@ -43,6 +45,23 @@ def test_right_pictures_pass(right: FloatArray, monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(reference_cache, "render", refuse)
     assert run(*files(right), "--scene", "ball.yaml")[0].exit_code == 0
+
+
+def test_a_description_that_we_misread_fails() -> None:
+    """Green and blue exchanged by our reader, in the reference and so also in the candidate of
+    whoever exchanges them, too: the numbers of the file read twice are not the same."""
+    with pytest.MonkeyPatch.context() as patch:
+        rgb = "    return rgb\n\n\ndef refl"
+        swapped = "    return rgb[::2] + rgb[1:2]\n\n\ndef refl"
+        plant(patch, SourceFault("", "", "core/model.py", rgb, swapped))
+        result, found = run(*files(pictures()), "--scene", "ball.yaml")
+    assert result.exit_code == 1, result.output
+    case = found["cases"][0]
+    assert case["verdict"] == "differ"
+    said = "materials.lamp.radiance: the description says 60 50 20, the rendered scene has 60 20 50"
+    assert case["reason"] == f"files: {said}; and 1 more"
+    assert [rung["status"] for rung in case["tiers"].values()] == ["differ"] + 3 * ["agree"]
+    assert said in Path("out/report.html").read_text()
 
 
 def test_one_percent_more_fails(right: FloatArray) -> None:

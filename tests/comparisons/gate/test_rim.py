@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.question import Question
@@ -65,3 +66,14 @@ def test_all_that_has_pixels_is_cropped() -> None:
 def test_a_rim_that_leaves_nothing(rim: int) -> None:
     with pytest.raises(UsageError, match="less than half of the shorter side"):
         gate_pictures(candidates(1.0), Reference(noisy(0, 16)), Question(rim=rim))
+
+
+def test_hypotheses_lose_the_rim_of_all_that_they_say() -> None:
+    picture = noisy(2, 1)[0]
+    whole = Hypothesis("any", "any", "", picture, 0, noise=picture**2)
+    question = question_without_rim(Question(rim=2, lengths=lambda reference: [whole]))
+    assert question.lengths is not None
+    (found,) = question.lengths(picture[2:-2, 2:-2])
+    assert np.array_equal(found.picture, picture[2:-2, 2:-2])
+    assert found.noise is not None
+    assert np.array_equal(found.noise, found.picture**2)

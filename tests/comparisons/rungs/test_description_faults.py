@@ -12,7 +12,7 @@ from faulty_sources import plant
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, compare_scene
 from comparisons.experiments.selftest import SourceFault
-from comparisons.rungs import files
+from comparisons.rungs.files import files, misread
 from reference_rt.cameras import Orthographic, Perspective, Pinhole, ThinLens
 from reference_rt.cameras.film import Film, GaussianFilter
 from reference_rt.integrators import Direct
@@ -241,10 +241,13 @@ DEFAULTS: tuple[tuple[Any, str, Any, str], ...] = (
 def test_faults_of_validators(name: str) -> None:
     text, place, planted = VALIDATORS[name]
     assert files(Scene.parse(text)).status == "agree"
+    assert misread(Scene.parse(text)) is None
     with planted():
-        found = files(Scene.parse(text))
+        found, in_gate = files(Scene.parse(text)), misread(Scene.parse(text))
     assert found.status == "differ"
     assert place in found.reason
+    assert in_gate is not None
+    assert (in_gate.status, in_gate.reason) == (found.status, found.reason)
     assert files(Scene.parse(text)).status == "agree"
 
 
@@ -268,6 +271,7 @@ def test_faults_of_defaults(fault: tuple[Any, str, Any, str]) -> None:
         read = files(Scene.parse(text))
         kept = Scene.parse(text)
         python = files(Scene(**{name: getattr(kept, name) for name in kept.model_fields_set}))
+        assert misread(kept) is not None
     for found in (read, python):
         assert found.status == "differ", found.reason
         assert re.search(rf"[.\]\w]\.{field}: the documented default is ", found.reason)

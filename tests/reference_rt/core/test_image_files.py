@@ -215,3 +215,25 @@ def test_bitmaps_are_read_beside_the_scene(tmp_path):
     )
     textures = build_tables(rt.Scene.load(tmp_path / "scene.yaml")).textures
     assert np.array_equal(lookup(textures.bitmaps, 0, 0.01, 0.99), IMAGE[0, 0] / 255)
+
+
+@pytest.mark.parametrize("tag", [256, 257, 278], ids=["width", "height", "rows of a strip"])
+def test_a_tiff_whose_strips_leave_pixels_out_is_refused(tmp_path, tag):
+    """Of a width or height that a bit made large, or of strips that end before the last row.  The
+    rest would be black, and take seconds."""
+    sound = tmp_path / "sound.tif"
+    Image.fromarray(IMAGE).save(sound)
+    assert np.array_equal(read_image(sound, "linear").shape, (5, 7, 3))
+    content = bytearray(sound.read_bytes())
+    (first,) = struct.unpack_from("<I", content, 4)
+    (count,) = struct.unpack_from("<H", content, first)
+    for k in range(count):
+        at = first + 2 + 12 * k
+        (name,) = struct.unpack_from("<H", content, at)
+        if name == tag:
+            value = 2 if tag == 278 else 3 * 2**20
+            struct.pack_into("<HHII", content, at, name, 4, 1, value)
+    damaged = tmp_path / "damaged.tif"
+    damaged.write_bytes(content)
+    with pytest.raises(ValueError, match=r"damaged\.tif: cannot be read: .*expected a whole image"):
+        read_image(damaged, "linear")
