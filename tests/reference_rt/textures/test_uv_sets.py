@@ -49,7 +49,7 @@ def square(**more):
     }
 
 
-def seen(tmp_path, textures, radiance, shapes, integrator=None, specialised=None, **more):
+def seen(tmp_path, textures, radiance, shapes, integrator=None, **more):
     """The colours of a picture of the unit square, seen a little from the right, without the column
     beyond it: row by row from the top."""
     Image.fromarray(TEXELS).save(tmp_path / "t.png")
@@ -73,7 +73,7 @@ def seen(tmp_path, textures, radiance, shapes, integrator=None, specialised=None
         **more,
     }
     scene = rt.Scene.parse(json.dumps(scene), folder=tmp_path)
-    return np.asarray(rt.render(scene, specialised=specialised).colour)[:, : SIDE - 1]
+    return np.asarray(rt.render(scene).colour)[:, : SIDE - 1]
 
 
 def places():
@@ -103,15 +103,14 @@ def products(kinds):
     return named | {"all": {"type": "product", "of": [*named]}}
 
 
-@pytest.mark.parametrize("specialised", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_each_texture_has_its_own_set(tmp_path, specialised):
+def test_each_texture_has_its_own_set(tmp_path):
     """On a mesh beside meshes with fewer sets, whose rows the hierarchy mixes."""
     textures = products(KINDS)
     others = [
         {**SQUARE, "material": None, "transform": [{"translate": [k, 0, -1]}]} for k in (-2, 2, 4)
     ]
     shapes = [*others[:2], square(), others[2]]
-    found = seen(tmp_path, textures, "all", shapes, specialised=specialised)
+    found = seen(tmp_path, textures, "all", shapes)
     uv = sets(*places())
     expected = np.prod([looked(kind, uv[k]) for kind in KINDS for k in range(3)], axis=0)
     assert np.allclose(found, expected, rtol=1e-14, atol=0.0)
