@@ -304,13 +304,14 @@ def _pictures(
         return pictures.whitted(scene, tables, counterpart), None
     start = time.perf_counter()
     first, numbers = budget.replicates, 3 * scene.film.width * scene.film.height
+    enough = max(first, budget.most_first or 0)  # to show a difference, and its cause
     most = looks.most_kept(first, numbers)
     of_both = pictures.Replicates(
-        scene, tables, counterpart, budget, threads, first if decided else most
+        scene, tables, counterpart, budget, threads, enough if decided else most
     )
     if budget.seconds is None or decided:
-        of_both.grow(first)
-        say(f"{first} + {first} pictures ({time.perf_counter() - start:.1f} s)")
+        of_both.grow(enough)
+        say(f"{enough} + {enough} pictures ({time.perf_counter() - start:.1f} s)")
         return of_both.rendered(), None
 
     rendered: Rendered | None = None
@@ -329,7 +330,12 @@ def _pictures(
         seconds=budget.seconds,
         first=first,
         most=most,
+        most_first=enough,
+        asked=partial(of_both.asked, budget.limit),
         say=lambda line: say(f"{line} ({time.perf_counter() - start:.1f} s)"),
     )
+    if looked.rung.status == "differ" and of_both.count < enough:
+        of_both.grow(enough)
+        rendered = of_both.rendered()
     assert rendered is not None
     return rendered, looked

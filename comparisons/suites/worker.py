@@ -106,6 +106,8 @@ def _traced(request: Request) -> str:
 def described(budget: Budget) -> str:
     """A budget as a note for people."""
     parts = [f"limit {100.0 * budget.limit:g} %", _replicates(budget)]
+    if budget.parts > 1:
+        parts.append(f"a part in {budget.parts} of the scene's samples each")
     if budget.spp is not None:
         parts.append(f"{budget.spp} samples per pixel")
     if budget.reference_spp is not None:
@@ -120,10 +122,10 @@ def described(budget: Budget) -> str:
 def _replicates(budget: Budget) -> str:
     if budget.seconds is None:
         return f"{budget.replicates} replicates"
-    return (
-        f"{budget.replicates} replicates, doubled until the question is decided or "
-        f"{budget.seconds:g} s have passed"
-    )
+    first = f"{budget.replicates} replicates"
+    if budget.most_first is not None:
+        first = f"{budget.replicates} to {budget.most_first} replicates, as the noise asks"
+    return f"{first}, and more until the question is decided or {budget.seconds:g} s have passed"
 
 
 def compare(
