@@ -19,6 +19,7 @@ from comparisons.geometry.flatten import copies_of
 from comparisons.integrators.mistakes import in_place_of
 from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.counterpart import Counterpart
+from comparisons.mitsuba.parse import file_of
 from comparisons.results.case import Case, RungResult
 from comparisons.rungs.layers.rung import applies
 from comparisons.rungs.limited import Rest
@@ -26,7 +27,7 @@ from comparisons.rungs.witness import witness_of
 from comparisons.translator import MOST_INSTANCES, UntranslatableError, load
 from comparisons.translator.moved import with_float32_vertices
 from comparisons.translator.notes import notes_of
-from comparisons.translator.reference import changes_to, file_of, own_scene
+from comparisons.translator.reference import changes_to, own_scene
 from reference_rt.cameras.film import BoxFilter, Film
 from reference_rt.cli.explain import explain
 from reference_rt.integrators import RayCast, Whitted

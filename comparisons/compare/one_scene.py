@@ -28,12 +28,12 @@ def compare_one(
 ) -> NotebookCase:
     """Render a scene, or a scene file, by reference_rt and by Mitsuba, and judge the difference.
 
-    spp: samples per pixel of each picture, None for a part of the scene's.  size, seed: None for the
-    scene's own.  replicates: independent pictures by each renderer at the first look, None for as
-    many as the noise asks for; others are added until the question is decided or `time_limit`
-    seconds have passed; None: one look.  limit: the smallest relative bias of the image mean that must be
-    detectable.  threads: ours, None for all cores.  witness: a third renderer, whose pictures say
-    who stands alone.  say: called with a line about each step.
+    spp: samples per pixel of each picture, None for a part of the scene's.  size, seed: None for
+    the scene's own.  replicates: independent pictures by each renderer at the first look, None for
+    as many as the noise asks for; others are added until the question is decided or `time_limit`
+    seconds have passed; None: one look.  limit: the smallest relative bias of the image mean that
+    must be detectable.  threads: ours, None for all cores.  witness: a third renderer, whose
+    pictures say who stands alone.  say: called with a line about each step.
 
     Mitsuba runs in this process.  Raises SceneError, ReferenceUnavailableError.
     """

@@ -5,7 +5,8 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from scipy import ndimage, optimize
+import scipy
+from scipy import ndimage
 
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.results.case import FloatArray, Images
@@ -201,7 +202,7 @@ class Misfit:
         # The normal equations, whose root is as small as the number of columns.
         rows = weighted.reshape(-1, weighted.shape[-1])
         triangle = np.asarray(np.linalg.qr(rows, mode="r"))
-        return np.asarray(optimize.nnls(triangle[:, :-1], triangle[:, -1])[0])
+        return np.asarray(scipy.optimize.nnls(triangle[:, :-1], triangle[:, -1])[0])
 
     def nearest(self, columns: FloatArray) -> FloatArray:
         """The factors of (height, width, 3, columns), the same for all channels, whose sum is

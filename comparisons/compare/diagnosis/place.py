@@ -6,7 +6,8 @@ from functools import partial
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage, optimize
+import scipy
+from scipy import ndimage
 
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.diagnosis.misfit import REST, Misfit
@@ -162,7 +163,7 @@ def filters(misfit: Misfit, base: FloatArray) -> Iterator[Move]:
     def blurred(p: FloatArray, sigma: float) -> FloatArray:
         return np.asarray(ndimage.gaussian_filter(p, (sigma, sigma, 0.0), mode="nearest"))
 
-    fit = optimize.minimize_scalar(
+    fit = scipy.optimize.minimize_scalar(
         lambda s: misfit.squares(blurred(base, float(s))),
         bounds=(0.15, 3.0),
         method="bounded",

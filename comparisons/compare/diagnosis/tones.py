@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from scipy import optimize
+import scipy
 
 from comparisons.compare.diagnosis.colour import LUMINANCE
 from comparisons.compare.diagnosis.hypothesis import Hypothesis, of_pixels
@@ -117,7 +117,7 @@ def _is_customary(gamma: float) -> bool:
 
 def _fitted(misfit: Misfit, mapped: Callable[[float], FloatArray]) -> float:
     """The exponent, between 0.3 and 3.3, with the least misfit."""
-    fit = optimize.minimize_scalar(
+    fit = scipy.optimize.minimize_scalar(
         lambda g: misfit.squares(mapped(math.exp(g))),
         bounds=(-1.2, 1.2),
         method="bounded",

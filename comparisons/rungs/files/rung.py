@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.geometry.flatten import maps_of
+from comparisons.mitsuba.parse import file_of
 from comparisons.results.case import RungResult
 from comparisons.rungs.files.description import Description, second_reading
 from comparisons.rungs.files.equations import check_equation
@@ -16,7 +17,6 @@ from comparisons.rungs.files.gltf import check_gltf
 from comparisons.rungs.files.images import check_bitmap, check_environment
 from comparisons.rungs.files.meshes import check_mesh
 from comparisons.shapes import type_of
-from comparisons.translator.reference import file_of
 from reference_rt.lights import EnvironmentMap
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Mesh, Triangle
