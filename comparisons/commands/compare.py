@@ -79,35 +79,44 @@ def compare(
 
     Finished cases are kept in the output folder and not run again.
     """
-    with compare_extra():
-        from comparisons.compare.budget import usual
-        from comparisons.compare.looks import SECONDS
-        from comparisons.results.case import exit_code
-        from comparisons.suites.run import Options, Run, run_cases, summarise
-        from comparisons.suites.suite import Changes, plan_of_files
-
-    changes = Changes(
-        spp=spp, size=size, seed=seed, defaults=by_name(define), allow_missing=allow_missing
-    )
     if fixed and time_limit is not None:
         raise UsageError("got --fixed and --time-limit; expected one of them")
-    seconds = SECONDS if time_limit is None else seconds_of(time_limit, "--time-limit")
-    budget = usual(spp, replicates, seconds, fixed=fixed, witness=witness)
-    plan = plan_of_files(scenes, changes, budget)
-    given = {
-        "replicates": replicates,
-        "time-limit": time_limit,
-        "fixed": fixed or None,
-        "witness": witness,
-    }
-    work = tuple(w._replace(again=_command(w.path, changes, given)) for w in plan.work)
+    with compare_extra():
+        from comparisons.runs.processes import Children
+        from comparisons.suites import worker
 
-    def tell(run: Run) -> None:
-        summarise(run.cases, run.walls, run.not_run, run.missing, every=True)
-        typer.echo(f"{options.results}, {options.report}", err=True)
+    with closing(Children()) as children:
+        if fresh or not (out / "cases").is_dir():  # where there is one, nothing may be left to do
+            children.begin(tuple(worker(threads)))
+        with compare_extra():
+            from comparisons.compare.budget import usual
+            from comparisons.compare.looks import SECONDS
+            from comparisons.results.case import exit_code
+            from comparisons.suites.run import Options, Run, run_cases, summarise
+            from comparisons.suites.suite import Changes, plan_of_files
 
-    options = Options(out, threads=threads, fresh=fresh, steps=True, tell=tell)
-    run = run_cases(plan._replace(work=work), options)
+        changes = Changes(
+            spp=spp, size=size, seed=seed, defaults=by_name(define), allow_missing=allow_missing
+        )
+        seconds = SECONDS if time_limit is None else seconds_of(time_limit, "--time-limit")
+        budget = usual(spp, replicates, seconds, fixed=fixed, witness=witness)
+        plan = plan_of_files(scenes, changes, budget)
+        given = {
+            "replicates": replicates,
+            "time-limit": time_limit,
+            "fixed": fixed or None,
+            "witness": witness,
+        }
+        work = tuple(w._replace(again=_command(w.path, changes, given)) for w in plan.work)
+
+        def tell(run: Run) -> None:
+            summarise(run.cases, run.walls, run.not_run, run.missing, every=True)
+            typer.echo(f"{options.results}, {options.report}", err=True)
+
+        options = Options(
+            out, threads=threads, fresh=fresh, steps=True, tell=tell, children=children
+        )
+        run = run_cases(plan._replace(work=work), options)
     raise typer.Exit(exit_code(run.cases, run.missing))
 
 
