@@ -107,7 +107,7 @@ def until_decided(
     first: int = FIRST,
     most: int | None = None,
     most_first: int = 0,
-    asked: Callable[[], int] | None = None,
+    asked: Callable[[float], int] | None = None,
     say: Callable[[str], None] = lambda line: None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> Looks:
@@ -117,7 +117,8 @@ def until_decided(
     them with this share of the levels;  seconds: no replicates are begun that would probably end
     later;  first: replicates of the first look, which is taken in any case;  most: of the `Pool`
     that keeps them, whose groups a look has as a whole;  asked: how many replicates a decision
-    takes by the noise of those that there are, None: their number is doubled;  most_first: while it
+    with this share of the levels takes, by the noise of those that there are; None: their number is
+    doubled;  most_first: while it
     asks for more, the first look waits, up to so many;  say: is told of each look.
     """
     counts: list[int] = []
@@ -134,7 +135,7 @@ def until_decided(
         grow(count)
         each = (clock() - begun) / (count - before)
         while asked is not None and not counts and count < most_first:
-            fits = in_time(min(_whole(asked(), most), most_first), each)
+            fits = in_time(min(_whole(asked(level_of(1)), most), most_first), each)
             if fits <= count:
                 break
             grow(fits)
@@ -146,7 +147,7 @@ def until_decided(
         if rung.status != "inconclusive":
             say(told)
             return Looks(tuple(counts), level_of(look), rung)
-        wish = 2 * count if asked is None else _next(count, asked())
+        wish = 2 * count if asked is None else _next(count, asked(level_of(look + 1)))
         fits = in_time(_whole(wish, most), each)
         if fits < WORTH * count:
             say(f"{told}; the time limit of {seconds:g} s is reached")

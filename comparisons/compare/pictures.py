@@ -7,7 +7,7 @@ import numpy as np
 
 from comparisons.compare.budget import Budget
 from comparisons.compare.judge import Rendered, of_replicates
-from comparisons.compare.looks import Pool, level_of, mean_picture
+from comparisons.compare.looks import Pool, mean_picture
 from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.referee.sizes import ShapeSizes
@@ -168,13 +168,13 @@ class Replicates:
         """The replicates of each side."""
         return len(self._sides[0])
 
-    def asked(self, limit: float) -> int:
-        """How many replicates it takes to see a bias of `limit`, by the noise of those that there
-        are, at the first look."""
+    def asked(self, limit: float, level: float) -> int:
+        """How many replicates it takes to see a bias of `limit` at a look with this share of the
+        levels, by the noise of those that there are."""
         kept = self._sides[0].pictures()
         each = self.count // len(kept)
         pictures = (np.stack(side.pictures()) for side in self._sides)
-        return each * replicates_asked(*pictures, limit, level_of(1))
+        return each * replicates_asked(*pictures, limit, level)
 
     def rendered(self) -> Rendered:
         """What there is so far; the images are its means.  seconds["render"] is the median time of
