@@ -41,9 +41,6 @@ PATIENCE = 3
 """And its first look waits until the noise permits a decision, up to so many times FIRST: a
 difference that is there should not be told too late."""
 
-MOST_GROWTH = 4
-"""Most times as many replicates at a look as at the one before."""
-
 SECONDS = 600.0
 """Default time limit: replicates are not added beyond it."""
 
@@ -157,11 +154,12 @@ def until_decided(
 
 
 def _next(count: int, asked: int) -> int:
-    """The replicates of the look after one at `count` that did not decide.  If their noise permits
-    a decision, the difference is near a limit: then there are twice as many."""
+    """The replicates of the look after one at `count` that did not decide: twice as many at most,
+    since the more there are, the less rare light seems.  If their noise permits a decision, the
+    difference is near a limit: then there are twice as many, too."""
     if asked <= count:
         return 2 * count
-    return min(max(asked, math.ceil(WORTH * count)), MOST_GROWTH * count)
+    return min(max(asked, math.ceil(WORTH * count)), 2 * count)
 
 
 def _whole(count: int, most: int | None) -> int:
