@@ -47,8 +47,8 @@ def compare(
     spp: Annotated[
         int | None,
         typer.Option(
-            help="Samples per pixel of each replicate. (default: an eighth of the scene's; "
-            "with --replicates or --fixed all)"
+            help="Samples per pixel of each replicate. (default: an eighth of the scene's, in "
+            "small pictures up to a quarter; with --replicates or --fixed all)"
         ),
     ] = None,
     size: Annotated[

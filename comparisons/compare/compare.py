@@ -9,7 +9,7 @@ from typing import Any
 
 from comparisons import rungs as ladder
 from comparisons.compare import looks, pictures, precision, ray_starts
-from comparisons.compare.budget import LEAST, Budget
+from comparisons.compare.budget import Budget, part_of
 from comparisons.compare.control import control
 from comparisons.compare.darkness import why_dark
 from comparisons.compare.judge import Evidence, Rendered, at_look, check, judge
@@ -93,7 +93,10 @@ def budgeted(scene: Scene, budget: Budget) -> Scene:
     elif not isinstance(sampler, Grid) and scene.integrator.deterministic:
         sampler = Grid(spp=math.isqrt(sampler.spp) ** 2)
     if not scene.integrator.deterministic:
-        spp = budget.spp or max(min(LEAST, sampler.spp), sampler.spp // budget.parts)
+        pixels = scene.film.width * scene.film.height
+        if budget.size is not None:
+            pixels = math.prod(budget.size)
+        spp = budget.spp or part_of(sampler.spp, budget.parts, pixels)
         sampler = sampler.model_copy(update={"spp": spp})
     return scene.changed(film=scene.film.model_copy(update=film), sampler=sampler)
 

@@ -48,6 +48,10 @@ WORTH = 1.25
 """The least growth that is worth a look: it narrows the interval by a tenth, which is about what
 the smaller level of a further look costs."""
 
+CUSHION = 1.15
+"""How many times the replicates that the noise asks for a later look has: their number is known to
+a fifth, and a further look costs more than a few replicates."""
+
 MOST_KEPT = 64
 """Most pictures of a side that are kept; beyond it pairs of replicates are averaged. With 63
 degrees of freedom a side, Student's quantiles are within 5 % of the normal ones."""
@@ -159,7 +163,7 @@ def _next(count: int, asked: int) -> int:
     difference is near a limit: then there are twice as many, too."""
     if asked <= count:
         return 2 * count
-    return min(max(asked, math.ceil(WORTH * count)), 2 * count)
+    return min(math.ceil(max(CUSHION * asked, WORTH * count)), 2 * count)
 
 
 def _whole(count: int, most: int | None) -> int:

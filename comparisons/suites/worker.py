@@ -123,7 +123,8 @@ def described(budget: Budget) -> str:
     """A budget as a note for people."""
     parts = [f"limit {100.0 * budget.limit:g} %", _replicates(budget)]
     if budget.parts > 1:
-        parts.append(f"a part in {budget.parts} of the scene's samples each")
+        more = "twice that in small pictures"
+        parts.append(f"a part in {budget.parts} of the scene's samples each, up to {more}")
     if budget.spp is not None:
         parts.append(f"{budget.spp} samples per pixel")
     if budget.reference_spp is not None:
