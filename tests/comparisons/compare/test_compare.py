@@ -236,10 +236,10 @@ def small(name: str, side: int = 24, spp: int = 64) -> Scene:
 
 def test_what_was_used_is_said_and_is_the_same_again() -> None:
     """The number of replicates depends on their noise alone."""
-    subject = comparisons.compare.compare.Subject(small("white_corridor"))
+    subject = comparisons.compare.compare.Subject(small("soft_shadows"))
     cases = [
         comparisons.compare.compare.compare_scene(
-            subject, usual(limit=0.06), lambda _: None, rungs=("statistics",)
+            subject, usual(limit=0.015), lambda _: None, rungs=("statistics",)
         )
         for _ in range(2)
     ]
@@ -249,8 +249,8 @@ def test_what_was_used_is_said_and_is_the_same_again() -> None:
     (count,) = numbers[0]["replicates_at_looks"]
     assert 8 <= count <= 24
     assert numbers[0]["replicates_candidate"] == numbers[0]["replicates_reference"] == count
-    assert max(numbers[0]["detectable_bias"].values()) <= 0.06
-    said = f"{count} pictures by each renderer, of 8 samples per pixel (sobol) and of 8 (Mitsuba's"
+    assert max(numbers[0]["detectable_bias"].values()) <= 0.015
+    said = f"{count} pictures by each renderer, of 16 samples per pixel (sobol) and of 16 (Mitsuba"
     assert sum(said in note for note in cases[0].notes) == 1
     assert numbers[0] == numbers[1]
     assert cases[0].images is not None
