@@ -173,8 +173,8 @@ class Replicates:
         levels, by the noise of those that there are."""
         kept = self._sides[0].pictures()
         each = self.count // len(kept)
-        pictures = (np.stack(side.pictures()) for side in self._sides)
-        return each * replicates_asked(*pictures, limit, level)
+        ours, theirs = (np.stack(side.pictures()) for side in self._sides)
+        return each * replicates_asked(ours, theirs, limit, level)
 
     def rendered(self) -> Rendered:
         """What there is so far; the images are its means.  seconds["render"] is the median time of
