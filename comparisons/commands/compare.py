@@ -47,8 +47,8 @@ def compare(
     spp: Annotated[
         int | None,
         typer.Option(
-            help="Samples per pixel of each replicate. (default: a quarter of the scene's; "
-            "with --replicates or --fixed all)"
+            help="Samples per pixel of each replicate. (default: an eighth of the scene's, in "
+            "small pictures up to a quarter; with --replicates or --fixed all)"
         ),
     ] = None,
     size: Annotated[
@@ -60,7 +60,7 @@ def compare(
         typer.Option(
             min=2,
             help="Independent pictures by each renderer (path tracing) at the first look. "
-            "(default: 12; with --spp 8, with --fixed 16)",
+            "(default: 8 to 24, by the noise; with --spp 8, with --fixed 16)",
         ),
     ] = None,
     time_limit: TimeLimit = None,
@@ -73,47 +73,50 @@ def compare(
 ) -> None:
     """Render scenes with reference_rt and with Mitsuba, and report whether they agree.
 
-    Noisy pictures are looked at, and doubled in number until they decide or --time-limit is
+    Noisy pictures are added, as many as their noise asks for, until they decide or --time-limit is
     reached: easy scenes are done sooner. The chance of a false alarm over all looks is that of one.
     The reference of an .xml scene is that file, loaded by Mitsuba.
 
     Finished cases are kept in the output folder and not run again.
     """
-    with compare_extra():
-        from comparisons.compare.budget import Budget
-        from comparisons.compare.looks import FIRST, PARTED, PARTS, SECONDS
-        from comparisons.results.case import exit_code
-        from comparisons.suites.run import Options, Run, run_cases, summarise
-        from comparisons.suites.suite import Changes, plan_of_files
-
-    changes = Changes(
-        spp=spp, size=size, seed=seed, defaults=by_name(define), allow_missing=allow_missing
-    )
     if fixed and time_limit is not None:
         raise UsageError("got --fixed and --time-limit; expected one of them")
-    seconds = SECONDS if time_limit is None else seconds_of(time_limit, "--time-limit")
-    if fixed:
-        budget = Budget(replicates=replicates or Budget().replicates)
-    elif spp is None and replicates is None:
-        budget = Budget(replicates=PARTED, parts=PARTS, seconds=seconds)
-    else:
-        budget = Budget(replicates=replicates or FIRST, seconds=seconds)
-    budget = budget.model_copy(update={"reference_sampler": "multijitter", "witness": witness})
-    plan = plan_of_files(scenes, changes, budget)
-    given = {
-        "replicates": replicates,
-        "time-limit": time_limit,
-        "fixed": fixed or None,
-        "witness": witness,
-    }
-    work = tuple(w._replace(again=_command(w.path, changes, given)) for w in plan.work)
+    with compare_extra():
+        from comparisons.runs.processes import Children
+        from comparisons.suites import worker
 
-    def tell(run: Run) -> None:
-        summarise(run.cases, run.walls, run.not_run, run.missing, every=True)
-        typer.echo(f"{options.results}, {options.report}", err=True)
+    with closing(Children()) as children:
+        if fresh or not (out / "cases").is_dir():  # where there is one, nothing may be left to do
+            children.begin(tuple(worker(threads)))
+        with compare_extra():
+            from comparisons.compare.budget import usual
+            from comparisons.compare.looks import SECONDS
+            from comparisons.results.case import exit_code
+            from comparisons.suites.run import Options, Run, run_cases, summarise
+            from comparisons.suites.suite import Changes, plan_of_files
 
-    options = Options(out, threads=threads, fresh=fresh, steps=True, tell=tell)
-    run = run_cases(plan._replace(work=work), options)
+        changes = Changes(
+            spp=spp, size=size, seed=seed, defaults=by_name(define), allow_missing=allow_missing
+        )
+        seconds = SECONDS if time_limit is None else seconds_of(time_limit, "--time-limit")
+        budget = usual(spp, replicates, seconds, fixed=fixed, witness=witness)
+        plan = plan_of_files(scenes, changes, budget)
+        given = {
+            "replicates": replicates,
+            "time-limit": time_limit,
+            "fixed": fixed or None,
+            "witness": witness,
+        }
+        work = tuple(w._replace(again=_command(w.path, changes, given)) for w in plan.work)
+
+        def tell(run: Run) -> None:
+            summarise(run.cases, run.walls, run.not_run, run.missing, every=True)
+            typer.echo(f"{options.results}, {options.report}", err=True)
+
+        options = Options(
+            out, threads=threads, fresh=fresh, steps=True, tell=tell, children=children
+        )
+        run = run_cases(plan._replace(work=work), options)
     raise typer.Exit(exit_code(run.cases, run.missing))
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from comparisons import rungs as ladder
 from comparisons.compare import looks, pictures, precision, ray_starts
-from comparisons.compare.budget import LEAST, Budget
+from comparisons.compare.budget import Budget, part_of
 from comparisons.compare.control import control
 from comparisons.compare.darkness import why_dark
 from comparisons.compare.judge import Evidence, Rendered, at_look, check, judge
@@ -19,6 +19,7 @@ from comparisons.geometry.flatten import copies_of
 from comparisons.integrators.mistakes import in_place_of
 from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.counterpart import Counterpart
+from comparisons.mitsuba.parse import file_of
 from comparisons.results.case import Case, RungResult
 from comparisons.rungs.layers.rung import applies
 from comparisons.rungs.limited import Rest
@@ -26,7 +27,7 @@ from comparisons.rungs.witness import witness_of
 from comparisons.translator import MOST_INSTANCES, UntranslatableError, load
 from comparisons.translator.moved import with_float32_vertices
 from comparisons.translator.notes import notes_of
-from comparisons.translator.reference import changes_to, file_of, own_scene
+from comparisons.translator.reference import changes_to, own_scene
 from reference_rt.cameras.film import BoxFilter, Film
 from reference_rt.cli.explain import explain
 from reference_rt.integrators import RayCast, Whitted
@@ -92,7 +93,10 @@ def budgeted(scene: Scene, budget: Budget) -> Scene:
     elif not isinstance(sampler, Grid) and scene.integrator.deterministic:
         sampler = Grid(spp=math.isqrt(sampler.spp) ** 2)
     if not scene.integrator.deterministic:
-        spp = budget.spp or max(min(LEAST, sampler.spp), sampler.spp // budget.parts)
+        pixels = scene.film.width * scene.film.height
+        if budget.size is not None:
+            pixels = math.prod(budget.size)
+        spp = budget.spp or part_of(sampler.spp, budget.parts, pixels)
         sampler = sampler.model_copy(update={"spp": spp})
     return scene.changed(film=scene.film.model_copy(update=film), sampler=sampler)
 
@@ -304,13 +308,14 @@ def _pictures(
         return pictures.whitted(scene, tables, counterpart), None
     start = time.perf_counter()
     first, numbers = budget.replicates, 3 * scene.film.width * scene.film.height
+    enough = max(first, budget.most_first or 0)  # to show a difference, and its cause
     most = looks.most_kept(first, numbers)
     of_both = pictures.Replicates(
-        scene, tables, counterpart, budget, threads, first if decided else most
+        scene, tables, counterpart, budget, threads, enough if decided else most
     )
     if budget.seconds is None or decided:
-        of_both.grow(first)
-        say(f"{first} + {first} pictures ({time.perf_counter() - start:.1f} s)")
+        of_both.grow(enough)
+        say(f"{enough} + {enough} pictures ({time.perf_counter() - start:.1f} s)")
         return of_both.rendered(), None
 
     rendered: Rendered | None = None
@@ -329,7 +334,12 @@ def _pictures(
         seconds=budget.seconds,
         first=first,
         most=most,
+        most_first=enough,
+        asked=partial(of_both.asked, budget.limit),
         say=lambda line: say(f"{line} ({time.perf_counter() - start:.1f} s)"),
     )
+    if looked.rung.status == "differ" and of_both.count < enough:
+        of_both.grow(enough)
+        rendered = of_both.rendered()
     assert rendered is not None
     return rendered, looked

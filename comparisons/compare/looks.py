@@ -1,19 +1,23 @@
 """Looks at a growing number of replicates, until the question is decided: a group-sequential test.
 
-The replicates are doubled between looks, and each look tests all that there are so far. With the
-full level at every look a right renderer would have a false alarm at some look several times too
-often. So the level is spent (Lan and DeMets 1983): look 1 uses half of each family's level, look 2
-a quarter, look 3 an eighth. By the union bound the chance of a false alarm at any of the looks is
-below the stated level, however many looks there are and whatever the law of the noise.
+Each look tests all replicates that there are so far. With the full level at every look a right
+renderer would have a false alarm at some look several times too often. So the level is spent (Lan
+and DeMets 1983): look 1 uses half of each family's level, look 2 a quarter, look 3 an eighth. By
+the union bound the chance of a false alarm at any of the looks is below the stated level, however
+many looks there are and whatever the law of the noise.
 
 The price is small, because the levels are small: the interval of look 3 is 13 % wider than that of
 a single look with as many replicates. The correlation of successive looks could be used to gain a
 part of it back, but only if the noise were normal.
 
-The replicates of a look depend on the number of the look and on the time that is left, never on the
-differences that were seen: otherwise a look could be placed where noise is largest.
+The replicates of a look depend on the number of the look, on the noise and on the time that is
+left, never on the differences that were seen: otherwise a look could be placed where noise is
+largest. Reading the noise is no look (an internal pilot, Wittes and Brittain 1990): of normal noise
+the spread tells nothing of the mean. Of skewed noise it does, on both sides alike, and with it the
+stopping: what that does to false alarms is measured (`tests/comparisons/compare/test_looks.py`).
 """
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,13 +33,13 @@ FIRST = 8
 """Replicates of a side at the first look: the least that gives the rank test of blocks
 (`statistics.ranks`) enough contrasts."""
 
-PARTS, PARTED = 4, 12
-"""Unless it is told otherwise, `compare` divides a scene's samples into so many parts, and takes so
-many replicates of one part each at the first look.  More degrees of freedom make Student's
-quantiles smaller.  Of the Cornell box 10 replicates of 32 samples, Mitsuba's independent, take 16
-CPU seconds and would show a bias of 0.37 % of the image, 5.7 % of half of the tiles and 102 % of
-half of the pixels.  With Mitsuba's `multijitter` 12 of 16 samples take 10 and show 0.33 %, 5.5 %
-and 94 %."""
+PARTS = 8
+"""Unless it is told otherwise, `compare` divides a scene's samples into so many parts, and each
+replicate has one: of small replicates the noise can ask for a few more."""
+
+PATIENCE = 3
+"""And its first look waits until the noise permits a decision, up to so many times FIRST: a
+difference that is there should not be told too late."""
 
 SECONDS = 600.0
 """Default time limit: replicates are not added beyond it."""
@@ -43,6 +47,10 @@ SECONDS = 600.0
 WORTH = 1.25
 """The least growth that is worth a look: it narrows the interval by a tenth, which is about what
 the smaller level of a further look costs."""
+
+CUSHION = 1.15
+"""How many times the replicates that the noise asks for a later look has: their number is known to
+a fifth, and a further look costs more than a few replicates."""
 
 MOST_KEPT = 64
 """Most pictures of a side that are kept; beyond it pairs of replicates are averaged. With 63
@@ -99,6 +107,8 @@ def until_decided(
     seconds: float,
     first: int = FIRST,
     most: int | None = None,
+    most_first: int = 0,
+    asked: Callable[[float], int] | None = None,
     say: Callable[[str], None] = lambda line: None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> Looks:
@@ -107,29 +117,58 @@ def until_decided(
     grow: makes replicates until there are as many of each side;  judge: the result of a look at
     them with this share of the levels;  seconds: no replicates are begun that would probably end
     later;  first: replicates of the first look, which is taken in any case;  most: of the `Pool`
-    that keeps them, whose groups a look has as a whole;  say: is told of each look.
+    that keeps them, whose groups a look has as a whole;  asked: how many replicates a decision
+    with this share of the levels takes, by the noise of those that there are; None: their number is
+    doubled;  most_first: while it
+    asks for more, the first look waits, up to so many;  say: is told of each look.
     """
     counts: list[int] = []
     start, count = clock(), first
+
+    def in_time(wish: int, each: float) -> int:
+        """Of `wish` replicates those for which there is time, in whole groups."""
+        left = seconds - (clock() - start)
+        fits = wish if each <= 0.0 else min(wish, count + int(max(left, 0.0) / each))
+        return fits - fits % (1 if most is None else group_of(fits, most))
+
     while True:
         begun, before = clock(), counts[-1] if counts else 0
         grow(count)
-        counts.append(count)
         each = (clock() - begun) / (count - before)
+        while asked is not None and not counts and count < most_first:
+            fits = in_time(min(_whole(asked(level_of(1)), most), most_first), each)
+            if fits <= count:
+                break
+            grow(fits)
+            count = fits
+        counts.append(count)
         look = len(counts)
         rung = judge(level_of(look))
         told = f"look {look}, {count} replicates: {rung.status}"
         if rung.status != "inconclusive":
             say(told)
             return Looks(tuple(counts), level_of(look), rung)
-        left = seconds - (clock() - start)
-        fits = 2 * count if each <= 0.0 else min(2 * count, count + int(max(left, 0.0) / each))
-        fits -= fits % (1 if most is None else group_of(fits, most))
+        wish = 2 * count if asked is None else _next(count, asked(level_of(look + 1)))
+        fits = in_time(_whole(wish, most), each)
         if fits < WORTH * count:
             say(f"{told}; the time limit of {seconds:g} s is reached")
             return Looks(tuple(counts), level_of(look), rung, out_of_time=True)
         say(f"{told}; goes on to {fits}, about {each * (fits - count):.0f} s")
         count = fits
+
+
+def _next(count: int, asked: int) -> int:
+    """The replicates of the look after one at `count` that did not decide: twice as many at most,
+    since the more there are, the less rare light seems.  If their noise permits a decision, the
+    difference is near a limit: then there are twice as many, too."""
+    if asked <= count:
+        return 2 * count
+    return min(math.ceil(max(CUSHION * asked, WORTH * count)), 2 * count)
+
+
+def _whole(count: int, most: int | None) -> int:
+    """As many replicates, or a few more, that make whole groups of a `Pool`."""
+    return count if most is None else count + -count % group_of(count, most)
 
 
 def mean_picture(pictures: list[FloatArray]) -> FloatArray:

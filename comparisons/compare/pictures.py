@@ -1,6 +1,7 @@
 """The pictures of a scene by both renderers, for each integrator."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from comparisons.rungs.layers.seen import Seen
 from comparisons.rungs.rays.camera import camera_rays, ends
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.whitted import plugin_radiance
+from comparisons.statistics import replicates_asked
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import Whitted
 from reference_rt.integrators.scene_tables import SceneTables
@@ -133,15 +135,16 @@ class Replicates:
         self._sides = Pool(most, mean_picture), Pool(most, mean_picture)
         self._times: list[dict[str, float]] = []
         self._mitsuba_times: list[float] = []
+        self._taken = self._reference_spp
 
     def grow(self, count: int) -> None:
         """Render until there are `count` replicates of each side."""
         ours, theirs = self._sides
         made = len(ours)
-        first = getattr(self._sampler, "seed", 0) + made
-        for k in range(count - made):
+        seed = getattr(self._sampler, "seed", 0)
+        for k in range(made, count):
             seeded = self._scene.changed(
-                sampler=self._sampler.model_copy(update={"seed": first + k})
+                sampler=self._sampler.model_copy(update={"seed": seed + k})
             )
             picture = render(seeded, tables=self._tables, threads=self._threads)
             ours.add(picture.colour)
@@ -151,12 +154,27 @@ class Replicates:
                 self._counterpart.mi_scene,
                 min(_BATCH, count - begun),
                 self._reference_spp,
-                first + begun - made,
+                seed + begun,
                 self._reference_sampler,
+                warm_up=begun == 0,
             )
             for other in rendered.pictures:
                 theirs.add(other)
             self._mitsuba_times += rendered.seconds.tolist()
+            self._taken = rendered.spp
+
+    @property
+    def count(self) -> int:
+        """The replicates of each side."""
+        return len(self._sides[0])
+
+    def asked(self, limit: float, level: float) -> int:
+        """How many replicates it takes to see a bias of `limit` at a look with this share of the
+        levels, by the noise of those that there are."""
+        kept = self._sides[0].pictures()
+        each = self.count // len(kept)
+        ours, theirs = (np.stack(side.pictures()) for side in self._sides)
+        return each * replicates_asked(ours, theirs, limit, level)
 
     def rendered(self) -> Rendered:
         """What there is so far; the images are its means.  seconds["render"] is the median time of
@@ -170,7 +188,12 @@ class Replicates:
             "reference": {"render": float(np.median(self._mitsuba_times))},
         }
         ours, theirs = self._sides
-        return of_replicates(np.stack(ours.pictures()), np.stack(theirs.pictures()), seconds)
+        note = (
+            f"{self.count} pictures by each renderer, of {self._sampler.spp} samples per pixel "
+            f"({self._sampler.type}) and of {self._taken} (Mitsuba's {self._reference_sampler})"
+        )
+        made = of_replicates(np.stack(ours.pictures()), np.stack(theirs.pictures()), seconds)
+        return replace(made, notes=(note,))
 
 
 def _seconds(ours: Picture, mitsuba: float) -> dict[str, dict[str, float]]:

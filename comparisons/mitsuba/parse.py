@@ -14,6 +14,7 @@ import numpy as np
 from comparisons.mitsuba.backend import imported
 from comparisons.mitsuba.included import OLD_ELEMENT, Included, Note, adapt, as_utf8
 from reference_rt.core.transform import Affine, compose, rotate, scale, translate
+from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceUnavailableError, SceneError
 from reference_rt.util.files import temporary_folder
 
@@ -271,6 +272,12 @@ def scalar() -> Iterator[Any]:
 
 _UNKNOWN = re.compile(r"encountered an unsupported XML element: (<[\w.:-]+>)")
 _LEFT_OUT = re.compile(r"<([\w.:-]+)>: is not supported$")
+
+
+def file_of(scene: Scene) -> Path | None:
+    """The .xml file that a scene was read from; None for our own scenes."""
+    path = scene.source_file
+    return path if path is not None and path.suffix.lower() == ".xml" else None
 
 
 def parse_file(path: Path, defaults: Mapping[str, str], allow_missing: bool = False) -> Parsed:

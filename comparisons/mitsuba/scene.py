@@ -162,17 +162,18 @@ def render(
     spp: int,
     seed: int = 0,
     sampler: ReferenceSampler = "independent",
+    warm_up: bool = True,
 ) -> Replicates:
     """Pictures with the seeds seed, seed + 1, ..., those of `multijitter` times SPREAD;  sampler:
     the scene's.
 
-    A small picture is rendered first and discarded: it compiles the kernels, which the measured
-    time must not include.
+    warm_up: render a small picture first and discard it: it compiles the kernels, which the
+    measured time must not include.
     """
     scalar = mitsuba().variant().startswith("scalar")
     # Scalar variants multiply seeds by the number of pixels themselves.
     factor = SPREAD if sampler == "multijitter" and not scalar else 1
-    if not scalar:
+    if warm_up and not scalar:
         # Dr.Jit divides by powers of two in another way, and then compiles another kernel.
         warm_up_spp = 1 if spp & (spp - 1) == 0 else 3
         picture(mi_scene, warm_up_spp, factor * (seed + replicates))
@@ -181,7 +182,10 @@ def render(
         start = time.perf_counter()
         pictures.append(picture(mi_scene, spp, factor * (seed + k)))
         seconds.append(time.perf_counter() - start)
-    return Replicates(np.stack(pictures), np.array(seconds), spp)
+    # `multijitter` rounds up: it takes 35 for 32.
+    in_one = getattr(mi_scene.integrator(), "most_rays", None) is None
+    taken = int(mi_scene.sensors()[0].sampler().sample_count()) if in_one else spp
+    return Replicates(np.stack(pictures), np.array(seconds), taken)
 
 
 _APART = 1 << 20

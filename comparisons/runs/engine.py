@@ -21,7 +21,7 @@ from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 
 from comparisons.results.files import plain, sealed, unsealed
 from comparisons.runs import processes
-from comparisons.runs.processes import Ended, R
+from comparisons.runs.processes import Children, Ended, R
 from reference_rt.util.console import Bar
 from reference_rt.util.files import read_text, replacing
 from reference_rt.util.workers import Workers
@@ -79,12 +79,14 @@ def measured(
     *,
     kin: Callable[[R], Hashable] = lambda request: None,
     doing: Callable[[R, str], None] = lambda request, step: None,
+    children: Children | None = None,
 ) -> Generator[tuple[R, T | None, Ended], None, None]:
     """(request, result, how its process ended) as they end; None for the result of one that failed.
 
     read: see `known`;  the others as `processes.run` has them.
     """
-    with closing(processes.run(requests, workers, seconds, doing, module, kin)) as running:
+    some = requests, workers, seconds, doing, module
+    with closing(processes.run(*some, kin, children)) as running:
         for ended in running:
             yield ended.request, None if ended.failure else read(ended.request), ended
 

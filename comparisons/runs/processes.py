@@ -126,6 +126,14 @@ class Children:
         self._busy: set[_Child] = set()
         self._closed = False
 
+    def begin(self, module: tuple[str, ...]) -> None:
+        """Start a child that imports what it needs while this process prepares the first request.
+
+        module: see `run`.
+        """
+        with self._lock:
+            self._idle.append(_Child(module, ""))
+
     def carry_out(
         self,
         module: tuple[str, ...],
@@ -321,6 +329,7 @@ def run(
     progress: Callable[[R, str], None],
     module: Sequence[str],
     kin: Callable[[R], Hashable] = lambda request: None,
+    children: Children | None = None,
 ) -> Generator[Outcome[R], None, None]:
     """Have requests carried out, and yield outcomes as they come.
 
@@ -329,11 +338,13 @@ def run(
     time limit of a request;  progress: called with a request and what is being done for it, ""
     when it begins; steps are not reported by clusters;  module: of a worker that keeps to the
     protocol, and options of its command line;  kin: requests of equal kin need the same kernels: on
-    this machine they follow each other, see `_Turns`.  Closing the iterator ends the processes of
-    this machine.  Raises ReferenceUnavailableError where none can be carried out; WorkersError.
+    this machine they follow each other, see `_Turns`;  children: of this process, if some were
+    begun already.  Closing the iterator ends the processes of this machine.  Raises
+    ReferenceUnavailableError where none can be carried out; WorkersError.
     """
     if isinstance(workers, Threads):
-        with closing(_run_here(requests, workers, seconds, progress, module, kin)) as found:
+        some = children or Children()
+        with closing(_run_here(requests, workers, seconds, progress, module, kin, some)) as found:
             yield from found
         return
     folder, sources = str(Path.cwd()), everything_fingerprint()
@@ -379,6 +390,7 @@ def _run_here(
     progress: Callable[[R, str], None],
     module: Sequence[str],
     kin: Callable[[R], Hashable],
+    children: Children,
 ) -> Generator[Outcome[R], None, None]:
     turns = _Turns(requests, kin)
     steps: queue.SimpleQueue[tuple[R, str]] = queue.SimpleQueue()
@@ -387,7 +399,7 @@ def _run_here(
         while not steps.empty():
             progress(*steps.get())
 
-    with closing(Children()) as children:
+    with closing(children):
 
         def carry_out(request: R) -> Outcome[R]:
             ended = children.carry_out(

@@ -56,7 +56,7 @@ of a single picture is handled by `single`; a reference with known mean and vari
 add a scale: its test, and its row in `scales` (the levels must still sum to 1e-3).
 """
 
-from comparisons.statistics.advice import noise_free_candidate, shortfall
+from comparisons.statistics.advice import noise_free_candidate, replicates_asked, shortfall
 from comparisons.statistics.cells import CHANNELS, Margins
 from comparisons.statistics.decide import compare
 from comparisons.statistics.places import standard_error, worst_regions
@@ -70,6 +70,7 @@ __all__ = [
     "compare",
     "noise_free_candidate",
     "read",
+    "replicates_asked",
     "shortfall",
     "standard_error",
     "worst_regions",

@@ -15,6 +15,7 @@ from comparisons.results.case import FloatArray
 from comparisons.statistics.cells import Margins
 from comparisons.statistics.scales import IMAGE, Pair, image_test
 from comparisons.statistics.sides import Known, known_side, side_of
+from comparisons.statistics.unseen import unseen
 from comparisons.statistics.welch import MOST_DOF, BiasTest, quantiles
 from comparisons.statistics.wording import percent
 
@@ -48,6 +49,38 @@ def noise_free_candidate(
     side = side_of(reference)
     perfect = known_side(Known(side.mean, np.zeros_like(side.mean)))
     return image_test(Pair(side, perfect, margins or Margins()), level * IMAGE.level)
+
+
+def replicates_asked(
+    candidate: FloatArray, reference: FloatArray, limit: float, level: float = 1.0
+) -> int:
+    """How many replicates of each side it takes to see a bias of `limit` with a chance of POWER, by
+    the noise of these, and to meet enough of the rare light; their difference has no part in it.
+
+    candidate, reference: replicates (R, height, width, 3), two or more;  level: as in `compare`, of
+    a look at so many.  The noise of few replicates is not known well: neither is the number.
+    """
+    a, b = side_of(candidate), side_of(reference)
+    count, margins = min(a.count, b.count), Margins()
+    image = image_test(Pair(a, b, margins), level * IMAGE.level)
+    known = image.errors[:2]  # the third grows with the difference
+    reach_of = quantiles(-math.expm1(math.log1p(-level * IMAGE.level) / image.difference.size))[1]
+    goal = limit * image.scale - image.margin * image.scale
+    largest = np.max([error.value for error in known], axis=0)
+    normal = (float(reach_of[MOST_DOF]) * largest) ** 2 + image.rare * image.margin * image.scale
+    missing = max(unseen(x, level * IMAGE.level).missing for x in (candidate, reference))
+
+    def suffices(replicates: int) -> bool:
+        factor = replicates / count
+        half = 0.5 * image.rare / factor
+        reaches = [half + np.sqrt(half**2 + normal / factor)]  # as `bias_test` has them
+        for error in known:
+            dof = np.clip(error.dof * (replicates - 1) / (count - 1), 1.0, MOST_DOF)
+            reaches.append(reach_of[dof.astype(np.int64)] * error.value / math.sqrt(factor))
+        return bool((np.max(reaches, axis=0) <= goal).all()) and missing <= limit * factor
+
+    counts = range(2, int(MOST))
+    return 2 + bisect.bisect_left(counts, True, key=suffices)
 
 
 def wanted(

@@ -11,3 +11,11 @@ verdict and does not stop the others.
 
 To add a suite, write a YAML file; list it in `suite.BUILT_IN` to make it available by name.
 """
+
+
+def worker(threads: int | None = None, runner: str | None = None) -> list[str]:
+    """The module that runs cases in a process of its own, and its options, see `worker`;  threads:
+    None for all cores."""
+    of_threads = [] if threads is None else ["--threads", str(threads)]
+    of_runner = [] if runner is None else ["--runner", runner]
+    return ["comparisons.suites.worker", *of_threads, *of_runner]

@@ -10,10 +10,10 @@ from urllib.parse import unquote
 
 from comparisons.compare.budget import Budget
 from comparisons.mitsuba.backend import Backend
+from comparisons.mitsuba.parse import file_of
 from comparisons.renderers import witness_facts
 from comparisons.runs import provenance
 from comparisons.runs.engine import key_of
-from comparisons.translator.reference import file_of
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.files import read_input, read_text
 

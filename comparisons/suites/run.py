@@ -37,8 +37,9 @@ from comparisons.results.stored_case import (
 )
 from comparisons.runs import engine
 from comparisons.runs.engine import Count
-from comparisons.runs.processes import Ended
+from comparisons.runs.processes import Children, Ended
 from comparisons.runs.provenance import provenance
+from comparisons.suites import worker
 from comparisons.suites.keys import case_key
 from comparisons.suites.suite import Plan, Source, Work, folder_name
 from comparisons.suites.worker import Request
@@ -218,7 +219,7 @@ class Options:
     """out: folder of the results;  rungs: only these, empty: all;  workers: what runs cases, see
     `processes.run`;  threads: of each process;  fresh: ignore stored cases;  steps: show each step
     of a case, not only its result;  tell: called with the outcome, after an interruption too;
-    runner: see `comparisons.suites.worker`."""
+    runner: see `comparisons.suites.worker`;  children: processes that were begun already."""
 
     out: Path
     rungs: tuple[str, ...] = ()
@@ -228,6 +229,7 @@ class Options:
     steps: bool = False
     tell: Callable[[Run], None] = lambda run: None
     runner: str | None = None
+    children: Children | None = None
 
     @property
     def results(self) -> Path:
@@ -242,9 +244,7 @@ class Options:
     @property
     def worker(self) -> list[str]:
         """The module that runs cases, and its options."""
-        threads = [] if self.threads is None else ["--threads", str(self.threads)]
-        runner = [] if self.runner is None else ["--runner", self.runner]
-        return ["comparisons.suites.worker", *threads, *runner]
+        return worker(self.threads, self.runner)
 
 
 def run_suite(source: Source, plan: Plan, options: Options) -> Run:
@@ -332,7 +332,7 @@ def run_cases(
                     display.done(done.case, done.remark)
             write()
             some = (requests, _stored, options.workers, seconds, options.worker)
-            running = engine.measured(*some, doing=display.doing)
+            running = engine.measured(*some, doing=display.doing, children=options.children)
             # If this is interrupted, they are closed at once: no worker outlives this process.
             with contextlib.closing(running):
                 for request, stored, ended in running:

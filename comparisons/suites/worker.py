@@ -8,6 +8,7 @@ request's folder.
 """
 
 import argparse
+import contextlib
 import dataclasses
 import faulthandler
 import importlib
@@ -26,9 +27,12 @@ from comparisons.runs.processes import carry_out, private_stdout, send
 from comparisons.suites.suite import Changes
 from reference_rt.cli.guarded import our_warnings
 from reference_rt.rendering.scene import Scene
+from reference_rt.util.errors import ReferenceUnavailableError
 
 Runner = Callable[..., Case]
 """Called as `compare` is."""
+
+OURS = "comparisons.suites.worker:compare"
 
 
 class Request(BaseModel):
@@ -55,7 +59,7 @@ class Request(BaseModel):
 def main() -> None:
     """Handle requests until standard input ends."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("--runner", default="comparisons.suites.worker:compare")
+    parser.add_argument("--runner", default=OURS)
     parser.add_argument("--threads", type=int, default=None)
     options = parser.parse_args()
     faulthandler.enable()
@@ -63,11 +67,23 @@ def main() -> None:
     module, _, name = options.runner.partition(":")
     try:
         runner: Runner = getattr(importlib.import_module(module), name)
+        if options.runner == OURS:
+            _get_ready()
     except ModuleNotFoundError as error:
         send(answers, unavailable=f"comparing needs {error.name}")
         return
     for line in sys.stdin:
         answer(Request.model_validate_json(line), runner, options.threads, answers)
+
+
+def _get_ready() -> None:
+    """Load what the first case needs while the parent reads its scene."""
+    from comparisons.mitsuba.backend import mitsuba
+
+    importlib.import_module("comparisons.compare.compare")
+    # What does not start is reported with the first case.
+    with contextlib.suppress(ReferenceUnavailableError):
+        mitsuba()
 
 
 def answer(request: Request, runner: Runner, threads: int | None, answers: TextIO) -> None:
@@ -106,6 +122,9 @@ def _traced(request: Request) -> str:
 def described(budget: Budget) -> str:
     """A budget as a note for people."""
     parts = [f"limit {100.0 * budget.limit:g} %", _replicates(budget)]
+    if budget.parts > 1:
+        more = "twice that in small pictures"
+        parts.append(f"a part in {budget.parts} of the scene's samples each, up to {more}")
     if budget.spp is not None:
         parts.append(f"{budget.spp} samples per pixel")
     if budget.reference_spp is not None:
@@ -120,10 +139,10 @@ def described(budget: Budget) -> str:
 def _replicates(budget: Budget) -> str:
     if budget.seconds is None:
         return f"{budget.replicates} replicates"
-    return (
-        f"{budget.replicates} replicates, doubled until the question is decided or "
-        f"{budget.seconds:g} s have passed"
-    )
+    first = f"{budget.replicates} replicates"
+    if budget.most_first is not None:
+        first = f"{budget.replicates} to {budget.most_first} replicates, as the noise asks"
+    return f"{first}, and more until the question is decided or {budget.seconds:g} s have passed"
 
 
 def compare(

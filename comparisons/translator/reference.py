@@ -4,7 +4,6 @@ the film's size and filter, the samples, what makes Mitsuba's own picture wrong
 checked, too."""
 
 import warnings
-from pathlib import Path
 from typing import Any
 
 from comparisons.integrators.mistakes import (
@@ -18,7 +17,7 @@ from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.colours import index_of_refraction
 from comparisons.mitsuba.context import TranslationContext, UntranslatableError
 from comparisons.mitsuba.node import Node
-from comparisons.mitsuba.parse import Parsed, parse_file
+from comparisons.mitsuba.parse import Parsed, file_of, parse_file
 from comparisons.mitsuba.plugins.exact_coat import COLOURS, SUBSTITUTE
 from comparisons.renderers import ReferenceSampler
 from comparisons.textures.texture import matrix_of
@@ -211,12 +210,6 @@ def _wrap(state: Any, index: int, plugin: str, values: dict[str, Any]) -> None:
 
 
 WINDOW = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y")
-
-
-def file_of(scene: Scene) -> Path | None:
-    """The .xml file that a scene was read from; None for our own scenes."""
-    path = scene.source_file
-    return path if path is not None and path.suffix.lower() == ".xml" else None
 
 
 def own_scene(scene: Scene, sampler: ReferenceSampler = "independent") -> Any:

@@ -5,7 +5,8 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from scipy import ndimage, optimize
+import scipy
+from scipy import ndimage
 
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.diagnosis.sample import chosen_pixels
@@ -266,7 +267,7 @@ class Misfit:
         root = np.sqrt(np.maximum(values, 1e-12 * values[-1]))
         rows = root[:, None] * vectors.T
         wanted = (vectors.T @ (right / size)) / root
-        return np.asarray(sums @ (optimize.nnls(rows, wanted)[0] / size))
+        return np.asarray(sums @ (scipy.optimize.nnls(rows, wanted)[0] / size))
 
     def nearest(self, columns: FloatArray) -> FloatArray:
         """The factors of (height, width, 3, columns), the same for all channels, whose sum is

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from functools import cache, partial
 
 import numpy as np
-from scipy import ndimage, optimize
+import scipy
+from scipy import ndimage
 
 from comparisons.compare.diagnosis.contest import Contender, Fit, contenders
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
@@ -191,7 +192,7 @@ def filters(misfit: Misfit, base: FloatArray) -> Iterator[Move]:
     # few widths is better than none.
     sigma = NARROWEST
     if min(map(squares, SMALL)) < misfit.squares(base):
-        fit = optimize.minimize_scalar(
+        fit = scipy.optimize.minimize_scalar(
             squares,
             bounds=(NARROWEST, 3.0),
             method="bounded",

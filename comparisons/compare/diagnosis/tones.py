@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from scipy import optimize
+import scipy
 
 from comparisons.compare.diagnosis.colour import LUMINANCE
 from comparisons.compare.diagnosis.hypothesis import Hypothesis, of_pixels
@@ -139,7 +139,7 @@ def _fitted(misfit: Misfit, mapped: Callable[[Misfit, float], FloatArray]) -> fl
         return of.squares(mapped(of, math.exp(g)))
 
     def searched(of: Misfit) -> float:
-        fit = optimize.minimize_scalar(
+        fit = scipy.optimize.minimize_scalar(
             lambda g: squares(of, float(g)),
             bounds=(-1.2, 1.2),
             method="bounded",

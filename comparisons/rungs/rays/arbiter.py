@@ -39,7 +39,7 @@ REST = 0.1
 """Least share of what is lit that must be resolved and agree.  With less, agreement would rest on
 values that say nothing, and a fault could hide in the others."""
 
-AT_ONCE = 2000
+AT_ONCE = 8000
 """Moved rays that are traced in one call, when fewer rays than these are left."""
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy import optimize
+import scipy
 
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.mitsuba.counterpart import Counterpart
@@ -155,7 +155,7 @@ def is_mixture(wanted: FloatArray, values: FloatArray, slack: float) -> bool:
     if (np.abs(off).max(axis=1) <= 1.0).any():
         return True
     sides = np.concatenate([off.T, -off.T])
-    solution = optimize.linprog(
+    solution = scipy.optimize.linprog(
         np.zeros(len(off)), sides, np.ones(6), np.ones((1, len(off))), np.ones(1), method="highs"
     )
     return bool(solution.status == 0)

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.stats import norm
+from scipy import special
 
 from comparisons.results.case import RungResult
 from comparisons.statistics.chi_square import chi_square
@@ -225,7 +225,7 @@ def of_view(bsdf: Bsdf, view: View, effort: Effort, level: float, seed: tuple[in
                 f"{len(kept)} directions in {fit.cells} cells: p = {fit.p_value:.1g})"
             )
     # Normal: the sum of many cells that the border crosses.
-    sigmas = float(norm.isf(0.5 * level))
+    sigmas = -float(special.ndtri(0.5 * level))
     claimed, fault = _perfect(view, drawn, ~failed & drawn.is_delta, sigmas, effort)
     if fault:
         return fault

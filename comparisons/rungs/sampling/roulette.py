@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
-from scipy.stats import binom
+from scipy import special
 
 from comparisons.results.case import RungResult
 from reference_rt.core.arrays import FloatArray
@@ -89,7 +89,7 @@ def _likely(count: int, of: int, chance: float) -> bool:
     """Whether so many of `of` paths may have come, each with this chance."""
     if chance > 1.0 - SAME:
         return chance < 1.0 + SAME and count == of
-    tails = binom.cdf(count, of, chance), binom.sf(count - 1, of, chance)
+    tails = special.bdtr(count, of, chance), special.bdtrc(count - 1, of, chance)
     return bool(min(tails) >= LEVEL)
 
 

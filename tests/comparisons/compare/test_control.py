@@ -95,7 +95,11 @@ def test_a_budget_changes_size_samples_and_filter(scene: Scene) -> None:
     samples = [budgeted(other, Budget(parts=n)).resolved_sampler.spp for n in (1, 2)]
     assert samples == [4, 4]  # not fewer than LEAST
     many = scene.changed(sampler=Sobol(spp=64))
-    assert budgeted(many, Budget(parts=4)).sampler == Sobol(spp=16)
+    assert budgeted(many, Budget(parts=4, size=(512, 512))).sampler == Sobol(spp=16)
+    assert budgeted(many, Budget(parts=4, size=(128, 128))).sampler == Sobol(spp=16)
+    assert budgeted(many, Budget(parts=4, size=(128, 80))).sampler == Sobol(spp=25)
+    assert budgeted(many, Budget(parts=4, size=(16, 16))).sampler == Sobol(spp=32)  # a small one
+    assert budgeted(many, Budget(size=(16, 16))).sampler == Sobol(spp=64)
     assert budgeted(many, Budget(parts=4, spp=8)).sampler == Sobol(spp=8)
     lamp = Point(position=(0.0, 3.0, 0.0), intensity=(1.0, 1.0, 1.0))
     dark = {"materials": {}, "shapes": (), "lights": (lamp,)}

@@ -12,13 +12,14 @@ from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, compare_scene
 from comparisons.mitsuba.backend import backend, mitsuba
 from comparisons.mitsuba.context import UntranslatableError
+from comparisons.mitsuba.parse import file_of
 from comparisons.mitsuba.scene import for_rays, picture
 from comparisons.results.case import Case
 from comparisons.rungs.rays.camera import camera_rays
 from comparisons.suites.keys import case_key
 from comparisons.suites.suite import Changes
 from comparisons.translator.reading import read_file
-from comparisons.translator.reference import file_of, own_scene
+from comparisons.translator.reference import own_scene
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneWarning
 
