@@ -42,10 +42,7 @@ Who decides:
 - `block_query.py`, `array_query.py`: block, packet or single ray, as in the diagram.  What a scene
   lacks is None, so all but "coherent" is decided while the caller is compiled.
 - `rendering/query/tracing.py`: FEW, because packets and streams take longer to compile.  All
-  queries call operations on a geometry through a link (`rendering/query/links.py`).
-- `rendering/kernels.py`: whether a picture's kernels are linked, or specialised for its tables; in
-  the latter, whether the stream traversal is compiled separately and called through the function
-  pointer `Geometry.tracer` (path, with a BVH, without instances) or is inlined.
+  queries call operations on a geometry through a link (`rendering/kept_links.py`).
 - `rendering/linking.py`: which operations are linked; a call of another one stops the process.
 
 Solids and instances are references in leaves of the BVH (kinds SOLID and INSTANCE, see `leaf.py`).
