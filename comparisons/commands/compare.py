@@ -81,13 +81,14 @@ def compare(
     """
     if fixed and time_limit is not None:
         raise UsageError("got --fixed and --time-limit; expected one of them")
+    limit = None if time_limit is None else seconds_of(time_limit, "--time-limit")
     with compare_extra():
         from comparisons.runs.processes import Children
-        from comparisons.suites import worker
+        from comparisons.suites import worker_command
 
     with closing(Children()) as children:
         if fresh or not (out / "cases").is_dir():  # where there is one, nothing may be left to do
-            children.begin(tuple(worker(threads)))
+            children.begin(tuple(worker_command(threads)))
         with compare_extra():
             from comparisons.compare.budget import usual
             from comparisons.compare.looks import SECONDS
@@ -98,7 +99,7 @@ def compare(
         changes = Changes(
             spp=spp, size=size, seed=seed, defaults=by_name(define), allow_missing=allow_missing
         )
-        seconds = SECONDS if time_limit is None else seconds_of(time_limit, "--time-limit")
+        seconds = SECONDS if limit is None else limit
         budget = usual(spp, replicates, seconds, fixed=fixed, witness=witness)
         plan = plan_of_files(scenes, changes, budget)
         given = {

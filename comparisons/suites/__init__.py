@@ -13,7 +13,7 @@ To add a suite, write a YAML file; list it in `suite.BUILT_IN` to make it availa
 """
 
 
-def worker(threads: int | None = None, runner: str | None = None) -> list[str]:
+def worker_command(threads: int | None = None, runner: str | None = None) -> list[str]:
     """The module that runs cases in a process of its own, and its options, see `worker`;  threads:
     None for all cores."""
     of_threads = [] if threads is None else ["--threads", str(threads)]

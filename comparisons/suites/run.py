@@ -39,7 +39,7 @@ from comparisons.runs import engine
 from comparisons.runs.engine import Count
 from comparisons.runs.processes import Children, Ended
 from comparisons.runs.provenance import provenance
-from comparisons.suites import worker
+from comparisons.suites import worker_command
 from comparisons.suites.keys import case_key
 from comparisons.suites.suite import Plan, Source, Work, folder_name
 from comparisons.suites.worker import Request
@@ -244,7 +244,7 @@ class Options:
     @property
     def worker(self) -> list[str]:
         """The module that runs cases, and its options."""
-        return worker(self.threads, self.runner)
+        return worker_command(self.threads, self.runner)
 
 
 def run_suite(source: Source, plan: Plan, options: Options) -> Run:

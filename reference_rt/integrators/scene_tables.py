@@ -23,10 +23,11 @@ from reference_rt.lights import Lights, LightTables
 from reference_rt.materials import Materials
 from reference_rt.shapes import TABLES
 from reference_rt.textures import Textures
+from reference_rt.util.errors import Brief
 
 
 @dataclass(frozen=True, eq=False)
-class SceneTables:
+class SceneTables(metaclass=Brief):
     """All arrays of a scene; None for what it lacks.  links: by purpose, what was made of them for
     kernels (`rendering/kept_links.py`)."""
 

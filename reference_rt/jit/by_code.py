@@ -14,9 +14,9 @@ becomes, for scenes of spheres and boxes,
 
     def uv(shapes, ray, hit):
         if hit.kind == 0:
-            return spheres(shapes.spheres, ray, hit)  # sphere.uv
+            return of_spheres(shapes.spheres, ray, hit)  # sphere.uv
         if hit.kind == 2:
-            return boxes(shapes.boxes, ray, hit)  # box.uv
+            return of_boxes(shapes.boxes, ray, hit)  # box.uv
         return otherwise(shapes, ray, hit)  # the function as it was decorated
 
 Compiled code and plain Python run this text, and tracebacks show it.  Given the table of one type
@@ -128,7 +128,7 @@ class ByCode(Group):
                 for number, field, of_row in present:
                     given = [f"{tables}.{field}", *parameters_of(of_row)[1:]]
                     yield f"if {code} == {number}:"
-                    yield f"    return {field}({', '.join(given)})"
+                    yield f"    return of_{field}({', '.join(given)})"
                 yield f"return otherwise({', '.join([tables, *others])})"
 
             operation, body = self._add(otherwise, rows), kernel(otherwise)
@@ -170,14 +170,17 @@ class ByCode(Group):
             present = [row for row in rows if is_present(row.field)]
             fields = tuple(row.field for row in present)
             label = f"for {', '.join(fields) or 'no tables'}"
-            return write(fields, label, lines(present), {row.field: row.kernel for row in present})
+            return write(
+                fields, label, lines(present), {f"of_{row.field}": row.kernel for row in present}
+            )
 
         def of_one(cls: type) -> Callable[..., Any]:
             for row in rows:
                 if row.field == field_of[cls]:
                     given = ", ".join([parameters[0], *parameters_of(row.kernel)[1:]])
-                    text = [f"return {row.field}({given})"]
-                    return write(cls, f"for a table of {row.field}", text, {row.field: row.kernel})
+                    text = [f"return of_{row.field}({given})"]
+                    known = {f"of_{row.field}": row.kernel}
+                    return write(cls, f"for a table of {row.field}", text, known)
             return otherwise
 
         @functools.wraps(function)

@@ -49,7 +49,8 @@ def texture_tables(scene: SceneModel) -> tuple[Textures | None, Palette]:
         field: joined(module, parts[code]) if code in parts else None
         for code, field, _, module in TEXTURE_TABLES
     }
-    textures = Textures(np.array(kinds), np.array(rows), np.array(maps), **tables)
+    sets = UvSets(np.zeros(len(kinds), np.int64), np.zeros((0, 6)))
+    textures = Textures(np.array(kinds), np.array(rows), np.array(maps), **tables, sets=sets)
     return textures, Palette(numbers, greatest)
 
 
@@ -60,5 +61,4 @@ def with_uv_sets(
     if textures is None or triangles is None or triangles.more_uvs is None:
         return textures
     numbers = np.array([texture.uv_set for texture in scene.textures.values()])
-    sets = UvSets(numbers, triangles.more_uvs) if numbers.any() else None
-    return textures._replace(sets=sets)
+    return textures._replace(sets=UvSets(numbers, triangles.more_uvs))

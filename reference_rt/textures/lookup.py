@@ -125,11 +125,9 @@ def _of_one(textures: Textures, k: int, u: float, v: float, colour: Vec3, on: On
 
 
 @kernel
-def _in_set(sets: UvSets | None, k: int, u: float, v: float, on: OnTriangle) -> tuple[float, float]:
+def _in_set(sets: UvSets, k: int, u: float, v: float, on: OnTriangle) -> tuple[float, float]:
     """The coordinates of texture k's set, as `shapes.meshes.triangle.uv` interpolates the mesh's
     own."""
-    if sets is None:
-        return u, v
     number = sets.number[k]
     if number == 0 or on.row < 0:
         return u, v

@@ -30,8 +30,8 @@ class UvSets(NamedTuple):
 
 class Textures(NamedTuple):
     """kind (n,), row (n,): the table and row of each texture;  uv (n, 6): its map, see `UvMap`;  a
-    table for each type, None for types that the scene lacks;  sets: None where all textures have
-    the surface's own coordinates."""
+    table for each type, None for types that the scene lacks;  sets: which texture coordinates each
+    texture has."""
 
     kind: IntArray
     row: IntArray
@@ -39,8 +39,8 @@ class Textures(NamedTuple):
     checkers: Annotated[checker.Checkers | None, checker]
     bitmaps: Annotated[bitmap.Bitmaps | None, bitmap]
     vertex_colours: Annotated[vertex_colours.VertexColourTable | None, vertex_colours]
-    products: Annotated[product.Products | None, product] = None
-    sets: UvSets | None = None
+    products: Annotated[product.Products | None, product]
+    sets: UvSets
 
 
 TABLES: tuple[tuple[int, str, Any, Any], ...] = tuple(

@@ -103,8 +103,9 @@ OF_KERNELS = (
     ),
     SourceFault(
         "probability of a light forgotten", "many_lights", "integrators/path.py",
-        "    pdf = light.pdf * picked.probability\n",
-        "    pdf = light.pdf / any_light.count(scene.lights)\n",
+        "            light, picked = light_of(scratch.lit, j), picked_in(scratch.lit, j)\n",
+        "            light, picked = light_of(scratch.lit, j), picked_in(scratch.lit, j)\n"
+        "            picked = Pick(picked.light, 1.0 / any_light.count(scene.lights))\n",
     ),
     SourceFault(
         "plane of focus a sphere", "camera_thin_lens", "cameras/thin_lens.py",
@@ -118,8 +119,8 @@ OF_KERNELS = (
     ),
     SourceFault(
         "one edge too many", "cornell_box", "integrators/path.py",
-        "    is_last, emits = depth + 1 >= path.max_depth, ",
-        "    is_last, emits = depth >= path.max_depth, ",
+        "        if depth + 1 >= path.max_depth:\n            break\n",
+        "        if depth >= path.max_depth:\n            break\n",
     ),
     SourceFault(
         "roulette that compensates too little", "colour_bleeding", "integrators/path.py",
@@ -172,10 +173,12 @@ FAULTS = (
     ),
     SourceFault(
         "cosine missing after the first bounce", BOX, "integrators/path.py",
-        "    throughput = state.throughput * scattered.weight\n",
-        "    throughput = state.throughput * scattered.weight\n"
-        "    if depth == 0 and scattered.wi.z > 0.0:\n"
-        "        throughput = throughput * (0.6666666666666666 / scattered.wi.z)\n",
+        "    throughput, eta = state.throughput * drawn.weight, state.eta * drawn.eta\n",
+        "    throughput, eta = state.throughput * drawn.weight, state.eta * drawn.eta\n"
+        "    wi, n = drawn.wi, point.ns\n"
+        "    cosine = wi.x * n.x + wi.y * n.y + wi.z * n.z\n"
+        "    if depth == 0 and cosine > 0.0:\n"
+        "        throughput = throughput * (0.6666666666666666 / cosine)\n",
     ),
     SourceFault(
         "MIS weights that do not sum to one", "veach_mis", "integrators/direct_light.py",
@@ -276,10 +279,9 @@ FAULTS = (
     SourceFault(
         "the numbers of the third edge again for the fourth", "white_corridor",
         "integrators/path.py",
-        "    point, dimension = shading.point, sampling.PER_BOUNCE * depth\n"
-        "    ended = Step(False, Ray(point.p, point.n, 0.0), state)\n",
-        "    point, dimension = shading.point, sampling.PER_BOUNCE * (2 if depth == 3 else depth)\n"
-        "    ended = Step(False, Ray(point.p, point.n, 0.0), state)\n",
+        "    count, dimension = any_light.count(lights), sampling.PER_BOUNCE * depth\n",
+        "    count, dimension = any_light.count(lights), sampling.PER_BOUNCE * depth\n"
+        "    dimension = sampling.PER_BOUNCE * 2 if depth == 3 else dimension\n",
     ),
     SourceFault(
         "density of rough glass without eta²", "material_rough_dielectric",

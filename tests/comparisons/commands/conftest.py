@@ -21,7 +21,6 @@ def idle(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
     for module, name in (
         (reference_rt.scene.build, "build_tables"),
-        (reference_rt.rendering.executor, "build_tables"),
         (comparisons.mitsuba.backend, "mitsuba"),
         (subprocess, "Popen"),
         (subprocess, "run"),

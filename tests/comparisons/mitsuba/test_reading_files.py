@@ -138,7 +138,7 @@ def test_a_glb_file_is_converted(tmp_path, monkeypatch):
     assert result.exit_code == 0, result.output
     with pytest.warns(SceneWarning):
         scene = Scene.load(tmp_path / "model.glb", {"camera": "flat"})
-    built = arrays_of(scene.tables)
+    built = arrays_of(scene.tables.parts)
     shutil.rmtree(tmp_path / "cache")
     (tmp_path / "model.glb").unlink()
     written = Scene.load(out)
@@ -147,7 +147,7 @@ def test_a_glb_file_is_converted(tmp_path, monkeypatch):
         scene.film,
         scene.lights,
     )
-    for ours, theirs in zip(arrays_of(written.tables), built, strict=True):
+    for ours, theirs in zip(arrays_of(written.tables.parts), built, strict=True):
         np.testing.assert_array_equal(ours, theirs)
 
 

@@ -139,11 +139,10 @@ def test_rays_that_wait_change_no_bits(scene, n, m):
     scene = scene.changed(film=film, integrator=rt.Direct(light_samples=n, bsdf_samples=m))
     together, prepared = rt.render(scene).colour, Prepared(scene, threads=1)
     colour = np.zeros((48, 3))
-    with prepared.running:
-        for pixel in range(48):
-            for k in range(4):
-                unit, sums = Unit(pixel, pixel + 1, k, k + 1), {"colour": colour[pixel : pixel + 1]}
-                prepared.compute(unit, sums, 64, threading.Event())
+    for pixel in range(48):
+        for k in range(4):
+            unit, sums = Unit(pixel, pixel + 1, k, k + 1), {"colour": colour[pixel : pixel + 1]}
+            prepared.compute(unit, sums, 64, threading.Event())
     assert together.any()
     assert np.array_equal(together.reshape(48, 3), colour / 4)
 

@@ -19,7 +19,7 @@ from reference_rt.textures.checker import Checkers
 from reference_rt.textures.image_file import Texels
 from reference_rt.textures.lookup import At, Textures, lookup, lookup_gradient
 from reference_rt.textures.parameter import Palette
-from reference_rt.textures.tables import BITMAP, CHECKER
+from reference_rt.textures.tables import BITMAP, CHECKER, UvSets
 from reference_rt.textures.texture import UvMap
 
 PALETTE = Palette({"t": 0}, [5.0])
@@ -28,12 +28,17 @@ UP = Vec3(0.0, 0.0, 1.0)
 FLAT = Tangents(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0))
 
 
+OWN = UvSets(np.zeros(1, np.int64), np.zeros((0, 6)))
+"""One texture with the surface's own coordinates."""
+
+
 def texture(texels, uv=PLAIN, nearest=0, wrap=0):
     """One bitmap with these texels (height, width, 3), the top row first."""
     values = np.array(texels, dtype=float)
     stored = Texels(values.reshape(-1).view(np.uint8), values, np.zeros(0), 1.0, values.max())
     bitmaps = table_of(stored, nearest, 4 * wrap)
-    return Textures(np.array([BITMAP]), np.array([0]), uv.coefficients()[None], None, bitmaps, None)
+    maps, tables = uv.coefficients()[None], (None, bitmaps, None, None)
+    return Textures(np.array([BITMAP]), np.array([0]), maps, *tables, OWN)
 
 
 def at(textures, u, v):
@@ -107,6 +112,8 @@ def test_checkers_have_no_slope():
         Checkers(np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])),
         None,
         None,
+        None,
+        OWN,
     )
     assert lookup_gradient(0, at(textures, 0.5, 0.5)) == (0.0, 0.0)
     assert bumped(textures, FLAT).n == (0.0, 0.0, 1.0)

@@ -58,10 +58,8 @@ def rendered(prepared, x, y, sample):
     scene = prepared.scene
     pixel = scene.film.width * y + x
     sums = {name: np.zeros((1, width)) for name, width in widths_of(scene).items()}
-    with prepared.running:
-        done = prepared.compute(
-            Unit(pixel, pixel + 1, sample, sample + 1), sums, 64, threading.Event()
-        )
+    unit = Unit(pixel, pixel + 1, sample, sample + 1)
+    done = prepared.compute(unit, sums, 64, threading.Event())
     return done.sums["colour"][0]
 
 

@@ -241,5 +241,5 @@ def test_sets_that_no_texture_has_leave_kernels_alone(tmp_path):
         "materials": {"lamp": {"type": "diffuse", "reflectance": "t"}},
     }
     scene = rt.Scene.parse(json.dumps({**parts, "shapes": [square()]}), folder=tmp_path)
-    assert scene.tables.textures.sets is None
+    assert not scene.tables.textures.sets.number.any()
     assert scene.tables.geometry.shapes.triangles.more_uvs is None

@@ -249,7 +249,11 @@ def count_nonfinite(picture: Picture) -> int:
 def signature_of(scene: Scene, tables: SceneTables) -> str:
     """Scenes of one signature are rendered by the same compiled kernels."""
     film = scene.film
-    parts: list[Any] = [tables, scene.camera.setup(film.width, film.height), film.filter.setup()]
+    parts: list[Any] = [
+        tables.parts,
+        scene.camera.setup(film.width, film.height),
+        film.filter.setup(),
+    ]
     if not isinstance(scene.integrator, RayCast):
         parts += [scene.integrator.setup(), scene.resolved_sampler.setup()]
     names = f"{scene.integrator.type} {film.layers} {numba.typeof(tuple(parts))}"
