@@ -85,7 +85,6 @@ def kernels_for(
     scene = linked(tables, purpose, link, compile_for)
     if not all(is_compiled(*call) for call in given.calls):  # where the links were there already
         precompile_all(given.calls, threads, say, ahead)
-    given.linker.resolve()
 
     def bound(job: Job, kernel: Callable[..., Any], of_job: Any) -> Callable[..., None]:
         arguments = job.arguments(of_job, given.view, given.filter)
@@ -97,8 +96,9 @@ def kernels_for(
 
         return run
 
-    compiled = [precompile(*call) for call in given.own]
-    return [bound(*one) for one in zip(jobs, compiled, scene.tables, strict=True)]
+    compiled = [precompile(*call) for call in given.calls]
+    given.linker.resolve()
+    return [bound(*one) for one in zip(jobs, compiled, scene.tables, strict=False)]
 
 
 def plain_arguments(job: Job, tables: SceneTables, view: Any, film_filter: Any) -> tuple[Any, ...]:
