@@ -115,6 +115,35 @@ def test_tables_and_links_are_made_once(monkeypatch):
         render(scene.changed(integrator=rt.Path(max_depth=3)))
 
 
+OTHER_CAMERA = """
+import reference_rt as rt
+from small_scenes import small
+scene = small("cornell_box")
+other = scene.changed(camera=rt.Orthographic(eye=(0.0, 0.0, 4.0), target=(0.0, 0.0, 0.0)))
+for one in {order}:
+    print(rt.render(one).colour.tobytes().hex()[:64])
+"""
+
+
+@needs_jit
+def test_another_camera_of_a_scene_in_a_new_process():
+    """Its kernels are in the cache, but not loaded when the scene's links are there already."""
+
+    def told(order):
+        done = subprocess.run(
+            [sys.executable, "-c", OTHER_CAMERA.format(order=order)],
+            env=os.environ | {"PYTHONPATH": os.pathsep.join([str(HELPERS), *sys.path])},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return done.stdout.split()
+
+    one, another = told("(scene, other)")
+    assert told("(other, scene)") == [another, one]
+    assert one != another
+
+
 def test_a_scene_that_is_sent_away_has_no_links():
     scene = small("cornell_box")
     render(scene)
