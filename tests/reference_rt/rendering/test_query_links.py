@@ -82,7 +82,7 @@ def write_traced(folder, file):
         d = rng.uniform(-0.8, 0.8, (N, 3)) - o
         if scene is whole:
             o, d = o + np.array([4.0, 4.0, 0.0]), 2.0 * d
-        d[-16:] = d[-1]  # a packet of coherent rays
+        d[-16:] = -o[-1]  # a packet of coherent rays, most of which hit
         o[-16:] = o[-1] + 0.01 * unit_vectors(rng, 16)
         for n in (0,) if scene is whole else (N, 0):
             with many_from(n):
