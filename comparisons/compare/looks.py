@@ -119,8 +119,8 @@ def until_decided(
     later;  first: replicates of the first look, which is taken in any case;  most: of the `Pool`
     that keeps them, whose groups a look has as a whole;  asked: how many replicates a decision
     with this share of the levels takes, by the noise of those that there are; None: their number is
-    doubled;  most_first: while it
-    asks for more, the first look waits, up to so many;  say: is told of each look.
+    doubled;  most_first: while it asks for more, the first look waits, up to so many;  say: is told
+    of each look.
     """
     counts: list[int] = []
     start, count = clock(), first

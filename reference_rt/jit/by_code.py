@@ -20,8 +20,14 @@ becomes, for scenes of spheres and boxes,
         return otherwise(shapes, ray, hit)  # the function as it was decorated
 
 Compiled code and plain Python run this text, and tracebacks show it.  Given the table of one type
-in place of all tables, as a kernel for one type has it, the kernel of that type is called: so the
-same text serves all types in a loop over a block of paths.
+in place of all tables, the kernel of that type is called.  So one text serves all types in a loop
+over a block of paths:
+
+    @by_code.stage()
+    def surfaces(table: Any, kind: int, rays: RayBlock, ...) -> None:
+        for j in range(n):
+            if hits.codes[j] == kind:
+                put_point(points, j, surface(table, ray_of(rays, j), hit_of(hits, j)))
 
 For a link to tables (`links.py`) the text depends on no scene.  A list has, for each code, the
 address of the table and the function pointers of the operations, 32 words (`STRIDE`) in all, of
@@ -39,7 +45,7 @@ which `uv` has number 3:
 """
 
 import functools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from types import ModuleType
 from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
@@ -136,6 +142,33 @@ class ByCode(Group):
             chosen = self._chosen(otherwise, [tables, *others], rows, lines, linked, body)
             Operation.of[chosen] = operation
             return chosen
+
+        return decorate
+
+    def stage(self, own: str = "", only: Collection[int] | None = None) -> Callable[[F], F]:
+        """Decorates f(table, kind, ...), a loop over a block of paths, which is called with the
+        table of one type after another, and does nothing for an absent table.
+
+        own: the name of a kernel that takes its place in modules that have one;  only: the codes of
+        the types that have a kernel at all.
+        """
+
+        def decorate(function: F) -> F:
+            parameters, body = ", ".join(parameters_of(function)), kernel(function)
+            module, name = function.__module__, function.__name__
+            text = f"def {name}({parameters}):\n    return\n"
+            nothing = define(text, module, name, "for no table", {})
+            left_out = [
+                row.module for row in self._rows if only is not None and row.code not in only
+            ]
+
+            def of_type(module: Any) -> Any:
+                has_none = any(module is other for other in left_out)
+                return None if has_none else getattr(module, own, body)
+
+            otherwise: Any = functools.wraps(function)(nothing)
+            found: F = self(of_type)(otherwise)
+            return found
 
         return decorate
 

@@ -155,12 +155,8 @@ def picked_in(lit: LightBlock, j: int) -> Pick:
     return Pick(lit.codes[2 * BLOCK + j], lit.numbers[14 * BLOCK + j])
 
 
-def _samples_by(module: Any) -> Any:
-    return getattr(module, "samples", _samples_one_by_one)
-
-
-@kernel
-def _samples_one_by_one(
+@by_code.stage(own="samples")
+def _samples(
     table: Any,
     kind: int,
     lit: LightBlock,
@@ -169,25 +165,13 @@ def _samples_one_by_one(
     points: PointBlock,
     n: int,
 ) -> None:
+    """`sample_one` for those of the first n points that ask for a light of one kind."""
     numbers = lit.numbers
     for j in range(n):
         if lit.codes[j] == kind:
             i, p = lit.codes[BLOCK + j], vector_of(points.numbers, 0, j)
             u0, u1 = numbers[12 * BLOCK + j], numbers[13 * BLOCK + j]
             put_light(lit, j, _sample(table, kind, i, shapes, textures, p, u0, u1))
-
-
-@by_code(_samples_by)
-def _samples(
-    lights: Lights,
-    kind: int,
-    lit: LightBlock,
-    shapes: Shapes,
-    textures: Textures | None,
-    points: PointBlock,
-    n: int,
-) -> None:
-    """`sample_one` for those of the first n points that ask for a light of one kind."""
 
 
 @kernel

@@ -61,8 +61,9 @@ def render(
     """Render a scene, or a scene file.
 
     spp: samples per pixel;  size: width and height in pixels;  seed: of the random numbers; None:
-    the scene's own.  threads: default all cores; their number changes no bit.  tables: the scene's
-    tables, if they are built already.  progress: called as the render goes on;  compiling: called
+    the scene's own.  threads: default all cores; their number changes no bit.  tables: others than
+    the scene's own, which are built once: a file that changes later is read by a scene that is
+    loaded again.  progress: called as the render goes on;  compiling: called
     in its place while kernels are compiled, with the number of those that are, and of all.
     Ctrl-C stops it within a tile.
 

@@ -28,7 +28,8 @@ class BuiltScene(SceneModel):
 
     @property
     def tables(self) -> SceneTables:
-        """The kernels' tables, built on first use.  Raises SceneError for unusable files."""
+        """The kernels' tables, built on first use: a file that changes later is read by a scene
+        that is loaded again.  Raises SceneError for unusable files."""
         if not self._built:
             self._built.append(build_tables(self))
         return self._built[0]

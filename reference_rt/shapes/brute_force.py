@@ -64,19 +64,15 @@ def nearest_of_rays(shapes: Shapes, rays: RayBlock, hits: HitBlock, n: int, any_
             complete(shapes, kind, rays, hits, n)
 
 
-@kernel
-def _complete(table: Any, kind: int, rays: RayBlock, hits: HitBlock, n: int) -> None:
+@by_code.stage(only=SIDE_BY_SIDE)
+def complete(table: Any, kind: int, rays: RayBlock, hits: HitBlock, n: int) -> None:
+    """Completes those of the first n hits that are on shapes of one type."""
     first = (kind + 1) * KIND
     for j in range(n):
         code, t = hits.codes[j], hits.numbers[j]
         if first <= code < first + KIND:
             at = _found(table, code - first, ray_of(rays, j), t)
             put_hit(hits, j, Hit(at.t, kind, code - first, at.u, at.v, -1))
-
-
-@by_code(lambda module: _complete if CODES[module] in SIDE_BY_SIDE else None)
-def complete(shapes: Shapes, kind: int, rays: RayBlock, hits: HitBlock, n: int) -> None:
-    """Completes those of the first n hits that are on shapes of one type."""
 
 
 @kernel

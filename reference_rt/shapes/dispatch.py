@@ -50,20 +50,14 @@ def surface(shapes: Shapes, ray: Ray, hit: Hit) -> SurfacePoint:
     return SurfacePoint(nothing, nothing, nothing, 0.0, -1, -1)
 
 
-@kernel
-def _surfaces(
+@by_code.stage()
+def surfaces(
     table: Any, kind: int, rays: RayBlock, hits: HitBlock, n: int, points: PointBlock
 ) -> None:
+    """The surface points of those of a block's first n hits that are on shapes of one type."""
     for j in range(n):
         if hits.codes[j] == kind:
             put_point(points, j, surface(table, ray_of(rays, j), hit_of(hits, j)))
-
-
-@by_code(lambda module: _surfaces)
-def surfaces(
-    shapes: Shapes, kind: int, rays: RayBlock, hits: HitBlock, n: int, points: PointBlock
-) -> None:
-    """The surface points of those of a block's first n hits that are on shapes of one type."""
 
 
 @by_code("uv", code="hit.kind")

@@ -35,9 +35,15 @@ def _scale(scalers: Scalers, i: int, x: float) -> float:
     return -scaled if scalers.negative else scaled
 
 
+@kernel
+def _own_block(scalers: Scalers, n: int, out: FloatArray) -> None:
+    for k in range(n):
+        out[k] = 100.0 * _scale(scalers, k, 0.25)
+
+
 class Tables(NamedTuple):
     adders: Annotated[Adders | None, SimpleNamespace(value=_add)]
-    scalers: Annotated[Scalers | None, SimpleNamespace(value=_scale)]
+    scalers: Annotated[Scalers | None, SimpleNamespace(value=_scale, own_block=_own_block)]
     others: Annotated[Others | None, SimpleNamespace()]
 
 
@@ -61,15 +67,11 @@ def count(tables: Tables, kind: int) -> int:
     return -1
 
 
-@kernel
-def _add_up(table: Any, kind: int, n: int, out: FloatArray) -> None:
+@by_code.stage(own="own_block", only=(ADDER, SCALER))
+def values_of_block(table: Any, kind: int, n: int, out: FloatArray) -> None:
+    """One text for all types, which calls an operation on the table of one."""
     for k in range(n):
         out[k] = value(table, kind, k, 0.25)
-
-
-@by_code(lambda module: _add_up)
-def values_of_block(tables: Tables, kind: int, n: int, out: FloatArray) -> None:
-    """One text for all types, which calls an operation on the table of one."""
 
 
 pairs = Linkable()

@@ -11,7 +11,6 @@ from typing import Any
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import BLOCK, PointBlock, RayBlock, vector_of
 from reference_rt.core.vec3 import Vec3, is_black, to_local
-from reference_rt.jit.kernel import kernel
 from reference_rt.materials.bsdfs.tables import CLEAR, TABLES, Leaves, by_code
 from reference_rt.materials.material import (
     NO_BRANCHES,
@@ -59,36 +58,9 @@ def ambient(leaves: Leaves, kind: int, i: int, at: At) -> Vec3:
     return Vec3(0.0, 0.0, 0.0)
 
 
-@kernel
-def _scatter(
-    table: Any,
-    kind: int,
-    block: ScatterBlock,
-    rays: RayBlock,
-    points: PointBlock,
-    light: FloatArray,
-    textured: Textured,
-    textures: Textures | None,
-    kept: FloatArray,
-    n: int,
-) -> None:
-    for j in range(n):
-        if block.codes[j] != kind:
-            continue
-        asked, i = asked_in(block, j, vector_of(points.numbers, 6, j)), block.codes[BLOCK + j]
-        frame, wi = asked.frame, direction_towards(light, j)
-        wo = to_local(frame, -vector_of(rays.numbers, 3, j))
-        at = evaluate_textures(textured, points.codes[j], place_in(block, j, textures), kept)
-        sent = Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
-        if not is_black(wi):
-            sent = eval_pdf(table, kind, i, at, wo, to_local(frame, wi))
-        drawn = sample(table, kind, i, at, wo, asked.u_lobe, asked.u0, asked.u1)
-        put_scattered(block, j, frame, sent, drawn)
-
-
-@by_code(lambda module: _scatter)
+@by_code.stage()
 def scatter(
-    leaves: Leaves,
+    table: Any,
     kind: int,
     block: ScatterBlock,
     rays: RayBlock,
@@ -101,3 +73,15 @@ def scatter(
 ) -> None:
     """`eval_pdf` towards the light samples, and `sample`, for those of the first n paths that are
     at a material of one type."""
+    for j in range(n):
+        if block.codes[j] != kind:
+            continue
+        asked, i = asked_in(block, j, vector_of(points.numbers, 6, j)), block.codes[BLOCK + j]
+        frame, wi = asked.frame, direction_towards(light, j)
+        wo = to_local(frame, -vector_of(rays.numbers, 3, j))
+        at = evaluate_textures(textured, points.codes[j], place_in(block, j, textures), kept)
+        sent = Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
+        if not is_black(wi):
+            sent = eval_pdf(table, kind, i, at, wo, to_local(frame, wi))
+        drawn = sample(table, kind, i, at, wo, asked.u_lobe, asked.u0, asked.u1)
+        put_scattered(block, j, frame, sent, drawn)
