@@ -9,7 +9,7 @@ from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Description, Direction, Positive, Vector
 from reference_rt.core.ray import Ray
-from reference_rt.core.vec3 import Vec3, length
+from reference_rt.core.vec3 import Vec3, cross, dot, length
 from reference_rt.jit.kernel import kernel
 
 LENS_CENTRE = (0.5, 0.5)
@@ -75,3 +75,42 @@ def clipped_ray(clip: Clip, o: Vec3, s: Vec3) -> Ray:
     to o + s, at distance 1 along the direction of view."""
     size = length(s)
     return Ray(o + s * clip.near, s * (1.0 / size), clip.depth * size)
+
+
+class Seen(NamedTuple):
+    """A point as a camera sees it.
+
+    x, y: its film point, as in `camera_ray`, also outside of the picture;  weight: the film's area
+    there, the picture's being 1, over that across the ray at the point: a small surface whose
+    normal has the cosine c to the ray covers weight c times its area; 0 for what no ray reaches;
+    o: the origin of its camera ray;  d: the ray's unit direction.
+    """
+
+    x: float
+    y: float
+    weight: float
+    o: Vec3
+    d: Vec3
+
+
+@kernel
+def seen_through(
+    clip: Clip, o: Vec3, corner: Vec3, right: Vec3, down: Vec3, shift: Vec3, p: Vec3
+) -> Seen:
+    """The point `p` seen from `o`, the eye or a point of the lens: the inverse of `clipped_ray`.
+
+    corner, right, down: the picture at distance 1 from the eye;  shift: what a lens adds to the
+    film point's vector.  With A the picture's area at distance 1, r the point's distance and z that
+    along the axis, the film's area per solid angle is 1 / (A cos^3), and r^2 is the area across the
+    ray per solid angle: their quotient is r / (A z^3).
+    """
+    w = p - o
+    across = cross(right, down)
+    area = length(across)
+    z = dot(w, across) / area
+    if not clip.near < z < clip.near + clip.depth:
+        return Seen(0.0, 0.0, 0.0, o, w)
+    s = w * (1.0 / z)
+    on_film, r = s + shift - corner, length(w)
+    x, y = dot(on_film, right) / dot(right, right), dot(on_film, down) / dot(down, down)
+    return Seen(x, y, r / (area * z) / (z * z), o + s * clip.near, w * (1.0 / r))

@@ -4,11 +4,11 @@ from typing import ClassVar, Literal, NamedTuple, Self
 
 from pydantic import model_validator
 
-from reference_rt.cameras.camera import Camera, Clip
+from reference_rt.cameras.camera import Camera, Clip, Seen
 from reference_rt.cameras.view_rectangle import Edges, Rectangle, by_width, place, vec3
 from reference_rt.core.model import Examples, Positive
 from reference_rt.core.ray import Ray
-from reference_rt.core.vec3 import Vec3
+from reference_rt.core.vec3 import Vec3, cross, dot, length
 from reference_rt.jit.kernel import kernel
 
 
@@ -59,3 +59,16 @@ def camera_ray(view: OrthographicView, x: float, y: float, lens: tuple[float, fl
     """The ray from (x, y) of the rectangle, forward (T2: u_s = l + (r - l)(i + 1/2) / n_x)."""
     start = view.corner + view.right * x + view.down * y
     return Ray(start + view.forward * view.clip.near, view.forward, view.clip.depth)
+
+
+@kernel
+def see(view: OrthographicView, p: Vec3, lens: tuple[float, float]) -> Seen:
+    """The point `p` as the camera sees it: the film's area is that across the rays, over the
+    rectangle's."""
+    w, right, down = p - view.corner, view.right, view.down
+    z = dot(w, view.forward)
+    o = p - view.forward * (z - view.clip.near)
+    x, y = dot(w, right) / dot(right, right), dot(w, down) / dot(down, down)
+    is_seen = view.clip.near < z < view.clip.near + view.clip.depth
+    weight = 1.0 / length(cross(right, down)) if is_seen else 0.0
+    return Seen(x, y, weight, o, view.forward)

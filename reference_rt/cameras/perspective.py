@@ -4,7 +4,7 @@ from typing import ClassVar, Literal, NamedTuple, Self
 
 from pydantic import model_validator
 
-from reference_rt.cameras.camera import Camera, Clip, clipped_ray
+from reference_rt.cameras.camera import Camera, Clip, Seen, clipped_ray, seen_through
 from reference_rt.cameras.view_rectangle import CentralCamera, at_distance_1, by_width, place
 from reference_rt.core.model import Examples, Positive
 from reference_rt.core.ray import Ray
@@ -43,6 +43,13 @@ class PerspectiveView(NamedTuple):
 def camera_ray(view: PerspectiveView, x: float, y: float, lens: tuple[float, float]) -> Ray:
     """d = s - e through (x, y) of the rectangle (T3), made unit."""
     return clipped_ray(view.clip, view.eye, view.corner + view.right * x + view.down * y)
+
+
+@kernel
+def see(view: PerspectiveView, p: Vec3, lens: tuple[float, float]) -> Seen:
+    """The point `p` as the camera sees it."""
+    none = Vec3(0.0, 0.0, 0.0)
+    return seen_through(view.clip, view.eye, view.corner, view.right, view.down, none, p)
 
 
 class Pinhole(Camera):

@@ -5,7 +5,7 @@ from typing import ClassVar, Literal, NamedTuple, Self
 
 from pydantic import model_validator
 
-from reference_rt.cameras.camera import Clip, clipped_ray
+from reference_rt.cameras.camera import Clip, Seen, clipped_ray, seen_through
 from reference_rt.cameras.view_rectangle import STEEPEST, CentralCamera, place, vec3
 from reference_rt.core.model import Examples, Positive
 from reference_rt.core.ray import Ray
@@ -91,3 +91,13 @@ def camera_ray(view: ThinLensView, x: float, y: float, lens: tuple[float, float]
     q = view.u * a + view.v * b
     s = view.corner + view.right * x + view.down * y
     return clipped_ray(view.clip, view.eye + q * view.radius, s - q * view.slope)
+
+
+@kernel
+def see(view: ThinLensView, p: Vec3, lens: tuple[float, float]) -> Seen:
+    """The point `p` as the lens point for `lens` sees it.  Lens points are uniform, and a pixel is
+    the mean over the lens."""
+    a, b = concentric_disk(lens[0], lens[1])
+    q = view.u * a + view.v * b
+    o, shift = view.eye + q * view.radius, q * view.slope
+    return seen_through(view.clip, o, view.corner, view.right, view.down, shift, p)

@@ -5,7 +5,8 @@ Contract: a description (pydantic; `deterministic`: it draws no random numbers;
 parameters, and a kernel for one ray, `radiance(setup, scene, ray, sampler)`, or one for a block of
 rays, `radiances`.  It estimates the radiance in W sr^-1 m^-2, linear sRGB, that arrives at a ray's
 origin from its (unit) direction; 0 is black.
-`RayCast` alone has no such kernel: `ray_cast.cast` computes AOVs.  Shared by all: `shading` (from a
+`RayCast` has no such kernel: `ray_cast.cast` computes AOVs.  `Light` has that of the path tracer
+for what needs no particle, and `light.trace_particles` for particles.  Shared by all: `shading` (from a
 hit to the BSDF's input), `direct_light` (one light sample, power heuristic), `scene_tables` (what
 kernels read), `path.Scratch` (buffers of a block).
 
@@ -20,6 +21,7 @@ from pydantic import Field
 from reference_rt.core.model import module_of, setups_of
 from reference_rt.core.ray import put_vector, ray_of
 from reference_rt.integrators.direct import Direct as Direct
+from reference_rt.integrators.light import Light as Light
 from reference_rt.integrators.path import Path as Path
 from reference_rt.integrators.path import Scratch
 from reference_rt.integrators.ray_cast import RayCast as RayCast
@@ -29,13 +31,13 @@ from reference_rt.integrators.whitted import WhittedSetup as WhittedSetup
 from reference_rt.jit.kernel import by_class, kernel
 from reference_rt.sampling import Samplers, sampler_of
 
-AnyIntegrator = Annotated[RayCast | Whitted | Direct | Path, Field(discriminator="type")]
+AnyIntegrator = Annotated[RayCast | Whitted | Direct | Path | Light, Field(discriminator="type")]
 
 SETUPS = (*setups_of(AnyIntegrator),)
 """The classes that `setup` returns."""
 
 
-def setup_of(integrator: Whitted | Direct | Path, has_numbers: bool) -> Any:
+def setup_of(integrator: Whitted | Direct | Path | Light, has_numbers: bool) -> Any:
     """What `radiances` takes for an integrator: its own, or that of the path tracer that draws the
     same samples.  has_numbers: whether the sampler has random numbers."""
     if has_numbers and isinstance(integrator, Direct):

@@ -179,8 +179,8 @@ is infinite from albedo² = cap on.  Mitsuba's cap of 0.95 reaches that at an al
 mean does not depend on the cap.
 """
 
-LIGHT_SAMPLING, BSDF_SAMPLING, _BOTH = range(3)
-_STRATEGIES = {"lights": LIGHT_SAMPLING, "bsdf": BSDF_SAMPLING, "both": _BOTH}
+LIGHT_SAMPLING, BSDF_SAMPLING, BOTH = range(3)
+_STRATEGIES = {"lights": LIGHT_SAMPLING, "bsdf": BSDF_SAMPLING, "both": BOTH}
 
 
 class Path(Description):
@@ -256,25 +256,63 @@ def radiances(
     Ended paths are removed: number j of the active paths belongs to sample `scratch.samples[j]`.
     The other paths of a block do not change a path's bits.
     """
-    rays, hits, points, lit = scratch.rays, scratch.hits, scratch.points, scratch.lit
     if path.hides_lamps:
-        pass_lamps(scene, rays, hits, n)
+        pass_lamps(scene, scratch.rays, scratch.hits, n)
+    begin(n, scratch)
+    advance(path, scene, samplers, 0, n, scratch)
+
+
+@kernel
+def begin(n: int, scratch: Scratch) -> None:
+    """The states of n camera rays, and no radiance so far."""
     for j in range(n):
-        put_state(scratch, j, j, start(ray_of(rays, j)))
+        put_state(scratch, j, j, start(ray_of(scratch.rays, j)))
         put_vector(scratch.totals, 0, j, Vec3(0.0, 0.0, 0.0))
-    for depth in range(path.max_depth):
+
+
+@kernel
+def advance(
+    path: PathSetup, scene: KernelScene, samplers: Samplers, first: int, n: int, scratch: Scratch
+) -> None:
+    """Trace the n active paths from edge number `first` to their ends."""
+    lit = scratch.lit
+    for depth in range(first, path.max_depth):
         if n == 0:
             break
-        closest_hits(scene.geometry, rays, hits, n)
-        surfaces(scene, rays, hits, n, points)
-        any_light.backgrounds(scene.lights, rays, hits, n, lit)
-        _emission(path, scene, depth, n, scratch)
+        meet(path, scene, depth, n, scratch)
         if depth + 1 >= path.max_depth:
             break
         _ask(scene, samplers, depth, n, scratch)
-        any_light.sample_asked(scene.lights, lit, scene.shapes, scene.textures, points, n)
+        textures = scene.textures
+        any_light.sample_asked(scene.lights, lit, scene.shapes, textures, scratch.points, n)
         _scatter(scene, n, scratch)
         n = _next_edges(path, scene, samplers, depth, n, scratch)
+
+
+@kernel
+def meet(path: PathSetup, scene: KernelScene, depth: int, n: int, scratch: Scratch) -> None:
+    """What the n active rays hit, and the emission that they meet."""
+    rays, hits = scratch.rays, scratch.hits
+    closest_hits(scene.geometry, rays, hits, n)
+    surfaces(scene, rays, hits, n, scratch.points)
+    any_light.backgrounds(scene.lights, rays, hits, n, scratch.lit)
+    _emission(path, scene, depth, n, scratch)
+
+
+@kernel
+def reflect_perfectly(
+    path: PathSetup, scene: KernelScene, samplers: Samplers, n: int, scratch: Scratch
+) -> int:
+    """Start the next edges of those of the n active camera rays whose material draws a delta lobe,
+    without light samples; returns how many there are."""
+    _ask(scene, samplers, 0, n, scratch)
+    for j in range(n):
+        ask_for_no_light(scratch.lit, j)
+    _scatter(scene, n, scratch)
+    for j in range(n):
+        if scratch.scattered.codes[j] >= 0 and not drawn_in(scratch.scattered, j).is_delta:
+            scratch.scattered.codes[j] = -1
+    return _next_edges(path, scene, samplers, 0, n, scratch)
 
 
 @kernel
@@ -420,7 +458,7 @@ def hit_emission(
 def _weight_of_path(path: PathSetup, strategy: int, pdf: float, other: float) -> float:
     """With a single strategy, samples of the other count nothing, except where the single one
     cannot draw them (other = 0)."""
-    if path.strategy == _BOTH:
+    if path.strategy == BOTH:
         return power_heuristic(pdf, other)
     return 1.0 if path.strategy == strategy or other == 0.0 else 0.0
 

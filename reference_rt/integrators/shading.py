@@ -31,11 +31,19 @@ def shade_point(
     scene: KernelScene, ray: Ray, hit: Hit, point: SurfacePoint, kept: FloatArray
 ) -> Shading:
     """The same, where the `surface` of the hit is known."""
+    return shade_towards(scene, ray, hit, point, -ray.d, kept)
+
+
+@kernel
+def shade_towards(
+    scene: KernelScene, ray: Ray, hit: Hit, point: SurfacePoint, wo: Vec3, kept: FloatArray
+) -> Shading:
+    """The same, seen from the unit direction `wo` in place of the ray's."""
     frame, local = frame_at(scene.materials, scene.geometry, ray, hit, point)
     at = place(scene, point.material, ray, hit)
     looked = evaluate_textures(scene.materials.textured, point.material, at, kept)
     flat_leaves = kept[lookup_cache_size(scene.materials.textured) :]
-    shading = Shading(point, frame, to_local(frame, -ray.d), looked, local, flat_leaves)
+    shading = Shading(point, frame, to_local(frame, wo), looked, local, flat_leaves)
     prepare(scene.materials, shading, at)
     return shading
 

@@ -12,10 +12,14 @@ from typing import Any
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.integrators import RayCast, setup_of
+from reference_rt.integrators import Light, RayCast, setup_of
+from reference_rt.integrators.light import LightSetup
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.rendering.splats import splat_tile
 from reference_rt.rendering.tiles import aov_tile, cost_tile, first_hits_tile, render_tile
 from reference_rt.sampling import Grid
 from reference_rt.scene.build import BuiltScene
+from reference_rt.scene.build_lights import emission_of
 
 Sums = dict[str, FloatArray]
 """Sums (n, width) of n pixels by name."""
@@ -112,6 +116,24 @@ def radiance_job(setup: Any, sampler: Any, shape: tuple[int, int], has_variance:
 
     sums = ("colour", "m2" if has_variance else "")
     return Job(render_tile, type(setup), arguments, sums)
+
+
+SPLATS = "splats"
+"""The sums of particles: of a whole picture, not of a unit's pixels, since a particle with the
+numbers of one pixel may be seen in any."""
+
+
+def splat_job(scene: BuiltScene, tables: SceneTables) -> Job:
+    """The particles of a scene with the integrator `light`: sums SPLATS.  Raises SceneError."""
+    integrator, film, sampler = scene.integrator, scene.film, scene.resolved_sampler.setup()
+    assert isinstance(integrator, Light)
+    emission = emission_of(scene, tables.geometry, tables.lights)
+    setup, shape = integrator.setup(), (film.width, film.height)
+
+    def arguments(tables: Any, view: Any, film_filter: Any) -> tuple[Any, ...]:
+        return setup, emission, tables, view, film_filter, sampler, shape
+
+    return Job(splat_tile, LightSetup, arguments, (SPLATS,))
 
 
 def widths_of(scene: BuiltScene) -> dict[str, int]:

@@ -15,10 +15,18 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray
+from reference_rt.integrators import Light
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.parallel_compile import Report
 from reference_rt.rendering import units
-from reference_rt.rendering.accumulation import Sums, add_samples, jobs_of, widths_of
+from reference_rt.rendering.accumulation import (
+    SPLATS,
+    Sums,
+    add_samples,
+    jobs_of,
+    splat_job,
+    widths_of,
+)
 from reference_rt.rendering.checkpoint import render_digest, sources_digest
 from reference_rt.rendering.kernels import compile_ahead, kernels_for
 from reference_rt.rendering.noise import statistics
@@ -99,14 +107,16 @@ class Prepared:
         with compile_ahead(self.jobs, threads) as ahead:
             self.tables = build_and_check(scene, tables)
             clock.append(time.perf_counter())
+            if isinstance(scene.integrator, Light):
+                self.jobs.append(splat_job(scene, self.tables))
             given = self.tables, view, film.filter.setup()
             self._kernels = kernels_for(self.jobs, *given, threads, compiling, ahead)
         clock.append(time.perf_counter())
         self.seconds = dict(zip(("tables", "compile"), np.diff(clock).tolist(), strict=True))
 
     def compute(self, unit: Unit, sums: Sums, chunk: int, stop: threading.Event) -> Done:
-        """Add a unit's samples to the sums of its pixels, in place.  Raises StoppedError within a
-        tile once `stop` is set."""
+        """Add a unit's samples to the sums of its pixels, and to SPLATS, in place.  Raises
+        StoppedError within a tile once `stop` is set."""
         before = sums["colour"].copy()
         # In plain Python (NUMBA_DISABLE_JIT=1) NumPy would warn of intended infinities (IEEE
         # division) and intended overflow (integer hashes).
@@ -116,7 +126,7 @@ class Prepared:
                     if stop.is_set():
                         raise StoppedError
                     rows = slice(tile.begin - unit.begin, tile.end - unit.begin)
-                    own = {name: array[rows] for name, array in sums.items()}
+                    own = {name: a if name == SPLATS else a[rows] for name, a in sums.items()}
                     add_samples(kernel, job, own, *tile)
             count = unit.last - unit.first
             return Done(sums, statistics(before, sums["colour"], count, chunk))

@@ -53,7 +53,9 @@ class _Given:
 
     def __init__(self, jobs: Sequence[Job], view: Any, film_filter: Any) -> None:
         self.linker = linker = Linker()
-        self.view, self.filter = linked_view(linker, view), linked_filter(linker, film_filter)
+        calls = frozenset[Any]().union(*(calls_of(job.kernel, job.setup) for job in jobs))
+        self.view = linked_view(linker, view, calls)
+        self.filter = linked_filter(linker, film_filter, calls)
         self.own = [_call(job, job.arguments(EMPTY_SCENE, self.view, self.filter)) for job in jobs]
         self.calls = [*self.own, *linker.calls]
 
@@ -103,11 +105,11 @@ def kernels_for(
 
 def plain_arguments(job: Job, tables: SceneTables, view: Any, film_filter: Any) -> tuple[Any, ...]:
     """What a job's kernel takes before its sums, for a process that runs it as plain Python."""
-    linker = Linker(is_plain=True)
+    linker, calls = Linker(is_plain=True), calls_of(job.kernel, job.setup)
     return job.arguments(
-        linked_scene(linker, tables, calls_of(job.kernel, job.setup)),
-        linked_view(linker, view),
-        linked_filter(linker, film_filter),
+        linked_scene(linker, tables, calls),
+        linked_view(linker, view, calls),
+        linked_filter(linker, film_filter, calls),
     )
 
 
@@ -115,6 +117,7 @@ def plain_arguments(job: Job, tables: SceneTables, view: Any, film_filter: Any) 
 
 _COSTS = {
     "render_tile": 1.6,
+    "splat_tile": 1.6,
     "closest_hits": 1.3,
     "any_hits": 0.9,
     "closest_hit": 0.8,

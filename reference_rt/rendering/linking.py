@@ -58,16 +58,17 @@ EMPTY_SCENE = KernelScene(
 """Nothing, of the type of every linked scene."""
 
 
-def linked_view(linker: Linker, view: Any) -> View:
-    """A camera's view, or `GivenRays`, as kernels take it."""
+def linked_view(linker: Linker, view: Any, calls: "Calls") -> View:
+    """A camera's view, or `GivenRays`, as kernels take it, with those operations of `calls` that
+    are a view's."""
     if isinstance(view, GivenRays):
         return View(linker.nothing, 0, view)
-    return View(linker.link(views, views.operations, view), int(has_lens(view)), _NO_RAYS)
+    return View(linker.link(views, _names(calls, views), view), int(has_lens(view)), _NO_RAYS)
 
 
-def linked_filter(linker: Linker, setup: Any) -> Any:
-    """A filter's setup behind a link."""
-    return linker.link(film_filters, film_filters.operations, setup)
+def linked_filter(linker: Linker, setup: Any, calls: "Calls") -> Any:
+    """A filter's setup behind a link, likewise."""
+    return linker.link(film_filters, _names(calls, film_filters), setup)
 
 
 # ---- what is called ------------------------------------------------------------------------------

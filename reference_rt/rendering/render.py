@@ -14,7 +14,7 @@ import numpy as np
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.exr import EXR_ROWS, exr_rows
 from reference_rt.core.model import name_of, types_of
-from reference_rt.integrators import AnyIntegrator, RayCast
+from reference_rt.integrators import AnyIntegrator, Light, RayCast
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.parallel_compile import Report
 from reference_rt.rendering.accumulation import layers_of, samples_of, widths_of
@@ -31,6 +31,7 @@ from reference_rt.rendering.framebuffer import Framebuffer
 from reference_rt.rendering.image import channels
 from reference_rt.rendering.loop import Limits, Loop, Saving
 from reference_rt.rendering.picture import MOST_PLACES, Picture, Taken, Written, header_of, written
+from reference_rt.rendering.splat_loop import SplatLoop
 from reference_rt.rendering.units import BAND
 from reference_rt.sampling import Grid
 from reference_rt.scene.build import BuiltScene
@@ -137,6 +138,13 @@ class Session:
         pixels in memory;  workers: opens what computes it in place of this process;  at_once: see
         `Loop`.  Raises SceneError, UsageError, WorkersError."""
         _check(scene, memory)
+        if isinstance(scene.integrator, Light):
+            if memory is not None or workers is not None or storage is not None:
+                raise scene.error(
+                    "a particle may be seen in any pixel, so that 'light' needs the whole picture "
+                    "in one process; expected no --workers, --memory or --checkpoint, or 'path'",
+                    *("integrator", "type"),
+                )
         threads = threads or os.cpu_count() or 1
         prepared: Prepared | None = None
         if workers is None:
@@ -169,8 +177,10 @@ class Session:
             remote = remote_scene(scene, digest(), self.frame.chunk)
             self._executor = Remote(remote, workers())
         after = math.inf if storage is None else storage.after
-        saving = Saving(after, needed=budget is not None)
-        self.loop = Loop(self.frame, self._executor, spp, limits or Limits(), saving, at_once)
+        saving, loop = Saving(after, needed=budget is not None), Loop
+        if isinstance(scene.integrator, Light):
+            loop = SplatLoop
+        self.loop = loop(self.frame, self._executor, spp, limits or Limits(), saving, at_once)
 
     def __enter__(self) -> Self:
         return self
@@ -267,6 +277,11 @@ def _check(scene: BuiltScene, memory: int | None) -> None:
     if "variance" in film.layers and scene.resolved_sampler.spp < 2 and not casts:
         raise scene.error(
             "one sample per pixel has no variance; expected at least 2", "film", "layers"
+        )
+    if "variance" in film.layers and isinstance(scene.integrator, Light):
+        raise scene.error(
+            "the pixels of 'light' are no means of samples of their own; expected no variance",
+            *("film", "layers"),
         )
     if memory is not None:
         return

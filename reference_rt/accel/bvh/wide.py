@@ -68,6 +68,14 @@ class Wide(NamedTuple):
     codes: IdArray
 
 
+def root_bounds(bvh: Bvh) -> tuple[FloatArray, FloatArray]:
+    """The boxes, lower and upper (VECTOR_WIDTH, 3), of the first tree's children, rounded outwards;
+    empty for those that are missing."""
+    planes = bvh.boxes[0, :CHILDREN].reshape(2, 3, VECTOR_WIDTH).astype(np.float64)
+    centre = bvh.frames[0, CENTER : CENTER + 3]
+    return planes[0].T + centre, planes[1].T + centre
+
+
 NOTHING = -1
 """The code of a leaf without references."""
 
