@@ -4,11 +4,11 @@ A camera has a `Camera` description, in scene units and degrees, with
 `setup(width, height)` for a picture of that many pixels, which returns a NamedTuple (a *view*); the
 kernel camera_ray(view, x, y, lens) -> `Ray` with a unit direction and no end, for the film point
 (x, y), each in [0, 1] across the picture from its top left corner, and the lens point for `lens`, a
-pair of random numbers; and its inverse see(view, p, lens) -> `Seen`.  The module of a camera with a lens says so: HAS_LENS; for others it is
-LENS_CENTRE.
+pair of random numbers; and its inverse, see(view, p, lens) -> `Seen`.  The module of a camera with
+a lens says so: HAS_LENS; for others it is LENS_CENTRE.
 
-To add a camera: its description and kernel, in a module that has no other `camera_ray` or `see`, and its
-line in `AnyCamera`.
+To add a camera: its description and kernels, in a module that has no other `camera_ray` or `see`,
+and its line in `AnyCamera`.
 """
 
 from typing import Annotated, Any

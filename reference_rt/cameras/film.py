@@ -334,8 +334,8 @@ _offset_by = by_class(
 )
 
 film_filters = Linkable()
-"""The operations `film_offset`, `stratum_of`, `filter_reach` and `filter_value`, on a filter's setup
-or on a link to one."""
+"""The operations `film_offset`, `stratum_of`, `filter_reach` and `filter_value`, on a filter's
+setup or on a link to one."""
 
 
 @film_filters.operation

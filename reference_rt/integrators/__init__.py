@@ -5,10 +5,10 @@ Contract: a description (pydantic; `deterministic`: it draws no random numbers;
 parameters, and a kernel for one ray, `radiance(setup, scene, ray, sampler)`, or one for a block of
 rays, `radiances`.  It estimates the radiance in W sr^-1 m^-2, linear sRGB, that arrives at a ray's
 origin from its (unit) direction; 0 is black.
-`RayCast` has no such kernel: `ray_cast.cast` computes AOVs.  `Light` has that of the path tracer
-for what needs no particle, and `light.trace_particles` for particles.  Shared by all: `shading` (from a
-hit to the BSDF's input), `direct_light` (one light sample, power heuristic), `scene_tables` (what
-kernels read), `path.Scratch` (buffers of a block).
+`RayCast` has no such kernel: `ray_cast.cast` computes AOVs.  That of `Light` leaves out what
+`light.trace_particles` adds.  Shared by all: `shading` (from a hit to the BSDF's input),
+`direct_light` (one light sample, power heuristic), `scene_tables` (what kernels read),
+`path.Scratch` (buffers of a block).
 
 To add an integrator: its file with description, NamedTuple and kernel, and its line in
 `AnyIntegrator`.

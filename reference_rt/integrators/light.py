@@ -48,36 +48,35 @@ from reference_rt.core.ray import (
     segment_to,
     vector_of,
 )
-from reference_rt.core.vec3 import Vec3, dot, is_black, max_component, to_local
+from reference_rt.core.vec3 import Vec3, dot, is_black, max_component
 from reference_rt.integrators.path import (
+    BOTH,
     ROULETTE_CAP,
     UNLIMITED,
-    BOTH,
     PathSetup,
     Scratch,
     State,
     advance,
+    ask,
     begin,
     meet,
+    next_edges,
     put_state,
-    reflect_perfectly,
+    scatter,
     state_of,
 )
 from reference_rt.integrators.scene_tables import KernelScene, surfaces
-from reference_rt.integrators.shading import frame_at, place, shade_towards
+from reference_rt.integrators.shading import frame_at, place
 from reference_rt.jit.kernel import kernel
+from reference_rt.lights import ask_for_no_light
 from reference_rt.lights.emission import Emission, emit
 from reference_rt.materials import (
     Asked,
     BsdfSample,
-    Scattered,
-    asked_in,
-    direction_towards,
     drawn_in,
     lit_in,
     put_asked,
     put_place,
-    put_scattered,
 )
 from reference_rt.sampling import Samplers, draw_pair, sampler_of
 
@@ -122,7 +121,14 @@ def radiances(
     if light.max_depth > 0:
         meet(path, scene, 0, n, scratch)
         if light.max_depth > 1:
-            n = reflect_perfectly(path, scene, samplers, n, scratch)
+            ask(scene, samplers, 0, n, scratch)
+            for j in range(n):
+                ask_for_no_light(scratch.lit, j)
+            scatter(scene, n, scratch, scratch.rays)
+            for j in range(n):
+                if not drawn_in(scratch.scattered, j).is_delta:
+                    scratch.scattered.codes[j] = -1
+            n = next_edges(path, scene, samplers, 0, n, scratch)
             advance(path, scene, samplers, 1, n, scratch)
 
 
@@ -178,7 +184,7 @@ def trace_particles(
             break
         closest_hits(scene.geometry, scratch.rays, scratch.hits, n)
         surfaces(scene, scratch.rays, scratch.hits, n, scratch.points)
-        _ask(scene, samplers, depth, n, scratch)
+        _ask_materials(scene, samplers, depth, n, scratch)
         _connect(scene, target, samplers, depth, n, scratch, more)
         if depth + 1 >= light.max_depth:
             break
@@ -206,7 +212,9 @@ def _emit(
 
 
 @kernel
-def _ask(scene: KernelScene, samplers: Samplers, depth: int, n: int, scratch: Scratch) -> None:
+def _ask_materials(
+    scene: KernelScene, samplers: Samplers, depth: int, n: int, scratch: Scratch
+) -> None:
     """What is asked of materials at each surface."""
     materials, dimension = scene.materials, sampling.PER_BOUNCE * depth
     is_flattened = any_material.are_flattened(materials)
@@ -226,29 +234,6 @@ def _ask(scene: KernelScene, samplers: Samplers, depth: int, n: int, scratch: Sc
         put_asked(scratch.scattered, j, kind, i, Asked(frame, u_lobe, u0, u1))
         if any_material.uses_textures(materials, m):
             put_place(scratch.scattered, j, place(scene, m, ray, hit))
-
-
-@kernel
-def _scatter(scene: KernelScene, n: int, scratch: Scratch, towards: RayBlock) -> None:
-    """What the materials scatter of light from `lit` for viewers against `towards`, and a direction
-    that is drawn for these."""
-    materials, block, lit = scene.materials, scratch.scattered, scratch.lit
-    points, kept = scratch.points, scratch.kept
-    if not any_material.are_flattened(materials):
-        textures = scene.textures
-        any_material.scatter(materials, block, towards, points, lit.numbers, textures, kept, n)
-        return
-    for j in range(n):
-        if block.codes[j] >= 0:
-            point, wo = point_of(points, j), -vector_of(towards.numbers, 3, j)
-            ray, hit = ray_of(scratch.rays, j), hit_of(scratch.hits, j)
-            shading = shade_towards(scene, ray, hit, point, wo, kept)
-            wi, sent = direction_towards(lit.numbers, j), Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
-            if not is_black(wi):
-                sent = any_material.eval_pdf(materials, shading, to_local(shading.frame, wi))
-            u = asked_in(block, j, point.ns)
-            drawn = any_material.sample(materials, shading, u.u_lobe, u.u0, u.u1)
-            put_scattered(block, j, shading.frame, sent, drawn)
 
 
 @kernel
@@ -291,7 +276,7 @@ def _connect(
         _look(scratch, more, j, is_asked, found.d)
         put_vector(seen, 0, j, Vec3(x, y, found.weight))
         put_vector(seen, 3, j, found.o)
-    _scatter(scene, n, scratch, more.towards)
+    scatter(scene, n, scratch, more.towards)
     for j in range(n):
         if scratch.scattered.codes[j] < 0 or scratch.lit.numbers[6 * BLOCK + j] == 0.0:
             continue
@@ -345,14 +330,14 @@ def _go_on(
     numbers, (first, last) = scratch.scattered.numbers, _DRAWN
     for j in range(n):
         scratch.lit.numbers[6 * BLOCK + j] = 0.0
-    _scatter(scene, n, scratch, scratch.rays)
+    scatter(scene, n, scratch, scratch.rays)
     for k in range(first, last):
         more.drawn[k] = numbers[k]
     for j in range(n):
         if scratch.scattered.codes[j] >= 0:
             drawn = drawn_in(scratch.scattered, j)
             _look(scratch, more, j, drawn.pdf > 0.0 and not drawn.is_delta, -drawn.wi)
-    _scatter(scene, n, scratch, more.towards)
+    scatter(scene, n, scratch, more.towards)
     for k in range(first, last):
         numbers[k] = more.drawn[k]
     alive = 0

@@ -20,8 +20,7 @@ that it is counted once (multiple importance sampling, Veach 1997).
 2013, "Megakernels Considered Harmful"): of all paths the hits, then the surface points, the light
 samples, what the materials scatter.  A stage is one kernel for each type of shape, light or
 material, which is called for the block, so that it is compiled once for all scenes, and costs a
-call for 64 paths.  What passes from stage to stage is in `Scratch`.  simple_path.py has the same as
-one loop.
+call for 64 paths.  What passes on is in `Scratch`.  simple_path.py has the same as one loop.
 """
 
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
@@ -58,7 +57,7 @@ from reference_rt.integrators.direct_light import (
     power_heuristic,
 )
 from reference_rt.integrators.scene_tables import KernelScene, surfaces
-from reference_rt.integrators.shading import frame_at, place, shade_point
+from reference_rt.integrators.shading import frame_at, place, shade_towards
 from reference_rt.jit.kernel import ByClass, kernel
 from reference_rt.lights import (
     Background,
@@ -89,8 +88,7 @@ from reference_rt.materials.textured import evaluate_textures
 from reference_rt.sampling import Sample, Samplers, draw_pair, sampler_of
 from reference_rt.textures import At
 
-STATE_FLOATS = 11 * BLOCK
-VECTOR_FLOATS = 3 * BLOCK
+STATE_FLOATS, VECTOR_FLOATS = 11 * BLOCK, 3 * BLOCK
 
 
 class Scratch(NamedTuple):
@@ -264,7 +262,6 @@ def radiances(
 
 @kernel
 def begin(n: int, scratch: Scratch) -> None:
-    """The states of n camera rays, and no radiance so far."""
     for j in range(n):
         put_state(scratch, j, j, start(ray_of(scratch.rays, j)))
         put_vector(scratch.totals, 0, j, Vec3(0.0, 0.0, 0.0))
@@ -275,44 +272,26 @@ def advance(
     path: PathSetup, scene: KernelScene, samplers: Samplers, first: int, n: int, scratch: Scratch
 ) -> None:
     """Trace the n active paths from edge number `first` to their ends."""
-    lit = scratch.lit
+    points, lit = scratch.points, scratch.lit
     for depth in range(first, path.max_depth):
         if n == 0:
             break
         meet(path, scene, depth, n, scratch)
         if depth + 1 >= path.max_depth:
             break
-        _ask(scene, samplers, depth, n, scratch)
-        textures = scene.textures
-        any_light.sample_asked(scene.lights, lit, scene.shapes, textures, scratch.points, n)
-        _scatter(scene, n, scratch)
-        n = _next_edges(path, scene, samplers, depth, n, scratch)
+        ask(scene, samplers, depth, n, scratch)
+        any_light.sample_asked(scene.lights, lit, scene.shapes, scene.textures, points, n)
+        scatter(scene, n, scratch, scratch.rays)
+        n = next_edges(path, scene, samplers, depth, n, scratch)
 
 
 @kernel
 def meet(path: PathSetup, scene: KernelScene, depth: int, n: int, scratch: Scratch) -> None:
     """What the n active rays hit, and the emission that they meet."""
-    rays, hits = scratch.rays, scratch.hits
-    closest_hits(scene.geometry, rays, hits, n)
-    surfaces(scene, rays, hits, n, scratch.points)
-    any_light.backgrounds(scene.lights, rays, hits, n, scratch.lit)
+    closest_hits(scene.geometry, scratch.rays, scratch.hits, n)
+    surfaces(scene, scratch.rays, scratch.hits, n, scratch.points)
+    any_light.backgrounds(scene.lights, scratch.rays, scratch.hits, n, scratch.lit)
     _emission(path, scene, depth, n, scratch)
-
-
-@kernel
-def reflect_perfectly(
-    path: PathSetup, scene: KernelScene, samplers: Samplers, n: int, scratch: Scratch
-) -> int:
-    """Start the next edges of those of the n active camera rays whose material draws a delta lobe,
-    without light samples; returns how many there are."""
-    _ask(scene, samplers, 0, n, scratch)
-    for j in range(n):
-        ask_for_no_light(scratch.lit, j)
-    _scatter(scene, n, scratch)
-    for j in range(n):
-        if scratch.scattered.codes[j] >= 0 and not drawn_in(scratch.scattered, j).is_delta:
-            scratch.scattered.codes[j] = -1
-    return _next_edges(path, scene, samplers, 0, n, scratch)
 
 
 @kernel
@@ -335,9 +314,8 @@ def _emission(path: PathSetup, scene: KernelScene, depth: int, n: int, scratch: 
 
 
 @kernel
-def _ask(scene: KernelScene, samplers: Samplers, depth: int, n: int, scratch: Scratch) -> None:
-    """What is asked of lights and materials at each surface.  Random numbers that decide nothing
-    are not drawn."""
+def ask(scene: KernelScene, samplers: Samplers, depth: int, n: int, scratch: Scratch) -> None:
+    """What is asked of lights and materials.  Numbers that decide nothing are not drawn."""
     materials, lights, hits = scene.materials, scene.lights, scratch.hits
     is_flattened = any_material.are_flattened(materials)
     count, dimension = any_light.count(lights), sampling.PER_BOUNCE * depth
@@ -369,18 +347,19 @@ def _ask(scene: KernelScene, samplers: Samplers, depth: int, n: int, scratch: Sc
 
 
 @kernel
-def _scatter(scene: KernelScene, n: int, scratch: Scratch) -> None:
-    """What the materials scatter: the light samples, and the paths themselves."""
+def scatter(scene: KernelScene, n: int, scratch: Scratch, towards: RayBlock) -> None:
+    """What the materials scatter: the light samples, and the paths themselves.  towards: rays from
+    the viewers, which are those of the paths but for light tracing."""
     materials, rays, hits, points = scene.materials, scratch.rays, scratch.hits, scratch.points
     block, lit = scratch.scattered, scratch.lit
     if not any_material.are_flattened(materials):
         textures, kept = scene.textures, scratch.kept
-        any_material.scatter(materials, block, rays, points, lit.numbers, textures, kept, n)
+        any_material.scatter(materials, block, towards, points, lit.numbers, textures, kept, n)
         return
     for j in range(n):
         if block.codes[j] >= 0:
-            point, ray = point_of(points, j), ray_of(rays, j)
-            shading = shade_point(scene, ray, hit_of(hits, j), point, scratch.kept)
+            point, ray, wo = point_of(points, j), ray_of(rays, j), -vector_of(towards.numbers, 3, j)
+            shading = shade_towards(scene, ray, hit_of(hits, j), point, wo, scratch.kept)
             wi, sent = direction_towards(lit.numbers, j), Scattered(Vec3(0.0, 0.0, 0.0), 0.0)
             if not is_black(wi):
                 sent = any_material.eval_pdf(materials, shading, to_local(shading.frame, wi))
@@ -390,7 +369,7 @@ def _scatter(scene: KernelScene, n: int, scratch: Scratch) -> None:
 
 
 @kernel
-def _next_edges(
+def next_edges(
     path: PathSetup, scene: KernelScene, samplers: Samplers, depth: int, n: int, scratch: Scratch
 ) -> int:
     """Adds the light samples that are not occluded, and starts the next edges; returns how many

@@ -8,6 +8,7 @@ depends on which thread was first.
 import time
 from collections import deque
 from concurrent.futures import Future
+from itertools import pairwise
 
 import numpy as np
 
@@ -64,7 +65,7 @@ class SplatLoop(Loop):
             for name, array in sums.items():
                 own[name][rows] = array
 
-        for begin, end in zip(edges, edges[1:], strict=False):
+        for begin, end in pairwise(edges):
             if begin == end:
                 continue
             rows = slice(begin, end)

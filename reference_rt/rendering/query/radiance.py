@@ -14,7 +14,7 @@ from reference_rt.cameras.film import BoxFilter
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import UNIT_ROUNDOFF, Ray
 from reference_rt.core.vec3 import row
-from reference_rt.integrators import AnyIntegrator, Path, RayCast, setup_of
+from reference_rt.integrators import AnyIntegrator, Light, Path, RayCast, setup_of
 from reference_rt.integrators.ray_cast import cast
 from reference_rt.integrators.scene_tables import KernelScene, SceneTables
 from reference_rt.jit.kernel import entry_kernel
@@ -63,6 +63,8 @@ def radiance(
     cores; their number changes no bit.  Raises ValueError, SceneError.
     """
     integrator = scene.integrator if integrator is None else integrator
+    if isinstance(integrator, Light):
+        raise ValueError("integrator: 'light' has pictures, no radiance of a ray; expected 'path'")
     if spp is None:
         spp = 1 if integrator.deterministic else scene.resolved_sampler.spp
     tables = _tables_for(scene, integrator)
