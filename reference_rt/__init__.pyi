@@ -18,6 +18,7 @@ from .cameras.film import LanczosFilter as LanczosFilter
 from .cameras.film import MitchellFilter as MitchellFilter
 from .cameras.film import TentFilter as TentFilter
 from .integrators import Direct as Direct
+from .integrators import Light as Light
 from .integrators import Path as Path
 from .integrators import RayCast as RayCast
 from .integrators import Whitted as Whitted

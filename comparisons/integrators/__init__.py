@@ -8,6 +8,7 @@ from typing import Any
 
 from comparisons.integrators.direct import DIRECT
 from comparisons.integrators.integrator import Data, IntegratorType
+from comparisons.integrators.light import LIGHT
 from comparisons.integrators.path import PATH
 from comparisons.integrators.ray_cast import LAYER_OF, RAY_CAST, SHOWN
 from comparisons.integrators.whitted import WHITTED
@@ -15,7 +16,7 @@ from comparisons.mitsuba.context import UntranslatableError
 from comparisons.mitsuba.node import Node, Reading
 from reference_rt.integrators import AnyIntegrator, Direct, Path, RayCast
 
-INTEGRATORS: tuple[IntegratorType[Any], ...] = (PATH, DIRECT, WHITTED, RAY_CAST)
+INTEGRATORS: tuple[IntegratorType[Any], ...] = (PATH, LIGHT, DIRECT, WHITTED, RAY_CAST)
 """All integrators."""
 
 _BY_TYPE = {one.description: one for one in INTEGRATORS}
@@ -57,7 +58,9 @@ def read_integrator(reading: Reading, node: Node | None) -> tuple[AnyIntegrator,
         elif node.plugin == "aov":
             found, layers = _aov(reading, node)
         else:
-            raise node.unsupported("expected one of: path, direct, volpath, depth, aov, moment")
+            raise node.unsupported(
+                "expected one of: path, ptracer, direct, volpath, depth, aov, moment"
+            )
     if hides and isinstance(found, Path | Direct):
         found = found.model_copy(update={"hide_emitters": True})
     node.finish()

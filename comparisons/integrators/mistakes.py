@@ -4,9 +4,10 @@ them."""
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from comparisons.integrators import type_of
+from comparisons.integrators import translate_integrator, type_of
+from comparisons.integrators.light import as_path
 from comparisons.lights import type_of as type_of_light
-from reference_rt.integrators import Direct, Path
+from reference_rt.integrators import Direct, Light, Path
 from reference_rt.materials import Emissive, Mask, ThinDielectric
 from reference_rt.scene.model import SceneModel
 
@@ -18,6 +19,15 @@ def in_place_of(scene: SceneModel, has_solids: bool = False) -> dict[str, Any] |
     of_solids = type_of(integrator).of_solids
     wrong = has_solids or squares_opacity(scene) or misplaces(scene)
     return of_solids(integrator) if of_solids is not None and wrong else None
+
+
+def by_paths(scene: SceneModel) -> dict[str, Any] | None:
+    """Mitsuba's integrator `path` in place of its `ptracer`, which has the expected picture of it
+    where it is right: it finds no path that ends, at the camera, in a mirror or in glass, does not
+    take orthographic cameras, and shows a room under an environment map 1.56 times as bright as
+    `path` does (Mitsuba 3.9.1)."""
+    integrator = scene.integrator
+    return translate_integrator(as_path(integrator)) if isinstance(integrator, Light) else None
 
 
 def misplaces(scene: SceneModel) -> bool:
@@ -93,6 +103,13 @@ MISTAKES = (
         lambda scene: (
             "without an environment Mitsuba's path tracer drops the light of lamps that let light "
             "pass straight through: its scene has a black environment"
+        ),
+    ),
+    Mistake(
+        lambda scene: isinstance(scene.integrator, Light),
+        lambda scene: (
+            "Mitsuba's particle tracer lacks what mirrors and glass show, orthographic cameras and "
+            "skies of maps; its path tracer, of the same mean, takes its place"
         ),
     ),
     Mistake(

@@ -19,7 +19,13 @@ from comparisons.geometry import affine
 from comparisons.geometry.flatten import Copy, Leaf, Member, copies_of, place_of
 from comparisons.geometry.frame import Frame
 from comparisons.integrators import translate_integrator
-from comparisons.integrators.mistakes import BLACK, counts_lights_often, drops_light, in_place_of
+from comparisons.integrators.mistakes import (
+    BLACK,
+    by_paths,
+    counts_lights_often,
+    drops_light,
+    in_place_of,
+)
 from comparisons.lights import translate_light
 from comparisons.materials.translate import (
     coloured_parts_of,
@@ -81,8 +87,8 @@ def load(
         plain["sensor"]["sampler"]["type"] = sampler
     solids = tuple(found.solids)
     ours = in_place_of(scene, bool(solids))
-    if ours is not None:
-        plain["integrator"] = ours
+    if (integrator := ours or by_paths(scene)) is not None:
+        plain["integrator"] = integrator
     mi_scene = mitsuba().load_dict(plain, optimize=False)
     if ours is not None:
         mi_scene.integrator().lit = partial(LitScene, solids=solids)

@@ -8,6 +8,7 @@ from typing import Any
 
 from comparisons.integrators.mistakes import (
     BLACK,
+    by_paths,
     counts_lights_often,
     drops_light,
     in_place_of,
@@ -238,7 +239,7 @@ def own_scene(scene: Scene, sampler: ReferenceSampler = "independent") -> Any:
     _without_moments(mi, state)
     if counts_lights_often(scene):
         _with_one_sample(mi, state)
-    if (ours := in_place_of(scene)) is not None:
+    if (ours := in_place_of(scene) or by_paths(scene)) is not None:
         index = _first(state, mi.ObjectType.Integrator)
         assert index is not None
         state.nodes[index].props = _properties(mi, ours)

@@ -12,6 +12,7 @@ import numpy as np
 
 from reference_rt.cli.options import Where
 from reference_rt.cli.quantities import bytes_of, duration, percentage, seconds_of, share_of
+from reference_rt.integrators import Light
 from reference_rt.jit.kernel_cache import cache_root
 from reference_rt.rendering import image
 from reference_rt.rendering.checkpoint import delete_old
@@ -98,6 +99,8 @@ def render_to_file(
     if preview is not None:
         image.check_suffix(preview)
         check_writable(preview)
+    if isinstance(scene.integrator, Light) and stored == Stored():
+        stored = Stored(no_checkpoint=True)  # it has none, see `Session`
     memory, limits, storage = limited.bytes(), limited.limits(), stored.storage()
     where.check()
     code = 0

@@ -17,6 +17,8 @@ the scene.
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import Ray
 from reference_rt.core.vec3 import Vec3, dot, frame_from_normal, row, to_world
@@ -42,6 +44,11 @@ class Emission(NamedTuple):
     is_far: FloatArray
     axis: FloatArray
     height: FloatArray
+
+
+def no_emission(n: int) -> Emission:
+    """Rows of zeros."""
+    return Emission(*(np.zeros(shape) for shape in (n, n, (n, 3), n, n, (n, 3), n)))
 
 
 class Emitted(NamedTuple):

@@ -14,12 +14,11 @@ import numpy as np
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators import Light, RayCast, setup_of
 from reference_rt.integrators.light import LightSetup
-from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.lights.emission import Emission
 from reference_rt.rendering.splats import splat_tile
 from reference_rt.rendering.tiles import aov_tile, cost_tile, first_hits_tile, render_tile
 from reference_rt.sampling import Grid
 from reference_rt.scene.build import BuiltScene
-from reference_rt.scene.build_lights import emission_of
 
 Sums = dict[str, FloatArray]
 """Sums (n, width) of n pixels by name."""
@@ -123,11 +122,10 @@ SPLATS = "splats"
 numbers of one pixel may be seen in any."""
 
 
-def splat_job(scene: BuiltScene, tables: SceneTables) -> Job:
-    """The particles of a scene with the integrator `light`: sums SPLATS.  Raises SceneError."""
+def splat_job(scene: BuiltScene, emission: Emission) -> Job:
+    """The particles of a scene with the integrator `light`: sums SPLATS."""
     integrator, film, sampler = scene.integrator, scene.film, scene.resolved_sampler.setup()
     assert isinstance(integrator, Light)
-    emission = emission_of(scene, tables.geometry, tables.lights)
     setup, shape = integrator.setup(), (film.width, film.height)
 
     def arguments(tables: Any, view: Any, film_filter: Any) -> tuple[Any, ...]:

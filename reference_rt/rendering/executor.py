@@ -32,6 +32,7 @@ from reference_rt.rendering.kernels import compile_ahead, kernels_for
 from reference_rt.rendering.noise import statistics
 from reference_rt.rendering.units import Unit, tiles_of
 from reference_rt.scene.build import BuiltScene
+from reference_rt.scene.build_lights import emission_of
 from reference_rt.scene.likely_mistakes import likely_mistakes
 from reference_rt.util.errors import SceneWarning, WorkersError
 from reference_rt.util.workers import Workers
@@ -108,7 +109,8 @@ class Prepared:
             self.tables = build_and_check(scene, tables)
             clock.append(time.perf_counter())
             if isinstance(scene.integrator, Light):
-                self.jobs.append(splat_job(scene, self.tables))
+                emission = emission_of(scene, self.tables.geometry, self.tables.lights)
+                self.jobs.append(splat_job(scene, emission))
             given = self.tables, view, film.filter.setup()
             self._kernels = kernels_for(self.jobs, *given, threads, compiling, ahead)
         clock.append(time.perf_counter())

@@ -44,6 +44,7 @@ from reference_rt.accel.single_ray import enter
 from reference_rt.core.ray import Ray, at, hit_of, point_of, ray_of
 from reference_rt.core.vec3 import Vec3, is_black
 from reference_rt.integrators import (
+    Light,
     RayCast,
     direct,
     direct_light,
@@ -71,6 +72,11 @@ SCATTERED, SHADOW = "scattered", "shadow"
 def ray_trees(scene: BuiltScene, places: Sequence[tuple[int, int, int]]) -> list[dict[str, Any]]:
     """What samples are made of, each given by its pixel's column and row and its number: its
     `rays`, its radiance, the filter_weight, and value, the product of both.  Raises SceneError."""
+    if isinstance(scene.integrator, Light):
+        raise scene.error(
+            "a pixel of 'light' is no mean of samples of its own; expected 'path'",
+            *("integrator", "type"),
+        )
     film = scene.film
     tables = build_and_check(scene, None)
     view = scene.camera.setup(film.width, film.height)

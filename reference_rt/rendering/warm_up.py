@@ -19,7 +19,7 @@ import numpy as np
 from reference_rt.cameras import AnyCamera
 from reference_rt.cameras.film import AnyFilter, Film, LayerName
 from reference_rt.core.model import name_of, types_of
-from reference_rt.integrators import Direct, RayCast, Whitted
+from reference_rt.integrators import Direct, Light, RayCast, Whitted
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import signature_of
@@ -27,6 +27,7 @@ from reference_rt.jit.links import Link, Linker
 from reference_rt.jit.parallel_compile import Call
 from reference_rt.lights import TABLES as LIGHTS
 from reference_rt.lights import Constant, EnvironmentMap, Point
+from reference_rt.lights.emission import no_emission
 from reference_rt.lights.selection.choice import FEW
 from reference_rt.materials import (
     Blend,
@@ -39,7 +40,7 @@ from reference_rt.materials import (
     RoughConductor,
     TwoSided,
 )
-from reference_rt.rendering.accumulation import Job, jobs_of
+from reference_rt.rendering.accumulation import Job, jobs_of, splat_job
 from reference_rt.rendering.kernels import calls_for, cost
 from reference_rt.rendering.linking import EMPTY_SCENE, geometry_of
 from reference_rt.rendering.query.bsdf import scatter_kernel
@@ -94,11 +95,14 @@ def picture_calls(scene: BuiltScene) -> list[Call]:
 def _picture(scene: BuiltScene) -> tuple[list[Job], SceneTables, Any, Any]:
     # Of one pixel: the number of pixels changes no type.
     film = scene.film.model_copy(update={"width": 1, "height": 1})
-    jobs = jobs_of(scene.model_copy(update={"film": film}))
+    small = scene.model_copy(update={"film": film})
+    jobs = jobs_of(small)
+    if isinstance(scene.integrator, Light):
+        jobs.append(splat_job(small, no_emission(0)))
     return jobs, scene.tables, scene.camera.setup(1, 1), film.filter.setup()
 
 
-_INTEGRATORS = PathTracing(), Direct(light_samples=2), Whitted(), RayCast()
+_INTEGRATORS = PathTracing(), Light(), Direct(light_samples=2), Whitted(), RayCast()
 """Of `Direct` one that is not rendered as paths (`Direct.as_path`)."""
 
 

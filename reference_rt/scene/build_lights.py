@@ -18,7 +18,7 @@ from reference_rt.lights import (
     LightSampler,
 )
 from reference_rt.lights import TABLES as LIGHT_TABLES
-from reference_rt.lights.emission import Emission
+from reference_rt.lights.emission import Emission, no_emission
 from reference_rt.lights.emitters import constant, environment_map
 from reference_rt.lights.selection import bounds
 from reference_rt.lights.selection.bounds import LightBounds
@@ -169,10 +169,10 @@ def emission_of(scene: SceneModel, geometry: Geometry, lights: Lights) -> Emissi
             *("integrator", "type"),
         )
     choice = lights.choice
-    n = 0 if choice is None else len(choice.kind)
-    found = Emission(*(np.zeros(s) for s in (n, n, (n, 3), n, n, (n, 3), n)))
     if choice is None:
-        return found
+        return no_emission(0)
+    n = len(choice.kind)
+    found = no_emission(n)
     found.probability[:], found.cumulative[:] = choice.probability, choice.cumulative
     around = _sphere_around(geometry)
     is_placed = np.isin(choice.kind, _PLACED)

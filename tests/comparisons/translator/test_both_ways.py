@@ -62,6 +62,8 @@ FILTER_EXAMPLES = (
 INTEGRATOR_EXAMPLES = (
     rt.Path(),
     rt.Path(max_depth=4, rr_depth=9, hide_emitters=True),
+    rt.Light(),
+    rt.Light(max_depth=4, rr_depth=9),
     rt.Direct(light_samples=2, bsdf_samples=3),
     rt.Direct(light_samples=0, hide_emitters=True),
     rt.Whitted(max_depth=2, min_contribution=0.01),
