@@ -9,7 +9,7 @@ from reference_rt.cameras import AnyCamera
 from reference_rt.cameras.film import AnyFilter
 from reference_rt.core.model import Description, types_of
 from reference_rt.core.transform import Step
-from reference_rt.integrators import AnyIntegrator
+from reference_rt.integrators import Direct, Path, RayCast, Whitted
 from reference_rt.lights import AnyLight
 from reference_rt.materials import AnyMaterial
 from reference_rt.sampling import AnySampler
@@ -23,7 +23,7 @@ KINDS: dict[str, Any] = {
     "texture": AnyTexture,
     "light": AnyLight,
     "camera": AnyCamera,
-    "integrator": AnyIntegrator,
+    "integrator": RayCast | Whitted | Direct | Path,  # `light` refuses many lamps and scenes
     "sampler": AnySampler,
     "filter": AnyFilter,
     "step": Step,
