@@ -366,7 +366,8 @@ def _tabulated_value(table: Tabulated, x: float) -> float:
     k = table.place[int(at)]
     if cells[k, 2] == 0.0:
         return 0.0
-    return _weight_in(cells, k, (x - cells[k, 0]) / table.half) / (table.half * cells[k, 2])
+    weight = _weight_in(cells, k, (x - cells[k, 0]) / table.half)
+    return float(weight / (table.half * cells[k, 2]))
 
 
 _value_by = by_class(
