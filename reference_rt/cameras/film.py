@@ -317,11 +317,11 @@ def _tabulated_offset(table: Tabulated, u: float) -> tuple[float, float]:
     """Uniform inside a cell of the table; the weight is the filter over the cell's density."""
     k, cells = np.uint64(guided_cell_of(table.cumulative, table.guides, u)), table.cells
     z = min(max((u - cells[k, 1]) * cells[k, 2], -1.0), 1.0)
-    return cells[k, 0] + table.half * z, _weight_in(cells, k, z)
+    return cells[k, 0] + table.half * z, weight_in(cells, k, z)
 
 
 @kernel
-def _weight_in(cells: FloatArray, k: Any, z: float) -> float:
+def weight_in(cells: FloatArray, k: Any, z: float) -> float:
     """The weight at z, from -1 to 1, in row k of the cells."""
     z2 = z * z
     weight = (cells[k, 3] + cells[k, 4] * z) + (cells[k, 5] + cells[k, 6] * z) * z2
@@ -334,7 +334,7 @@ _offset_by = by_class(
 )
 
 film_filters = Linkable()
-"""The operations `film_offset`, `stratum_of`, `filter_reach` and `filter_value`, on a filter's
+"""The operations `film_offset` and `stratum_of`, and those of `filter_values.py`, on a filter's
 setup or on a link to one."""
 
 
@@ -344,69 +344,6 @@ def film_offset(setup: Any, u: float) -> tuple[float, float]:
     weight * g(offset) is the filter's integral of g."""
     dx, weight = _offset_by(setup, u)
     return dx, weight
-
-
-@kernel
-def _box_value(box: BoxSetup, x: float) -> float:
-    return 1.0 if -0.5 <= x < 0.5 else 0.0
-
-
-@kernel
-def _tent_value(tent: TentSetup, x: float) -> float:
-    return max(0.0, 1.0 - abs(x) / tent.radius) / tent.radius
-
-
-@kernel
-def _tabulated_value(table: Tabulated, x: float) -> float:
-    """The weight in the cell of x times the density there, 1 / (half * cells[k, 2])."""
-    cells = table.cells
-    at = 0.5 * x / table.half + 0.5 * len(cells)
-    if not 0.0 <= at < len(cells):
-        return 0.0
-    k = table.place[int(at)]
-    if cells[k, 2] == 0.0:
-        return 0.0
-    weight = _weight_in(cells, k, (x - cells[k, 0]) / table.half)
-    return float(weight / (table.half * cells[k, 2]))
-
-
-_value_by = by_class(
-    "filter_value", {BoxSetup: _box_value, TentSetup: _tent_value, Tabulated: _tabulated_value}
-)
-
-
-@film_filters.operation
-def filter_value(setup: Any, x: float) -> float:
-    """The filter along one axis, x pixels from the pixel's centre; its integral is 1."""
-    found: float = _value_by(setup, x)
-    return found
-
-
-@kernel
-def _box_reach(box: BoxSetup) -> float:
-    return 0.5 * box.width
-
-
-@kernel
-def _tent_reach(tent: TentSetup) -> float:
-    return tent.radius
-
-
-@kernel
-def _tabulated_reach(table: Tabulated) -> float:
-    return table.half * len(table.cells)
-
-
-_reach_by = by_class(
-    "filter_reach", {BoxSetup: _box_reach, TentSetup: _tent_reach, Tabulated: _tabulated_reach}
-)
-
-
-@film_filters.operation
-def filter_reach(setup: Any) -> float:
-    """How far from a pixel's centre the filter is not 0, in pixels."""
-    found: float = _reach_by(setup)
-    return found
 
 
 class Stratum(NamedTuple):

@@ -32,7 +32,7 @@ from reference_rt import materials as any_material
 from reference_rt import sampling
 from reference_rt.accel.block_query import any_hits, closest_hits
 from reference_rt.cameras import LENS_CENTRE, see
-from reference_rt.cameras.film import filter_reach, filter_value
+from reference_rt.cameras.filter_values import filter_reach, filter_value
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import Description, Examples
 from reference_rt.core.ray import (

@@ -9,7 +9,8 @@ import pytest
 
 import reference_rt as rt
 from reference_rt.cameras import camera_ray, see
-from reference_rt.cameras.film import AnyFilter, filter_reach, filter_value
+from reference_rt.cameras.film import AnyFilter
+from reference_rt.cameras.filter_values import filter_reach, filter_value
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import types_of
 from reference_rt.core.ray import at
