@@ -59,14 +59,16 @@ class ThinLens(CentralCamera):
             vec3(v),
             self.aperture_radius,
             self.aperture_radius / self.focus,
+            0.0,
             self.clip,
         )
 
 
 class ThinLensView(NamedTuple):
     """eye, corner, right, down: as in `PerspectiveView`, at distance 1;  u, v: unit axes of the
-    lens;  radius: its radius;  slope: radius / focus distance;
-    clip: the clipping planes."""
+    lens;  radius: its radius;  slope: radius / focus distance, below 0 for a focus behind the
+    lens;  exposure: what a pixel shows of a radiance that fills the lens is this times cos^4 of the
+    angle to the axis, or the radiance itself for 0;  clip: the clipping planes."""
 
     eye: Vec3
     corner: Vec3
@@ -76,6 +78,7 @@ class ThinLensView(NamedTuple):
     v: Vec3
     radius: float
     slope: float
+    exposure: float
     clip: Clip
 
 

@@ -30,7 +30,7 @@ from reference_rt.core.ray import (
     put_ray,
     vector_of,
 )
-from reference_rt.core.vec3 import Vec3, row
+from reference_rt.core.vec3 import Vec3, dot, row
 from reference_rt.integrators import radiances
 from reference_rt.integrators.path import STATE_FLOATS, VECTOR_FLOATS, Scratch, prepare
 from reference_rt.integrators.ray_cast import cast
@@ -69,11 +69,14 @@ class GivenRays(NamedTuple):
 
 class View(NamedTuple):
     """Where rays come from.  link: a camera's view behind a link, in plain Python itself;
-    has_lens: whether lens points are drawn;  given: the rays in place of a camera's, of length 0
-    for a camera."""
+    has_lens: whether lens points are drawn;  exposure: see `ThinLensView`, 0 for others;  forward:
+    the unit direction of view where there is an exposure;  given: the rays in place of a camera's,
+    of length 0 for a camera."""
 
     link: Any
     has_lens: int
+    exposure: float
+    forward: Vec3
     given: GivenRays
 
 
@@ -174,6 +177,9 @@ def render_tile(
             seen = _film_ray(view, film_filter, stratum, sampler_of(samplers, k), shape, x, y)
             put_ray(scratch.rays, k, seen.ray)
             weights[k] = seen.weight
+            if view.exposure > 0.0:
+                # Light through the hole on the film: both are inclined, and the way is longer.
+                weights[k] *= view.exposure * dot(seen.ray.d, view.forward) ** 4
         radiances(integrator, scene, samplers, n, scratch)
         for k in range(n):
             i, sample = (start + k) // count, first + (start + k) % count
