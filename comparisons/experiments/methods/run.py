@@ -198,8 +198,8 @@ def _picture(draw: Draw, number: float, size: int) -> list[Trial]:
 
 
 def picture_of_triangles(draw: Draw, number: float) -> list[Trial]:
-    """128 x 128 pixels, and ever more and smaller triangles scattered in a cube."""
-    return _picture(draw, number, 128)
+    """64 x 64 pixels, and ever more and smaller triangles scattered in a cube."""
+    return _picture(draw, number, 64)
 
 
 def picture_of_pixels(draw: Draw, pixels: float) -> list[Trial]:

@@ -45,10 +45,12 @@ def cameras(rng, scale):
 def triangles(rng, camera, scale):
     """Around the camera: before, beside and behind it, through the plane of its eye; some cover the
     picture, some no pixel, some are thin; two share an edge."""
-    eye, forward = np.array(camera.eye), -camera.basis[2]
-    before = rng.uniform(-0.5, 4, (9, 1)) * forward
-    middles = eye + scale * (0.4 * rng.normal(size=(9, 3)) + before)
-    sizes = scale * 10 ** rng.uniform(-1.5, 1, (9, 1, 1))
+    at = rng.uniform(0, [WIDTH, HEIGHT], (9, 2)) - 0.5
+    film = rt.Film(width=WIDTH, height=HEIGHT)
+    eye, d = rt.Scene(camera=camera, film=film).camera_rays(at)
+    depths = rng.uniform(-0.5, 4, (9, 1))
+    middles = eye + scale * depths * d
+    sizes = scale * (abs(depths) * 10 ** rng.uniform(-0.7, 1, (9, 1)))[..., None]
     v = middles[:, None] + sizes * rng.uniform(-1, 1, (9, 3, 3))
     v[1] = v[1, 0], v[1, 1], v[1, 0] + 0.4 * (v[1, 1] - v[1, 0]) + 1e-3 * (v[1, 2] - v[1, 0])
     v[2, :2] = v[3, :2]
@@ -99,7 +101,7 @@ def test_all_find_the_depths(scale):
     # Of 8 pictures.
     assert decided > 0.97 * 8 * WIDTH * HEIGHT
     assert hits > 200
-    assert several > 50
+    assert several > 20
 
 
 def test_the_order_of_triangles_does_not_matter():
