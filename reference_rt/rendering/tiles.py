@@ -53,10 +53,12 @@ from reference_rt.textures import colour_at
 
 
 class FilmRay(NamedTuple):
-    """A camera ray through a film point, and the filter weight of its radiance in the pixel."""
+    """A camera ray through a film point, the filter weight of its radiance in the pixel, and what
+    the film shows of the radiance."""
 
     ray: Ray
     weight: float
+    exposure: float
 
 
 class GivenRays(NamedTuple):
@@ -92,7 +94,7 @@ def _film_ray(
 ) -> FilmRay:
     given = view.given
     if len(given.o) > 0:
-        return FilmRay(Ray(row(given.o, x), row(given.d, x), math.inf), 1.0)
+        return FilmRay(Ray(row(given.o, x), row(given.d, x), math.inf), 1.0, 1.0)
     width, height = shape
     u0, u1 = draw_pair(sampler, sampling.FILM)
     u0 = stratum.part_x[0] + stratum.part_x[1] * u0
@@ -103,7 +105,12 @@ def _film_ray(
     if view.has_lens != 0:
         lens = draw_pair(sampler, sampling.LENS)
     ray = camera_ray(view.link, (x + 0.5 + dx) / width, (y + 0.5 + dy) / height, lens)
-    return FilmRay(ray, weight_x * weight_y * stratum.weight)
+    exposure = 1.0
+    if view.exposure > 0.0:
+        # Light through the hole on the film: both are inclined, and the way is longer.
+        cosine = dot(ray.d, view.forward)
+        exposure = view.exposure * (cosine * cosine) * (cosine * cosine)
+    return FilmRay(ray, weight_x * weight_y * stratum.weight, exposure)
 
 
 @kernel
@@ -176,10 +183,7 @@ def render_tile(
             y, x = pixel // shape[0], pixel % shape[0]
             seen = _film_ray(view, film_filter, stratum, sampler_of(samplers, k), shape, x, y)
             put_ray(scratch.rays, k, seen.ray)
-            weights[k] = seen.weight
-            if view.exposure > 0.0:
-                # Light through the hole on the film: both are inclined, and the way is longer.
-                weights[k] *= view.exposure * dot(seen.ray.d, view.forward) ** 4
+            weights[k] = seen.weight * seen.exposure
         radiances(integrator, scene, samplers, n, scratch)
         for k in range(n):
             i, sample = (start + k) // count, first + (start + k) % count

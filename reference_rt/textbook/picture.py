@@ -42,13 +42,15 @@ def prepare(parameters: SceneParameters) -> Prepared:
         raise ValueError("expected a camera of type perspective, without clipping planes")
     if any(shape.type not in ("triangle", "mesh") for shape in scene.shapes):
         raise ValueError("expected a scene of triangles and meshes alone")
-    view = camera.setup(film.width, film.height)
+    view, triangles = camera.setup(film.width, film.height), scene.tables.geometry.shapes.triangles
+    if triangles is None:
+        raise ValueError("expected a scene that has triangles")
     right, down = (
         np.array(edge) * (pixels / np.dot(edge, edge))
         for edge, pixels in ((view.right, film.width), (view.down, film.height))
     )
     return Prepared(
-        np.ascontiguousarray(scene.tables.geometry.shapes.triangles.vertices).reshape(-1, 9),
+        np.ascontiguousarray(triangles.vertices),
         vector(view.eye, "eye"),
         vector(-camera.basis[2], "forward"),
         vector(view.corner, "corner"),

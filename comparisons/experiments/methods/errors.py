@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +18,7 @@ RAYS = 16
 Rational = list[Fraction]
 
 
-def exact(corners: npt.ArrayLike, o: npt.ArrayLike, d: npt.ArrayLike) -> Rational:
+def exact(corners: Any, o: npt.ArrayLike, d: npt.ArrayLike) -> Rational:
     """t, u and v of the ray and the triangle's plane: u e1 + v e2 - t d = o - v0 by Cramer's
     rule."""
     v0, v1, v2 = map(_rational, np.asarray(corners))
