@@ -22,6 +22,12 @@ LARGE = 64.0
 1, and the plane's error is so many times the rounding."""
 
 
+THINNEST = 2.0**-8
+"""Minor radius below which raysect's tori are left out, where the scene's solids are about as large
+as 1: the errors of its quartics grow with the fourth power, and it loses whole hits (of 60 random
+scenes up to 2.6 % of the rays at 0.001, and below 0.1 % from 0.002 on)."""
+
+
 def node_of(member: Member, outer: Affine) -> Node:
     """A member of a copy;  outer: the map from the copy's coordinates to those of the rays.  Raises
     NoCounterpartError."""
@@ -75,4 +81,6 @@ def _placed(part: RaysectPart, m: Affine) -> Node:
     size = float(np.linalg.svd(m[:, :3], compute_uv=False)[0])
     linear = np.column_stack([m[:, :3] / size, m[:, 3]])
     sizes = [size * length for length in part.sizes]
+    if part.type == "torus" and sizes[1] * np.linalg.svd(linear[:, :3])[1][-1] < THINNEST:
+        raise NoCounterpartError(f"torus: thinner than {THINNEST} of all solids")
     return {"type": part.type, "sizes": sizes, "map": linear.tolist()}

@@ -19,7 +19,7 @@ import numpy as np
 
 from comparisons.geometry import affine
 from comparisons.geometry.exact.dyadic import Dyadic, nearest
-from comparisons.geometry.flatten import Copy, copies_of
+from comparisons.geometry.flatten import copies_of
 from comparisons.mitsuba.hits import BoolArray
 from comparisons.raysect import translate
 from comparisons.raysect.translate import Node, node_of
@@ -86,8 +86,10 @@ def solids(scene: Scene, most: int = 20_000, seed: int = 0) -> RungResult:
     ours = query.intersect(build_tables(found.scene), rays.o, rays.d)
     theirs = _traced(found, rays)
     judged = ~_is_flat(rays, ours) & ~_is_flat(rays, theirs)
-    wrong = np.flatnonzero(judged & ~_agree(sizes, rays, ours, theirs))
-    by_us, cleared, together = _decided(sizes, rays, ours, theirs, wrong)
+    off = np.maximum(_off(sizes, rays, ours), _off(sizes, rays, theirs))
+    at_one, alike = _compared(sizes, ours, theirs, off)
+    wrong = np.flatnonzero(judged & ~(at_one & alike))
+    by_us, cleared, together = _decided(sizes, rays, ours, theirs, off, at_one, wrong)
     hits = int(np.count_nonzero(judged & (ours.shape >= 0)))
     numbers: dict[str, Any] = {
         "solids": len(found.nodes),
@@ -116,25 +118,29 @@ def solids(scene: Scene, most: int = 20_000, seed: int = 0) -> RungResult:
 
 
 def _solids_of(scene: Scene) -> _Solids:
-    copies, left_out = copies_of(scene), Counter[str]()
-    kept: dict[int, list[Copy]] = {}
-    for copy in copies:
-        kept.setdefault(copy.shape, []).append(copy)
-    for shape, of in [*kept.items()]:
-        try:
-            for copy in of:
-                for member in copy.members:
-                    node_of(member, affine.IDENTITY)
-        except NoCounterpartError as error:
-            left_out[str(error)] += 1
-            del kept[shape]
-    some = scene.changed(shapes=tuple(scene.shapes[k] for k in kept))
-    if not kept:
-        return _Solids(some, [], np.zeros(0, int), np.zeros(0, int), affine.IDENTITY, left_out)
-    sizes = ShapeSizes(some)
-    middle, size = 0.5 * (sizes.lower + sizes.upper), float((sizes.upper - sizes.lower).max())
-    frame = np.column_stack([np.eye(3) / size, -middle / size])
-    placed = [(copy, member) for copy in sizes.copies for member in copy.members]
+    left_out, frame = Counter[str](), affine.IDENTITY
+    shapes = [*scene.shapes]
+    for _ in range(2):  # what all others have made the frame of, in that frame
+        copies, kept = (
+            copies_of(scene.changed(shapes=tuple(shapes))),
+            dict.fromkeys(range(len(shapes))),
+        )
+        for copy in copies:
+            try:
+                for member in copy.members if copy.shape in kept else ():
+                    node_of(member, affine.compose(copy.outer, frame))
+            except NoCounterpartError as error:
+                left_out[str(error)] += 1
+                del kept[copy.shape]
+        shapes = [shapes[k] for k in kept]
+        some = scene.changed(shapes=tuple(shapes))
+        if not shapes:
+            break
+        sizes = ShapeSizes(some)
+        middle, size = 0.5 * (sizes.lower + sizes.upper), float((sizes.upper - sizes.lower).max())
+        if frame is affine.IDENTITY:
+            frame = np.column_stack([np.eye(3) / size, -middle / size])
+    placed = [(copy, member) for copy in copies_of(some) for member in copy.members]
     return _Solids(
         some,
         [node_of(member, affine.compose(copy.outer, frame)) for copy, member in placed],
@@ -213,35 +219,37 @@ def _off(sizes: ShapeSizes, rays: Rays, hits: Intersections) -> FloatArray:
     return np.asarray(TOGETHER * scale / np.maximum(cosine, FLATTEST))
 
 
-def _agree(sizes: ShapeSizes, rays: Rays, ours: Intersections, theirs: Intersections) -> BoolArray:
+def _compared(
+    sizes: ShapeSizes, ours: Intersections, theirs: Intersections, off: FloatArray
+) -> tuple[BoolArray, BoolArray]:
+    """Whether both have the same surface and t, or miss; whether the normals are alike."""
     same = (ours.shape == theirs.shape) & (ours.instance == theirs.instance)
-    missed, off = ours.shape < 0, _off(sizes, rays, ours)
     with np.errstate(invalid="ignore"):  # inf - inf of misses
-        near = np.abs(ours.t - theirs.t) <= off
+        near = (ours.shape < 0) | (np.abs(ours.t - theirs.t) <= off)
     turned, feature = np.linalg.norm(ours.n - theirs.n, axis=1), sizes.feature_of(ours)
     # The curvature of an ellipsoid is up to a / b²; b is its feature, and a below its reach.
-    like = turned <= TOGETHER + off / feature * np.maximum(
-        1.0, sizes.reach_of(ours.shape) / feature
-    )
-    return np.asarray(same & (missed | (near & like)))
+    bend = np.maximum(1.0, sizes.reach_of(ours.shape) / feature) / feature
+    return np.asarray(same & near), np.asarray(turned <= TOGETHER + off * bend)
 
 
 def _decided(
-    sizes: ShapeSizes, rays: Rays, ours: Intersections, theirs: Intersections, wrong: IntArray
+    sizes: ShapeSizes,
+    rays: Rays,
+    ours: Intersections,
+    theirs: Intersections,
+    off: FloatArray,
+    at_one: BoolArray,
+    wrong: IntArray,
 ) -> tuple[IntArray, IntArray, IntArray]:
     """Of the rays `wrong` those whose hit or normal is wrong on our side; those that only raysect
     has wrong; those that differ where operands have a face in one place, whose order rounding
     decides."""
-    off = np.maximum(_off(sizes, rays, ours), _off(sizes, rays, theirs))
     differ_at = np.minimum(ours.t, theirs.t)
-    with np.errstate(invalid="ignore"):  # inf - inf of misses
-        near = np.abs(ours.t - theirs.t) <= off
-    in_one_place = (ours.shape == theirs.shape) & (ours.instance == theirs.instance) & near
     together = _coincide(sizes, rays.rows(wrong), differ_at[wrong], off[wrong])
     left = wrong[~together]
     truths = Referee(sizes, TOGETHER).decide(rays.o[left], rays.d[left])
     right = [
-        truth.touching or (truth.agrees(ours, k, off[k]) and not in_one_place[k])
+        truth.touching or (truth.agrees(ours, k, off[k]) and not at_one[k])
         for k, truth in zip(left.tolist(), truths, strict=True)
     ]
     cleared = left[np.array(right, bool)]

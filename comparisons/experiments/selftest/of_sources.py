@@ -300,7 +300,7 @@ FAULTS = (
         "        return min(i, 2 * n - 1 - i)\n    return n - 1 if i == n else i % n\n", "files",
     ),
     SourceFault(
-        "normals of what a solid lacks not turned", "csg_die", "accel/geometry.py",
+        "normals of what a solid lacks not turned", "csg_inside", "accel/geometry.py",
         "                point.p, -point.n, -point.ns, point.error, point.material, point.light\n",
         "                point.p, point.n, point.ns, point.error, point.material, point.light\n",
         "solids",
