@@ -49,7 +49,7 @@ def a_map(rng: np.random.Generator) -> tuple[Matrix, ...]:
     linear = np.eye(3) * rng.uniform(0.5, 2.0, 3) + rng.uniform(-0.4, 0.4, (3, 3))
     linear[:, 0] *= rng.choice([-1.0, 1.0])
     rows = np.column_stack([linear, rng.uniform(-1.0, 1.0, 3)])
-    return (Matrix(matrix=tuple(map(tuple, rows.tolist()))),)
+    return (Matrix.model_validate({"matrix": rows.tolist()}),)
 
 
 def a_tree(rng: np.random.Generator, depth: int) -> Any:
