@@ -79,4 +79,5 @@ PLANE = ShapeType(
     to_mitsuba=_to_mitsuba,
     triangles=None,
     encloses=always,
+    to_raysect=lambda shape: [],
 )

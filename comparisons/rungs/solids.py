@@ -1,0 +1,280 @@
+"""The rung `solids`: first hits of solids, and of primitives that enclose some space, against
+raysect's.
+
+Mitsuba has no solids, cones or tori: there its side is meshes and a plugin of ours.  raysect shares
+nothing with either.  It is right but for rays that it cannot decide, such as those along a surface:
+so exact arithmetic decides where the two differ, and each ray that it decides against raysect is
+counted.
+"""
+
+import importlib.util
+import json
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from comparisons.geometry import affine
+from comparisons.geometry.exact.dyadic import Dyadic, nearest
+from comparisons.geometry.flatten import copies_of
+from comparisons.mitsuba.hits import BoolArray
+from comparisons.raysect import translate
+from comparisons.raysect.translate import Node, node_of
+from comparisons.referee.referee import Referee, crossings_of
+from comparisons.referee.sizes import ShapeSizes, corners_of
+from comparisons.renderers import NoCounterpartError
+from comparisons.results.case import RungResult
+from comparisons.rungs.rays import arbiter
+from comparisons.rungs.rays.rays import Rays
+from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.rendering import query
+from reference_rt.rendering.query import Intersections
+from reference_rt.rendering.scene import Scene
+from reference_rt.scene.build import build_tables
+from reference_rt.util.errors import ReferenceUnavailableError
+from reference_rt.util.files import temporary_folder
+from reference_rt.util.processes import tied
+
+HOW = "raysect is not installed; to get it: pip install 'reference_rt[witness]'"
+
+TOGETHER = 2.0**-40
+"""Tolerance of t and of points, as a fraction of the coordinates and over the cosine: a thousand
+times what was measured (8 ulp in 20,000 rays of each scene), and far below any other surface."""
+
+FLATTEST = 1e-3
+"""Cosine below which rays are left out: raysect takes tangents for entries (its epsilon is
+1e-9)."""
+
+FEW = 1e-3
+"""Largest fraction of rays that exact arithmetic may decide against raysect.  More means that it
+was given another solid."""
+
+SECONDS = 120.0
+"""Time limit of raysect: against hanging."""
+
+
+class _Solids(NamedTuple):
+    """scene: the scene with these shapes alone;  nodes: raysect's solids, in coordinates in which
+    all are about as large as 1;  shape, instance: of each;  left_out: of other shapes, the
+    reason."""
+
+    scene: Scene
+    nodes: list[Node]
+    shape: IntArray
+    instance: IntArray
+    frame: affine.Affine
+    left_out: dict[str, int]
+
+
+def solids(scene: Scene, most: int = 20_000, seed: int = 0) -> RungResult:
+    """Compare t, surface and normal of the first hits of rays through each solid, `most` in all.
+
+    Raises SceneError, and ReferenceUnavailableError where raysect fails.
+    """
+    found = _solids_of(scene)
+    told = "; ".join(f"{count} of {reason}" for reason, count in found.left_out.items())
+    left_out = f"; left out: {told}" if told else ""
+    if not found.nodes:
+        return RungResult("solids", "not-applicable", f"no solid that raysect has{left_out}")
+    if importlib.util.find_spec("raysect") is None:
+        return RungResult("solids", "not-applicable", HOW)
+    sizes = ShapeSizes(found.scene)
+    rays = _rays(sizes, most, seed)
+    ours = query.intersect(build_tables(found.scene), rays.o, rays.d)
+    theirs = _traced(found, rays)
+    judged = ~_is_flat(rays, ours) & ~_is_flat(rays, theirs)
+    off = np.maximum(_off(sizes, rays, ours), _off(sizes, rays, theirs))
+    at_one, alike = _compared(sizes, ours, theirs, off)
+    wrong = np.flatnonzero(judged & ~(at_one & alike))
+    by_us, cleared, together = _decided(sizes, rays, ours, theirs, off, at_one, wrong)
+    hits = int(np.count_nonzero(judged & (ours.shape >= 0)))
+    numbers: dict[str, Any] = {
+        "solids": len(found.nodes),
+        "rays": len(rays.o),
+        "hits": hits,
+        "flat": int(np.count_nonzero(~judged)),
+        "wrong": len(by_us),
+        "cleared": len(cleared),
+        "coincident": len(together),
+        "left_out": found.left_out,
+    }
+    if len(by_us) or arbiter.too_many(len(cleared), len(rays.o), FEW):
+        first = int(by_us[0] if len(by_us) else cleared[0])
+        why = (
+            f"{len(by_us)} of {len(rays.o)} rays of solids are wrong by exact arithmetic"
+            if len(by_us)
+            else f"raysect's solids are others for {len(cleared)} of {len(rays.o)} rays, whose "
+            "hits by exact arithmetic are as our tables are"
+        )
+        return RungResult("solids", "differ", f"{why}; {_told(rays, ours, theirs, first)}", numbers)
+    text = f"{hits} hits of {len(found.nodes)} solids are raysect's"
+    for count, what in ((len(cleared), "are"), (len(together), "on coincident faces are")):
+        if count:
+            text += f"; exact arithmetic decides {count} more for ours, which {what} not"
+    return RungResult("solids", "agree", text + left_out, numbers)
+
+
+def _solids_of(scene: Scene) -> _Solids:
+    left_out, frame = Counter[str](), affine.IDENTITY
+    shapes = [*scene.shapes]
+    for _ in range(2):  # what all others have made the frame of, in that frame
+        copies, kept = (
+            copies_of(scene.changed(shapes=tuple(shapes))),
+            dict.fromkeys(range(len(shapes))),
+        )
+        for copy in copies:
+            try:
+                for member in copy.members if copy.shape in kept else ():
+                    node_of(member, affine.compose(copy.outer, frame))
+            except NoCounterpartError as error:
+                left_out[str(error)] += 1
+                del kept[copy.shape]
+        shapes = [shapes[k] for k in kept]
+        some = scene.changed(shapes=tuple(shapes))
+        if not shapes:
+            break
+        sizes = ShapeSizes(some)
+        middle, size = 0.5 * (sizes.lower + sizes.upper), float((sizes.upper - sizes.lower).max())
+        if frame is affine.IDENTITY:
+            frame = np.column_stack([np.eye(3) / size, -middle / size])
+    placed = [(copy, member) for copy in copies_of(some) for member in copy.members]
+    return _Solids(
+        some,
+        [node_of(member, affine.compose(copy.outer, frame)) for copy, member in placed],
+        np.array([copy.shape for copy, _ in placed]),
+        np.array([copy.instance for copy, _ in placed]),
+        frame,
+        dict(left_out),
+    )
+
+
+def _rays(sizes: ShapeSizes, most: int, seed: int) -> Rays:
+    """As many for each copy: half from around it to a point of its bounds, and half in a random
+    direction from a point in these, which may be inside of the solid."""
+    rng = np.random.default_rng(seed)
+    each = -(-most // (2 * len(sizes.copies)))
+    o, d = [], []
+    for copy in sizes.copies:
+        leaves = [leaf for leaf in sizes.leaves_of(copy) if leaf.is_finite]
+        corners = np.concatenate([corners_of(leaf.bounds, copy.outer) for leaf in leaves])
+        lower, upper = corners.min(axis=0), corners.max(axis=0)
+        inside, towards = rng.uniform(lower, upper, (2, each, 3))
+        offset = np.linalg.norm(upper - lower) * affine.unit_vectors(rng, each)
+        around = 0.5 * (lower + upper) + offset
+        o += [around, inside]
+        d += [towards - around, affine.unit_vectors(rng, each)]
+    ways = np.concatenate(d)
+    return Rays(np.concatenate(o), affine.unit_rows(ways))
+
+
+def _traced(found: _Solids, rays: Rays) -> Intersections:
+    """raysect's hits, in scene units;  part, primitive and uv are 0."""
+    size = 1.0 / found.frame[0, 0]
+    with temporary_folder() as folder:
+        given, out = folder / "rays.npz", folder / "hits.npz"
+        np.savez(given, o=affine.apply_points(found.frame, rays.o), d=rays.d)
+        request = {"solids": found.nodes, "rays": str(given), "out": str(out)}
+        done = subprocess.run(
+            [sys.executable, "-P", str(Path(translate.__file__).with_name("worker.py"))],
+            input=json.dumps(request),
+            capture_output=True,
+            text=True,
+            timeout=SECONDS,
+            check=False,
+            **tied(),
+        )
+        if done.returncode != 0:
+            why = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+            raise ReferenceUnavailableError(f"raysect: {why}")
+        with np.load(out) as hits:
+            t, solid, normal = size * hits["t"], hits["solid"], hits["normal"]
+    none, known = np.zeros(len(t), np.int32), solid >= 0
+    return Intersections(
+        t=t,
+        shape=np.where(known, found.shape[solid], -1),
+        instance=np.where(known, found.instance[solid], -1),
+        part=none,
+        primitive=none,
+        p=np.where(known[:, None], rays.o + np.where(known, t, 0.0)[:, None] * rays.d, 0.0),
+        n=normal,
+        ns=normal,
+        uv=np.zeros((len(t), 2)),
+    )
+
+
+def _is_flat(rays: Rays, hits: Intersections) -> BoolArray:
+    cosine = np.abs(np.einsum("ni,ni->n", rays.d, hits.n))
+    return np.asarray((hits.shape >= 0) & (cosine < FLATTEST))
+
+
+def _off(sizes: ShapeSizes, rays: Rays, hits: Intersections) -> FloatArray:
+    """Tolerance of t (n,).  The terms of a quadratic equation are as large as the square of the
+    distance in units of the shape: their rounding moves a hit by u distance² / feature."""
+    scale = np.maximum(np.abs(rays.o).max(axis=1), sizes.reach_of(hits.shape))
+    scale = np.maximum(scale, scale * scale / sizes.feature_of(hits))
+    cosine = np.abs(np.einsum("ni,ni->n", rays.d, hits.n))
+    return np.asarray(TOGETHER * scale / np.maximum(cosine, FLATTEST))
+
+
+def _compared(
+    sizes: ShapeSizes, ours: Intersections, theirs: Intersections, off: FloatArray
+) -> tuple[BoolArray, BoolArray]:
+    """Whether both have the same surface and t, or miss; whether the normals are alike."""
+    same = (ours.shape == theirs.shape) & (ours.instance == theirs.instance)
+    with np.errstate(invalid="ignore"):  # inf - inf of misses
+        near = (ours.shape < 0) | (np.abs(ours.t - theirs.t) <= off)
+    turned, feature = np.linalg.norm(ours.n - theirs.n, axis=1), sizes.feature_of(ours)
+    # The curvature of an ellipsoid is up to a / b²; b is its feature, and a below its reach.
+    bend = np.maximum(1.0, sizes.reach_of(ours.shape) / feature) / feature
+    return np.asarray(same & near), np.asarray(turned <= TOGETHER + off * bend)
+
+
+def _decided(
+    sizes: ShapeSizes,
+    rays: Rays,
+    ours: Intersections,
+    theirs: Intersections,
+    off: FloatArray,
+    at_one: BoolArray,
+    wrong: IntArray,
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Of the rays `wrong` those whose hit or normal is wrong on our side; those that only raysect
+    has wrong; those that differ where operands have a face in one place, whose order rounding
+    decides."""
+    differ_at = np.minimum(ours.t, theirs.t)
+    together = _coincide(sizes, rays.rows(wrong), differ_at[wrong], off[wrong])
+    left = wrong[~together]
+    truths = Referee(sizes, TOGETHER).decide(rays.o[left], rays.d[left])
+    right = [
+        truth.touching or (truth.agrees(ours, k, off[k]) and not at_one[k])
+        for k, truth in zip(left.tolist(), truths, strict=True)
+    ]
+    cleared = left[np.array(right, bool)]
+    return np.setdiff1d(left, cleared), cleared, wrong[together]
+
+
+def _coincide(sizes: ShapeSizes, rays: Rays, t: FloatArray, off: FloatArray) -> BoolArray:
+    """Whether two operands of a copy, or two copies, have a face at t, within `off`."""
+    faces = np.zeros(len(t), np.int64)
+    for copy in sizes.copies if len(t) else ():
+        inverse = affine.invert(copy.outer)
+        o = affine.apply_points(inverse, rays.o)
+        d = affine.apply_points(inverse, rays.o + rays.d) - o
+        for leaf in sizes.leaves_of(copy):
+            lists, _ = crossings_of(leaf, (o, d), (Dyadic.of(o), Dyadic.of(d)))
+            for k, crossings in enumerate(lists):
+                at = np.array([float(nearest(np.array([c], object))[0]) for c, _, _ in crossings])
+                faces[k] += bool((np.abs(at - t[k]) <= off[k]).any())
+    return faces > 1
+
+
+def _told(rays: Rays, ours: Intersections, theirs: Intersections, k: int) -> str:
+    sides = [
+        f"{whose}: shape {hits.shape[k]}, instance {hits.instance[k]}, t = {hits.t[k]:.17g}, "
+        f"n = {hits.n[k].tolist()}"
+        for whose, hits in (("ours", ours), ("raysect's", theirs))
+    ]
+    return f"the ray from {rays.o[k].tolist()} along {rays.d[k].tolist()}: {'; '.join(sides)}"
