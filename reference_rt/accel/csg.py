@@ -13,7 +13,8 @@ to.  The other operands are outside so far: their boxes are not around the ray's
 has not come to them.  So the walk to the first visible crossing takes time for the operands whose
 boxes are on the way there, and a crossing changes only the gates above its operand, up to the first
 one that stays as it is.  The bits are those of a walk that begins with all operands, since boxes
-only cull (see `accel/__init__.py`): no crossing comes before its operand's box.
+only cull (see `accel/__init__.py`): no crossing comes before its operand's box.  Crossings at the
+same t are of one group, whose result does not depend on their order.
 
 An operand that is a closed mesh has a BVH of its own; other operands give their crossings as
 `Spans`, see `shapes.dispatch.spans`.  t is that of the ray as given.  Inside, rays start near the
@@ -187,8 +188,7 @@ t_in / FAR_SLACK (`can_be_nearer`), and the second factor covers the two roundin
 
 @kernel
 def _code_of_node(child: int) -> int:
-    """The code in the queue of a child in the BVH, a node or a leaf: negative, so that at equal
-    keys it comes before crossings."""
+    """The code in the queue of a child in the BVH, a node or a leaf: negative, unlike operands."""
     return -1 - 2 * child if child >= 0 else 2 * child
 
 
@@ -254,7 +254,8 @@ def _nearest(
 ) -> int:
     """The operand with the first of all next crossings; -1 for none with begin + t up to `limit`.
 
-    What the ray enters within `at_origin` comes first: the walk begins with the state there.
+    What the ray enters within `at_origin` comes first, since the walk begins with the state there:
+    a crossing so near may be of the surface that the ray leaves (`_come_to`).
     """
     keys, codes, run = walk.keys, walk.codes, walk.run
     while True:

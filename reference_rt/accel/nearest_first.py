@@ -1,13 +1,8 @@
-"""A queue in arrays that the caller owns: a binary heap of (key, code), the smallest key first, and
-at equal keys the smallest code.  Two entries with the same key and code need no order."""
+"""A queue in arrays that the caller owns: a binary heap of (key, code), the smallest key first, in
+any order at equal keys."""
 
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.jit.kernel import kernel
-
-
-@kernel
-def _precedes(key: float, code: int, other: float, other_code: int) -> bool:
-    return key < other or (key == other and code < other_code)
 
 
 @kernel
@@ -16,7 +11,7 @@ def push(keys: FloatArray, codes: IntArray, n: int, key: float, code: int) -> in
     k = n
     while k > 0:
         above = (k - 1) >> 1
-        if not _precedes(key, code, keys[above], codes[above]):
+        if not key < keys[above]:
             break
         keys[k], codes[k] = keys[above], codes[above]
         k = above
@@ -30,9 +25,9 @@ def replace_first(keys: FloatArray, codes: IntArray, n: int, key: float, code: i
     k, below = 0, 1
     while below < n:
         right = below + 1
-        if right < n and _precedes(keys[right], codes[right], keys[below], codes[below]):
+        if right < n and keys[right] < keys[below]:
             below = right
-        if not _precedes(keys[below], codes[below], key, code):
+        if not keys[below] < key:
             break
         keys[k], codes[k] = keys[below], codes[below]
         k, below = below, 2 * below + 1

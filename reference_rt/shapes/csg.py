@@ -29,10 +29,10 @@ from reference_rt.core.ray import UNIT_ROUNDOFF, Ray, SurfacePoint
 from reference_rt.core.transform import Affine, Transform, affine, compose, identity
 from reference_rt.core.vec3 import dot, length, max_abs, row
 from reference_rt.jit.kernel import kernel
-from reference_rt.shapes import Primitive
 from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.rounding import along_from
 from reference_rt.shapes.shape import Difference, Intersection, Shape, Solid, Union
+from reference_rt.shapes.tables import Primitive
 
 __all__ = [
     "AND",
@@ -186,7 +186,8 @@ def gates_of(steps: Sequence[int]) -> Gates:
             stack.append((gate, turned))
     whole, _ = stack.pop()
     waiting = [(whole if isinstance(whole, _Gate) else _Gate([(whole, False)]), -1)]
-    up, gate_up = [0] * (1 + max(steps)), []
+    up = [0] * (1 + max(steps))
+    gate_up: list[int] = []
     while waiting:
         gate, to = waiting.pop()
         number = len(gate_up)
