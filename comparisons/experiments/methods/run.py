@@ -213,7 +213,7 @@ SERIES = (
     Series("triangle", "slivers", "length / height", (1.0, 1e2, 1e4, 1e6, 1e8), slivers),
     Series("box", "all around", "", (1.0,), boxes),
     Series("polygon", "gears", "vertices", (4.0, 16.0, 64.0, 256.0, 1024.0), polygons),
-    Series("csg", "solids", "operands", (2.0, 4.0, 8.0, 16.0, 32.0, 64.0), solids),
+    Series("csg", "solids", "operands", (2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 256.0), solids),
     Series("hierarchy", "strewn", "triangles", (1e1, 1e2, 1e3, 1e4, 1e5), strewn),
     Series("hierarchy", "needles", "triangles", (1e1, 1e2, 1e3, 1e4), needles),
     Series("picture", "triangles", "triangles", (1e1, 1e2, 1e3, 1e4, 1e5), picture_of_triangles),
