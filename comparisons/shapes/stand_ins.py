@@ -4,6 +4,7 @@ how far they are off: in distance, normals, texture coordinates and tangents."""
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,15 +18,16 @@ from comparisons.shapes.meshing import meshed
 from comparisons.shapes.site import MOST_INSTANCES, MOST_TRIANGLES, Site, placed, with_mesh_light
 from comparisons.shapes.soup import Soup, heights_of
 from comparisons.shapes.surface import Limits, Patch, Surface
-from reference_rt.core.arrays import FloatArray
+from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.shapes.shape import Shape
 
 # ---- errors --------------------------------------------------------------------------------------
 
 
-MEASURED = 50_000
+MEASURED = 10_000
 """Most triangles that are measured, evenly strided: on a smooth surface neighbours have nearly the
-same error."""
+same error.  Of 34 quadrics and tori of 5,810 to 72,092 triangles the largest distance and angle
+were at most 0.6 % short of those of all triangles."""
 
 WEIGHTS = np.array([[1, 1, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]], np.float64)
 WEIGHTS /= WEIGHTS.sum(axis=1, keepdims=True)
@@ -134,13 +136,14 @@ def measured_twist(
     return float(angle[order][np.searchsorted(area, RARE * area[-1])])
 
 
-def aspects(soup: Soup, m: affine.Affine) -> FloatArray:
-    """(faces,): the longest side of each triangle, mapped by m, over its height on it.
+def aspects(soup: Soup, m: affine.Affine, faces: IntArray) -> FloatArray:
+    """(n,): the longest side of triangles `faces` (n,), mapped by m, over its height on it.
 
     Float32's error of the barycentric coordinates moves a point along the surface by its common
     error times this: by hundreds of times on the long triangles of a cylinder.
     """
-    corners = affine.apply_points(m, soup.positions)[soup.faces]
+    corners = soup.positions[soup.faces[faces]].reshape(-1, 3)
+    corners = affine.apply_points(m, corners).reshape(-1, 3, 3)
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     heights = heights_of(corners)
     return np.asarray(np.divide(longest, heights, out=np.zeros_like(heights), where=heights > 0.0))
@@ -226,7 +229,7 @@ def stand_in(
     return plugin._replace(
         faces=soup.all_of_face(0),
         stand_in=found,
-        aspects=aspects(soup, m),
+        aspects=partial(aspects, soup, m),
         uv_of_mesh=soup.uvs is not None,
     )
 

@@ -24,6 +24,7 @@ import struct
 import typing
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar
 
@@ -103,6 +104,29 @@ def type_of(annotation: Any) -> Any:
 
 
 _WORD, _REAL = ir.IntType(64), ir.DoubleType()
+
+_types: dict[Any, Any] = {}
+"""Numba's types of tables, by `_kind`."""
+
+
+def type_of_table(table: Any) -> Any:
+    """`numba.typeof`, which takes up to 1 ms for a table; once for all tables of a kind."""
+    kind = _kind(table)
+    if kind not in _types:
+        _types[kind] = numba.typeof(table)
+    return _types[kind]
+
+
+def _kind(value: Any) -> Any:
+    """What Numba's type of a part of a table depends on: of an array the type and number of its
+    indices and how it lies in memory, of a number its class and whether 63 bits hold it."""
+    if isinstance(value, np.ndarray):
+        return value.dtype, value.ndim, value.flags.num
+    if isinstance(value, tuple):
+        return type(value), *map(_kind, value)
+    if isinstance(value, int):
+        return type(value), value.bit_length() < 64
+    return type(value)
 
 
 def words_of(value: Any) -> list[int]:
@@ -240,6 +264,20 @@ def _emit_call(
     return invoke(context, builder, function, returns, declared, arguments)
 
 
+@dataclass(eq=False)
+class Callee:
+    """What stands behind links for an operation and a type of table.
+
+    table: Numba's type;  call: the entry kernel, and the signature to compile it for;  pointer: to
+    the function once it is compiled in this process, else 0.  It is found by identity: to hash the
+    types of a table takes as long as to trace some rays.
+    """
+
+    table: Any
+    call: tuple[Any, Any]
+    pointer: int = 0
+
+
 class Row(NamedTuple):
     """A type of table in a group: its code, the field of its table, its kernel."""
 
@@ -262,6 +300,7 @@ class Operation:
         self.rows = {row.code: row.kernel for row in rows}
         self.parameters = parameters_of(function)[1:]
         self._entries: dict[int, Any] = {}
+        self._callees: dict[tuple[int, int], Callee] = {}
 
     @cached_property
     def arguments(self) -> tuple[Any, ...]:
@@ -281,6 +320,13 @@ class Operation:
             self._entries[code] = self._entry(code)
         pointer = types.CPointer(table)
         return self._entries[code], signature(self.returns, pointer, *self.arguments)
+
+    def callee_for(self, code: int, table: Any) -> Callee:
+        """`call_for`, made once in a process."""
+        key = code, id(table)  # of an object that lives as long as the callee
+        if key not in self._callees:
+            self._callees[key] = Callee(table, self.call_for(code, table))
+        return self._callees[key]
 
     def _entry(self, code: int) -> Any:
         # The code is part of the name, because all compiled code of a process shares one table of
@@ -402,14 +448,24 @@ class Linkable(Group):
 class Linker:
     """Makes the links of a scene.  They are valid as long as the linker lives.
 
-    calls: the entry kernels to be compiled, with their signatures.
+    callees: what it links, with the places of its function pointers.
     """
 
     def __init__(self, is_plain: bool = bool(numba.config.DISABLE_JIT)) -> None:
         """is_plain: for kernels that run as plain Python, which take the tables themselves."""
-        self.calls: dict[tuple[Any, Any], list[tuple[Words, int]]] = {}
+        self.callees: dict[Callee, list[tuple[Words, int]]] = {}
         self.nothing: Any = None if is_plain else Link(0)
         self._is_plain, self._kept = is_plain, list[Any]()
+
+    @property
+    def calls(self) -> list[tuple[Any, Any]]:
+        """The entry kernels behind the links, with their signatures."""
+        return [callee.call for callee in self.callees]
+
+    @property
+    def missing(self) -> list[tuple[Any, Any]]:
+        """Those of `calls` that this process has not linked before."""
+        return [callee.call for callee in self.callees if not callee.pointer]
 
     def link(
         self,
@@ -434,20 +490,21 @@ class Linker:
             content = np.array(words_of(table), np.int64)
             self._kept += [table, content]
             words[STRIDE * code] = content.ctypes.data
-            of_table = numba.typeof(table)  # once: it takes up to 1 ms
+            of_table = type_of_table(table)
             for operation in found:
                 if code in operation.rows and code in (only or {}).get(operation.name, tables):
-                    call = operation.call_for(code, of_table)
+                    callee = operation.callee_for(code, of_table)
                     place = words, STRIDE * code + operation.number
-                    self.calls.setdefault(call, []).append(place)
+                    self.callees.setdefault(callee, []).append(place)
         self._kept.append(words)
         return Link(words.ctypes.data)
 
     def resolve(self) -> None:
         """Write the function pointers, once all calls are compiled."""
-        for call, places in self.calls.items():
+        for callee, places in self.callees.items():
+            callee.pointer = callee.pointer or pointer_to(*callee.call)
             for words, k in places:
-                words[k] = pointer_to(*call)
+                words[k] = callee.pointer
 
 
 @intrinsic  # type: ignore[untyped-decorator]

@@ -81,7 +81,7 @@ def test_only_what_is_asked_for_is_compiled():
     assert len(linker.calls) == 3
     linker.link(by_code, ["count"], tables)  # two lists, one kernel
     assert len(linker.calls) == 3
-    assert sum(len(places) for places in linker.calls.values()) == 6
+    assert sum(len(places) for places in linker.callees.values()) == 6
 
 
 @needs_jit
@@ -100,7 +100,7 @@ def test_a_block_is_one_text_for_all_types():
 def test_plain_python_takes_the_tables_themselves():
     linker, tables = Linker(is_plain=True), tables_of(True, False, True)
     assert linker.link(by_code, by_code.operations, tables) is tables
-    assert (linker.nothing, linker.calls) == (None, {})
+    assert (linker.nothing, linker.calls) == (None, [])
     assert is_absent(linker.nothing)
 
 
