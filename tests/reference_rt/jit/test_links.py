@@ -28,7 +28,8 @@ from linked_tables import (
 )
 
 from reference_rt.jit.kernel import entry_kernel, kernel
-from reference_rt.jit.links import STRIDE, Link, Linkable, Linker, is_absent, type_of_table
+from reference_rt.jit.links import STRIDE, Link, Linkable, Linker, is_absent
+from reference_rt.jit.table_words import type_of_table
 
 needs_jit = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
