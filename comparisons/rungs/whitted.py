@@ -197,7 +197,7 @@ class Trees:
         off = theirs[outliers] - ours[outliers]
         allowed = (bound[outliers] + of_direct_light(context))[:, None]
         within = ((off >= low - allowed) & (off <= high + allowed)).all(axis=1)
-        return settled | within, within & (np.abs(off) > allowed).any(axis=1)
+        return settled | within, np.asarray(within & (np.abs(off) > allowed).any(axis=1))
 
     def _ours_along(
         self, o: FloatArray, d: FloatArray, tables: SceneTables | None = None

@@ -105,7 +105,7 @@ def _grid_normals(gradient: FloatArray) -> FloatArray:
     length = np.linalg.norm(gradient, axis=2, keepdims=True)
     n = np.divide(gradient, length, out=np.zeros_like(gradient), where=length > 0.0)
     if (length > 0.0).all():
-        return n
+        return np.asarray(n)
     for axis in (1, 0):
         for step in (-1, 1):
             beside = np.roll(n, step, axis=axis)

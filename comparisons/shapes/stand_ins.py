@@ -155,8 +155,8 @@ def aspects(soup: Soup, m: affine.Affine, faces: IntArray) -> FloatArray:
     Float32's error of the barycentric coordinates moves a point along the surface by its common
     error times this: by hundreds of times on the long triangles of a cylinder.
     """
-    corners = soup.positions[soup.faces[faces]].reshape(-1, 3)
-    corners = affine.apply_points(m, corners).reshape(-1, 3, 3)
+    points = soup.positions[soup.faces[faces]].reshape(-1, 3)
+    corners = affine.apply_points(m, points).reshape(-1, 3, 3)
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     heights = heights_of(corners)
     return np.asarray(np.divide(longest, heights, out=np.zeros_like(heights), where=heights > 0.0))
