@@ -49,8 +49,7 @@ def approximate_g1(a: FloatArray) -> FloatArray:
 
 def exact_g1(a: FloatArray) -> FloatArray:
     """Smith's G1: 2 / (1 + erf a + exp(-a²) / (a sqrt pi)) (Walter et al. 2007, section 5.2)."""
-    erf = np.vectorize(math.erf)(a)
-    return np.asarray(2.0 / (1.0 + erf + np.exp(-a * a) / (a * math.sqrt(math.pi))))
+    return np.asarray(2.0 / (1.0 + special.erf(a) + np.exp(-a * a) / (a * math.sqrt(math.pi))))
 
 
 def correction(mi: Any, alpha_u: Any, alpha_v: Any, v: Any) -> Any:
@@ -159,7 +158,7 @@ class RoughCoat:
         self.nodes = 64, 32
         self.transmittance = self.scattered(np.linspace(0.0, 1.0, CELLS + 1) ** 2, eta, True)
         critical = math.sqrt(1.0 - 1.0 / (eta * eta)) if eta > 1.0 else 0.5
-        parts = (_rule(64, 0.0, critical), _rule(64, critical, 1.0))
+        parts = (_rule(32, 0.0, critical), _rule(32, critical, 1.0))
         nodes, weights = (np.concatenate(column) for column in zip(*parts, strict=True))
         self.nodes = 192, 64  # near total reflection F behaves like a square root
         within = self.scattered(nodes, 1.0 / eta, False)
