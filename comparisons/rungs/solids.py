@@ -12,6 +12,7 @@ import json
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,7 +20,7 @@ import numpy as np
 
 from comparisons.geometry import affine
 from comparisons.geometry.exact.dyadic import Dyadic, nearest
-from comparisons.geometry.flatten import copies_of
+from comparisons.geometry.flatten import Copy, Member, copies_of
 from comparisons.mitsuba.hits import BoolArray
 from comparisons.raysect import translate
 from comparisons.raysect.translate import Node, node_of
@@ -49,16 +50,16 @@ FLATTEST = 1e-3
 1e-9)."""
 
 FEW = 1e-3
-"""Largest fraction of rays that exact arithmetic may decide against raysect.  More means that it
-was given another solid."""
+"""Largest fraction of rays that exact arithmetic may decide against raysect, a hundred times what
+was seen (10 in a million).  More means that it was given another solid."""
 
 SECONDS = 120.0
 """Time limit of raysect: against hanging."""
 
 
 class _Solids(NamedTuple):
-    """scene: the scene with these shapes alone;  nodes: raysect's solids, in coordinates in which
-    all are about as large as 1;  shape, instance: of each;  left_out: of other shapes, the
+    """scene: the scene with these shapes alone;  nodes: raysect's solids, in coordinates that
+    `frame` maps the scene's to;  shape, instance: of each;  left_out: of other shapes, the
     reason."""
 
     scene: Scene
@@ -118,37 +119,40 @@ def solids(scene: Scene, most: int = 20_000, seed: int = 0) -> RungResult:
 
 
 def _solids_of(scene: Scene) -> _Solids:
-    left_out, frame = Counter[str](), affine.IDENTITY
-    shapes = [*scene.shapes]
-    for _ in range(2):  # what all others have made the frame of, in that frame
-        copies, kept = (
-            copies_of(scene.changed(shapes=tuple(shapes))),
-            dict.fromkeys(range(len(shapes))),
-        )
-        for copy in copies:
-            try:
-                for member in copy.members if copy.shape in kept else ():
-                    node_of(member, affine.compose(copy.outer, frame))
-            except NoCounterpartError as error:
-                left_out[str(error)] += 1
-                del kept[copy.shape]
-        shapes = [shapes[k] for k in kept]
-        some = scene.changed(shapes=tuple(shapes))
-        if not shapes:
-            break
-        sizes = ShapeSizes(some)
-        middle, size = 0.5 * (sizes.lower + sizes.upper), float((sizes.upper - sizes.lower).max())
-        if frame is affine.IDENTITY:
-            frame = np.column_stack([np.eye(3) / size, -middle / size])
-    placed = [(copy, member) for copy in copies_of(some) for member in copy.members]
+    left_out = Counter[str]()
+    some = _those(scene, lambda copy, member: node_of(member, copy.outer), left_out)
+    if not some.shapes:
+        return _Solids(some, [], np.zeros(0, int), np.zeros(0, int), affine.IDENTITY, left_out)
+    sizes = ShapeSizes(some)
+    middle, size = 0.5 * (sizes.lower + sizes.upper), float((sizes.upper - sizes.lower).max())
+    frame = np.column_stack([np.eye(3), -middle]) * (translate.SIZE / size)
+
+    def placed(copy: Copy, member: Member) -> Node:
+        return node_of(member, affine.compose(copy.outer, frame))
+
+    some = _those(some, lambda copy, member: translate.check(placed(copy, member)), left_out)
+    all_of = [(copy, member) for copy in copies_of(some) for member in copy.members]
     return _Solids(
         some,
-        [node_of(member, affine.compose(copy.outer, frame)) for copy, member in placed],
-        np.array([copy.shape for copy, _ in placed]),
-        np.array([copy.instance for copy, _ in placed]),
+        [placed(*one) for one in all_of],
+        np.array([copy.shape for copy, _ in all_of]),
+        np.array([copy.instance for copy, _ in all_of]),
         frame,
         dict(left_out),
     )
+
+
+def _those(scene: Scene, check: Callable[[Copy, Member], object], left_out: Counter[str]) -> Scene:
+    """The scene with those shapes alone for which `check` does not raise NoCounterpartError."""
+    kept = dict.fromkeys(range(len(scene.shapes)))
+    for copy in copies_of(scene):
+        try:
+            for member in copy.members if copy.shape in kept else ():
+                check(copy, member)
+        except NoCounterpartError as error:
+            left_out[str(error)] += 1
+            del kept[copy.shape]
+    return scene.changed(shapes=tuple(scene.shapes[k] for k in kept))
 
 
 def _rays(sizes: ShapeSizes, most: int, seed: int) -> Rays:

@@ -93,7 +93,7 @@ def test_random_solids(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(100, 160))
 def test_more_random_solids(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    found = solids(scene_of(*(a_tree(rng, seed % 4) for _ in range(3))), 20_000, seed)
+    found = solids(scene_of(*(a_tree(rng, seed % 4) for _ in range(3)), Box()), 20_000, seed)
     assert found.status == "agree", found.reason
 
 
@@ -101,7 +101,7 @@ def test_half_spaces_and_copies() -> None:
     rng = np.random.default_rng(3)
     bowl = Difference(of=(Sphere(), Plane(transform=a_map(rng)), Sphere(radius=0.8)))
     lid = Intersection(of=(Plane(transform=a_map(rng)), Box()))
-    group = (bowl, Torus(transform=a_map(rng)))
+    group = (bowl, Torus(major_radius=3.0))
     copies = tuple(Instance(group="g", transform=a_map(rng)) for _ in range(3))
     found = solids(scene_of(*copies, lid, groups={"g": group}), FEW)
     assert found.status == "agree", found.reason
