@@ -216,9 +216,11 @@ def _is_flat(rays: Rays, hits: Intersections) -> BoolArray:
 
 def _off(sizes: ShapeSizes, rays: Rays, hits: Intersections) -> FloatArray:
     """Tolerance of t (n,).  The terms of a quadratic equation are as large as the square of the
-    distance in units of the shape: their rounding moves a hit by u distance² / feature."""
+    distance in units of the shape: their rounding moves a hit by u distance² / feature.  raysect's
+    coordinates are counted from the middle of all solids, and rounded there."""
     scale = np.maximum(np.abs(rays.o).max(axis=1), sizes.reach_of(hits.shape))
     scale = np.maximum(scale, scale * scale / sizes.feature_of(hits))
+    scale = np.maximum(scale, 2.0**-10 * (sizes.upper - sizes.lower).max())
     cosine = np.abs(np.einsum("ni,ni->n", rays.d, hits.n))
     return np.asarray(TOGETHER * scale / np.maximum(cosine, FLATTEST))
 
