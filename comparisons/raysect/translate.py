@@ -65,8 +65,6 @@ def _of_leaf(leaf: Leaf, outer: Affine) -> Node:
     if known.to_raysect is None:
         raise NoCounterpartError(f"{name_of(type(shape))}: raysect has none in float64")
     m = affine.compose(affine.of_steps(shape.transform), affine.compose(leaf.outer, outer))
-    if isinstance(shape, Plane):
-        return _half_space(m)
     return _combined("intersection", [_placed(part, m) for part in known.to_raysect(shape)])
 
 
@@ -81,6 +79,8 @@ def _half_space(m: Affine) -> Node:
 
 def _placed(part: RaysectPart, m: Affine) -> Node:
     m = affine.compose(part.place, m)
+    if part.type == "half_space":
+        return _half_space(m)
     # A map that enlarges is given to the sizes: raysect's bounds of a sphere ignore it.
     size = float(np.linalg.svd(m[:, :3], compute_uv=False)[0])
     linear = np.column_stack([m[:, :3] / size, m[:, 3]])

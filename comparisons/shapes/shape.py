@@ -61,7 +61,7 @@ class PbrtPart(NamedTuple):
 
 class RaysectPart(NamedTuple):
     """A primitive of raysect's: its type, lengths, and its place in the shape's own coordinates;
-    see `comparisons.raysect.worker`."""
+    see `comparisons.raysect.worker`.  Or "half_space", what is below z = 0."""
 
     type: str
     sizes: tuple[float, ...]
@@ -134,7 +134,6 @@ class ShapeType(Generic[AnyShape]):
     to_pbrt: Callable[[AnyShape, PbrtPlace], list[PbrtPart]] | None = None
     """pbrt's own shapes; none where triangles must stand for it."""
     to_raysect: Callable[[AnyShape], list[RaysectPart]] | None = None
-    """raysect's primitives whose intersection it is; none for a half-space.  Raises
-    NoCounterpartError."""
+    """raysect's primitives whose intersection it is.  Raises NoCounterpartError."""
     is_sampled: bool = False
     """Whether `reference_rt` samples points of one that is a lamp."""

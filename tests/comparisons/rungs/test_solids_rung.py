@@ -21,7 +21,6 @@ from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Box, Cone, Cylinder, Plane, Sphere, Torus
 from reference_rt.shapes.csg import Difference, Intersection, Union
 from reference_rt.shapes.instances import Instance
-from reference_rt.util.errors import ReferenceUnavailableError
 
 pytest.importorskip("raysect")
 
@@ -179,6 +178,9 @@ def test_another_solid_differs(name: str, monkeypatch: pytest.MonkeyPatch) -> No
     right = translate.node_of
     wrong = lambda member, outer: turned(right(member, outer), TREES[name])  # noqa: E731
     monkeypatch.setattr(RUNG, "node_of", wrong)
+    monkeypatch.setattr(RUNG, "MOST_JUDGED", 200)
+    touching = solids(Scene.load(SCENES / "csg_coincident.yaml"), FEW)
+    assert touching.status == "differ", "faces in one place excuse it"
     found = solids(
         scene_of(BITTEN.model_copy(update={"transform": a_map(np.random.default_rng(2))}))
     )
@@ -226,8 +228,24 @@ def test_without_raysect_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) 
 
 def test_a_failure_of_raysect_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(RUNG, "node_of", lambda *given: {"type": "pyramid", "sizes": [], "map": []})
-    with pytest.raises(ReferenceUnavailableError, match="pyramid"):
-        solids(scene_of(Sphere()))
+    found = solids(scene_of(Sphere()))
+    assert found.status == "not-applicable"
+    assert "raysect: KeyError: 'pyramid'" in found.reason
+
+
+def test_raysect_is_not_waited_for_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(RUNG, "SECONDS", 0.01)
+    found = solids(scene_of(Sphere()))
+    assert found.status == "not-applicable"
+    assert "no answer" in found.reason
+
+
+def test_many_copies_are_not_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(RUNG, "MOST_COPIES", 2)
+    copies = tuple(Instance(group="g") for _ in range(3))
+    found = solids(scene_of(*copies, groups={"g": (Sphere(),)}))
+    assert found.status == "not-applicable"
+    assert "3 copies" in found.reason
 
 
 def test_an_open_tube_is_no_solid() -> None:
