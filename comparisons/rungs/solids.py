@@ -42,7 +42,7 @@ from reference_rt.util.processes import tied
 HOW = "raysect is not installed; to get it: pip install 'reference-rt[witness]'"
 
 TOGETHER = 2.0**-40
-"""Tolerance of t, as a fraction of the coordinates and over the cosine (see `_off`), and of
+"""Tolerance of t, as a fraction of the coordinates and over the cosine (see `_tolerance`), and of
 normals.  Of 20,000 rays of each scene in scenes/ the worst is at 0.49 of it, and the worst ray of
 the median scene at 0.0007."""
 
@@ -101,11 +101,11 @@ def solids(scene: Scene, most: int = 20_000, seed: int = 0) -> RungResult:
     except ReferenceUnavailableError as error:  # Mitsuba is compared all the same
         return RungResult("solids", "not-applicable", str(error))
     judged = ~_is_flat(rays, ours) & ~_is_flat(rays, theirs)
-    off = np.maximum(_off(sizes, rays, ours), _off(sizes, rays, theirs))
-    at_one, alike = _compared(sizes, ours, theirs, off)
-    wrong = np.flatnonzero(judged & ~(at_one & alike))
+    tolerance = np.maximum(_tolerance(sizes, rays, ours), _tolerance(sizes, rays, theirs))
+    same_hit, alike = _compared(sizes, ours, theirs, tolerance)
+    wrong = np.flatnonzero(judged & ~(same_hit & alike))
     some = wrong[:: -(-len(wrong) // MOST_JUDGED)] if len(wrong) else wrong
-    by_us, cleared, together = _decided(sizes, rays, ours, theirs, off, at_one, some)
+    by_us, cleared, together = _decided(sizes, rays, ours, theirs, tolerance, same_hit, some)
     share = len(wrong) / max(len(some), 1)
     hits = int(np.count_nonzero(judged & (ours.shape >= 0)))
     numbers: dict[str, Any] = {
@@ -138,7 +138,7 @@ def solids(scene: Scene, most: int = 20_000, seed: int = 0) -> RungResult:
 
 def _solids_of(scene: Scene) -> _Solids:
     left_out = Counter[str]()
-    some = _those(scene, lambda copy, member: node_of(member, copy.outer), left_out)
+    some = _kept(scene, lambda copy, member: node_of(member, copy.outer), left_out)
     if not some.shapes:
         return _Solids(some, [], np.zeros(0, int), np.zeros(0, int), affine.IDENTITY, left_out)
     sizes = ShapeSizes(some)
@@ -148,7 +148,7 @@ def _solids_of(scene: Scene) -> _Solids:
     def placed(copy: Copy, member: Member) -> Node:
         return node_of(member, affine.compose(copy.outer, frame))
 
-    some = _those(some, lambda copy, member: translate.check(placed(copy, member)), left_out)
+    some = _kept(some, lambda copy, member: translate.check(placed(copy, member)), left_out)
     all_of = [(copy, member) for copy in copies_of(some) for member in copy.members]
     return _Solids(
         some,
@@ -160,7 +160,7 @@ def _solids_of(scene: Scene) -> _Solids:
     )
 
 
-def _those(scene: Scene, check: Callable[[Copy, Member], object], left_out: Counter[str]) -> Scene:
+def _kept(scene: Scene, check: Callable[[Copy, Member], object], left_out: Counter[str]) -> Scene:
     """The scene with those shapes alone for which `check` does not raise NoCounterpartError."""
     kept = dict.fromkeys(range(len(scene.shapes)))
     for copy in copies_of(scene):
@@ -236,7 +236,7 @@ def _is_flat(rays: Rays, hits: Intersections) -> BoolArray:
     return np.asarray((hits.shape >= 0) & (cosine < FLATTEST))
 
 
-def _off(sizes: ShapeSizes, rays: Rays, hits: Intersections) -> FloatArray:
+def _tolerance(sizes: ShapeSizes, rays: Rays, hits: Intersections) -> FloatArray:
     """Tolerance of t (n,), 0 for a miss.  The terms of a quadratic equation are as large as the
     square of the distance in units of the shape: their rounding moves a hit by u distance² /
     feature.  raysect's coordinates are counted from the middle of all solids, and rounded there."""
@@ -244,21 +244,21 @@ def _off(sizes: ShapeSizes, rays: Rays, hits: Intersections) -> FloatArray:
     scale = np.maximum(scale, scale * scale / sizes.feature_of(hits))
     scale = np.maximum(scale, 2.0**-10 * (sizes.upper - sizes.lower).max())
     cosine = np.abs(np.einsum("ni,ni->n", rays.d, hits.n))
-    off = TOGETHER * scale / np.maximum(cosine, FLATTEST)
-    return np.asarray(np.where(hits.shape >= 0, off, 0.0))
+    tolerance = TOGETHER * scale / np.maximum(cosine, FLATTEST)
+    return np.asarray(np.where(hits.shape >= 0, tolerance, 0.0))
 
 
 def _compared(
-    sizes: ShapeSizes, ours: Intersections, theirs: Intersections, off: FloatArray
+    sizes: ShapeSizes, ours: Intersections, theirs: Intersections, tolerance: FloatArray
 ) -> tuple[BoolArray, BoolArray]:
     """Whether both have the same surface and t, or miss; whether the normals are alike."""
     same = (ours.shape == theirs.shape) & (ours.instance == theirs.instance)
     with np.errstate(invalid="ignore"):  # inf - inf of misses
-        near = (ours.shape < 0) | (np.abs(ours.t - theirs.t) <= off)
+        near = (ours.shape < 0) | (np.abs(ours.t - theirs.t) <= tolerance)
     turned, feature = np.linalg.norm(ours.n - theirs.n, axis=1), sizes.feature_of(ours)
     # The curvature of an ellipsoid is up to a / b²; b is its feature, and a below its reach.
     bend = np.maximum(1.0, sizes.reach_of(ours.shape) / feature) / feature
-    return np.asarray(same & near), np.asarray(turned <= TOGETHER + off * bend)
+    return np.asarray(same & near), np.asarray(turned <= TOGETHER + tolerance * bend)
 
 
 def _decided(
@@ -266,8 +266,8 @@ def _decided(
     rays: Rays,
     ours: Intersections,
     theirs: Intersections,
-    off: FloatArray,
-    at_one: BoolArray,
+    tolerance: FloatArray,
+    same_hit: BoolArray,
     wrong: IntArray,
 ) -> tuple[IntArray, IntArray, IntArray]:
     """Of the rays `wrong` those whose hit or normal is wrong on our side; those that only raysect
@@ -275,11 +275,11 @@ def _decided(
     decides."""
     differ_at = np.minimum(ours.t, theirs.t)
     copies = np.stack([sizes.copy_of(ours), sizes.copy_of(theirs)])[:, wrong]
-    together = _coincide(sizes, rays.rows(wrong), copies, differ_at[wrong], off[wrong])
+    together = _coincide(sizes, rays.rows(wrong), copies, differ_at[wrong], tolerance[wrong])
     left = wrong[~together]
     truths = Referee(sizes, TOGETHER).decide(rays.o[left], rays.d[left])
     right = [
-        truth.touching or (truth.agrees(ours, k, off[k]) and not at_one[k])
+        truth.touching or (truth.agrees(ours, k, tolerance[k]) and not same_hit[k])
         for k, truth in zip(left.tolist(), truths, strict=True)
     ]
     cleared = left[np.array(right, bool)]
@@ -287,9 +287,9 @@ def _decided(
 
 
 def _coincide(
-    sizes: ShapeSizes, rays: Rays, copies: IntArray, t: FloatArray, off: FloatArray
+    sizes: ShapeSizes, rays: Rays, copies: IntArray, t: FloatArray, tolerance: FloatArray
 ) -> BoolArray:
-    """Whether two primitives of `copies` (2, n) have a face at t, within `off`."""
+    """Whether two primitives of `copies` (2, n) have a face at t, within `tolerance`."""
     faces = np.zeros(len(t), np.int64)
     for number in np.unique(copies).tolist():
         rows = np.flatnonzero((copies == number).any(axis=0))
@@ -300,7 +300,7 @@ def _coincide(
             lists, _ = crossings_of(leaf, (o, d), (Dyadic.of(o), Dyadic.of(d)))
             for k, crossings in zip(rows.tolist(), lists, strict=True):
                 at = nearest(np.array([c for c, _, _ in crossings], object)).astype(float)
-                faces[k] += bool((np.abs(at - t[k]) <= off[k]).any())
+                faces[k] += bool((np.abs(at - t[k]) <= tolerance[k]).any())
     return faces > 1
 
 

@@ -209,6 +209,25 @@ def test_rays_that_graze_the_boxes_of_operands():
         same_as_plain(shape, *grazing(rng, boxes_of(scene), 300), scene)
 
 
+def test_operands_a_hair_apart_keep_their_bits():
+    """Slices of a block, so close that rounding may take two crossings for one, or not, also where
+    a node's box begins: a ray that comes to that node must not lose what is in it further on."""
+    rng, gap = np.random.default_rng(18), 1e-9
+    ends = np.sort(rng.uniform(-1.0, 1.0, 401))
+    parts = tuple(
+        moved(
+            rt.Box(),
+            transform.Scale(scale=((b - a - gap) / 2.0, 0.5, 0.5)),
+            transform.Translate(translate=((a + b) / 2.0, 0.0, 0.0)),
+        )
+        for a, b in pairwise(ends.tolist())
+    )
+    o = np.column_stack([np.full(4, -3.0), rng.uniform(-0.4, 0.4, (4, 2))])
+    d = np.column_stack([np.ones(4), 0.02 * rng.normal(size=(4, 2))])
+    for shape in (Union(of=parts), Difference(of=(rt.Box(), *parts))):
+        assert same_as_plain(shape, o, d) == 4
+
+
 def boxes_of(scene):
     """The boxes (m, 3), (m, 3) of the operands of a scene's first solid that are no meshes."""
     geometry = scene.tables.geometry
