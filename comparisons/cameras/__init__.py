@@ -10,7 +10,8 @@ from comparisons.cameras.camera import CLIP, CameraType, Data
 from comparisons.cameras.central import focal
 from comparisons.cameras.film import read_film
 from comparisons.cameras.orthographic import ORTHOGRAPHIC
-from comparisons.cameras.perspective import PERSPECTIVE, PINHOLE
+from comparisons.cameras.perspective import PERSPECTIVE
+from comparisons.cameras.pinhole import PINHOLE
 from comparisons.cameras.samplers import read_sampler
 from comparisons.cameras.thin_lens import THIN_LENS
 from comparisons.mitsuba.context import TranslationContext, UntranslatableError

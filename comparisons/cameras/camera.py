@@ -27,10 +27,13 @@ Edges = tuple[float, float, float, float]
 
 
 class Lens(NamedTuple):
-    """radius: of its aperture;  focus: the distance of the plane in focus."""
+    """radius: of its aperture;  focus: the distance of the plane in focus, below 0 for a hole,
+    whose rays part from the film behind it;  exposure: None where pixels are the mean radiance
+    through it, else they are so many times the irradiance of the film."""
 
     radius: float
     focus: float
+    exposure: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,12 +48,17 @@ class CameraType(Generic[C]):
     edges: Callable[[C, Film], Edges]
     """Of what it sees: at distance 1 before the eye, or through the eye if its rays are parallel.
     From the description's fields, not by our cameras' code."""
-    lens: Callable[[C], Lens] | None
+    lens: Callable[[C], Lens | None]
+    """Of its fields; None without."""
     is_parallel: bool
     is_upside_down: bool
     scaled: Callable[[C, float], Data]
     """Its lengths in a scene that is so many times as large, except those of which only the ratio
     matters: fields."""
+
+
+def no_lens(camera: Camera) -> None:
+    """`CameraType.lens` of a type that has none."""
 
 
 NEAR, FAR = 1e-10, 1e10

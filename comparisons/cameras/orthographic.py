@@ -2,7 +2,15 @@
 
 import numpy as np
 
-from comparisons.cameras.camera import CameraType, Data, Edges, placed, read_place, read_planes
+from comparisons.cameras.camera import (
+    CameraType,
+    Data,
+    Edges,
+    no_lens,
+    placed,
+    read_place,
+    read_planes,
+)
 from comparisons.cameras.central import centred
 from comparisons.cameras.film import Frame
 from comparisons.mitsuba.context import TranslationContext
@@ -77,7 +85,7 @@ ORTHOGRAPHIC = CameraType(
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"orthographic": _from_mitsuba, "radiancemeter": _radiance_meter},
     edges=_edges,
-    lens=None,
+    lens=no_lens,
     is_parallel=True,
     is_upside_down=False,
     scaled=_scaled,

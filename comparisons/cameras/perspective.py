@@ -1,20 +1,18 @@
-"""Perspective cameras and real pinholes: Mitsuba's `perspective`."""
+"""Perspective cameras: Mitsuba's `perspective`."""
 
-from comparisons.cameras.camera import CameraType, Data, Edges, placed, read_place, read_planes
+from comparisons.cameras.camera import CameraType, Data, no_lens, placed, read_place, read_planes
 from comparisons.cameras.central import (
     angle_of,
-    centred,
     edges_of,
     is_square,
     principal_point,
     read_angle,
-    spanning,
     view_rectangle,
 )
 from comparisons.cameras.film import Frame
 from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.node import Node, Reading
-from reference_rt.cameras import Perspective, Pinhole
+from reference_rt.cameras import Perspective
 from reference_rt.cameras.film import Film
 
 
@@ -44,34 +42,8 @@ PERSPECTIVE = CameraType(
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"perspective": _from_mitsuba},
     edges=edges_of,
-    lens=None,
+    lens=no_lens,
     is_parallel=False,
     is_upside_down=False,
-    scaled=lambda camera, scale: {},
-)
-
-
-def _half(camera: Pinhole) -> float:
-    return camera.film_width / camera.film_distance / 2.0
-
-
-def _pinhole_to_mitsuba(camera: Pinhole, film: Film, context: TranslationContext) -> Data:
-    """A perspective camera, upside down."""
-    upside_down = placed(camera, context, right=-1.0, up=-1.0)
-    return {"type": "perspective", **spanning(_half(camera)), **upside_down}
-
-
-def _pinhole_edges(camera: Pinhole, film: Film) -> Edges:
-    return centred(_half(camera), film)
-
-
-PINHOLE = CameraType(
-    description=Pinhole,
-    to_mitsuba=_pinhole_to_mitsuba,
-    from_mitsuba={},
-    edges=_pinhole_edges,
-    lens=None,
-    is_parallel=False,
-    is_upside_down=True,
     scaled=lambda camera, scale: {},
 )

@@ -15,7 +15,7 @@ from comparisons.cameras.central import (
 from comparisons.cameras.film import Frame
 from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.node import Node, Reading
-from reference_rt.cameras import Perspective, ThinLens
+from reference_rt.cameras import Perspective, Pinhole, ThinLens
 from reference_rt.cameras.film import Film
 
 
@@ -46,20 +46,35 @@ def _from_mitsuba(reading: Reading, node: Node, frame: Frame) -> Perspective | T
         values = {"view": frame.window(half)}
     if not node.has("aperture_radius"):
         raise node.error("has no 'aperture_radius'; expected one")
-    return _with_lens(node, place | values, far)
+    return _with_lens(place | values, *_read_lens(node, far))
 
 
-def _read_view_rectangle(reading: Reading, node: Node, frame: Frame) -> Perspective | ThinLens:
+def _read_view_rectangle(
+    reading: Reading, node: Node, frame: Frame
+) -> Perspective | ThinLens | Pinhole:
     """Of our plugin, in files that we have written."""
     place, _ = read_place(reading, node)
     place |= read_planes(node)[0]
     view = tuple(node.number(name, 0.0) for name in ("left", "right", "bottom", "top"))
-    return _with_lens(node, place | {"view": view}, 1.0)
+    radius, focus = _read_lens(node, 1.0)
+    exposure = node.number("exposure", 0.0)
+    if focus > 0.0:
+        return _with_lens(place | {"view": view}, radius, focus)
+    return Pinhole(
+        **place | {"up": [-x for x in place["up"]]},
+        film_width=(view[1] - view[0]) * -focus,
+        film_distance=-focus,
+        hole_radius=radius,
+        exposure=exposure or None,
+    )
 
 
-def _with_lens(node: Node, values: Data, focus: float) -> Perspective | ThinLens:
-    """focus: the default of the plugin."""
-    radius, focus = node.number("aperture_radius", 0.0), node.number("focus_distance", focus)
+def _read_lens(node: Node, focus: float) -> tuple[float, float]:
+    """Radius and focus distance;  focus: the default of the plugin."""
+    return node.number("aperture_radius", 0.0), node.number("focus_distance", focus)
+
+
+def _with_lens(values: Data, radius: float, focus: float) -> Perspective | ThinLens:
     if radius == 0.0:  # Mitsuba takes a tiny one
         return Perspective(**values)
     return ThinLens(**values, aperture_radius=radius, focus_distance=focus)

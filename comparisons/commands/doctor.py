@@ -24,6 +24,10 @@ def checks() -> Iterable[Check]:
         yield Check(
             "FLIP", "left out: flip-evaluator is not installed", "pip install flip-evaluator"
         )
+    if importlib.util.find_spec("raysect") is None:
+        yield Check(
+            "raysect", "left out: it is not installed", "pip install 'reference-rt[witness]'"
+        )
     try:
         yield Check("Cycles", other("cycles").version())
     except ReferenceUnavailableError as error:

@@ -75,7 +75,7 @@ def methods(
     out: Annotated[Path, out_folder("results and the page", "DIR")] = Path("out/methods"),
     family: Annotated[
         list[str] | None,
-        typer.Option(help="Only these: sphere, triangle, box, polygon, csg, hierarchy."),
+        typer.Option(help="Only these: sphere, triangle, box, polygon, csg, hierarchy, picture."),
     ] = None,
     full: Annotated[
         bool, typer.Option("--full/--quick", help="More rays and runs: minutes instead of one.")

@@ -259,6 +259,7 @@ def _deterministic_rungs(
     convention must not be reported as wrong light.  written: the scene as its author wrote it."""
     film_filters = films[0].filter, films[1].filter
     climbs: dict[str, Callable[[], RungResult]] = {
+        "solids": lambda: ladder.solids(scene, budget.pixels),
         "geometry": lambda: ladder.geometry(
             scene, tables, counterpart, budget.pixels, resolved=budget.resolution
         ),

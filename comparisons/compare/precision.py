@@ -113,7 +113,7 @@ def _of_trees(
     outliers = compared.outliers
     beyond = beyond_precision(scene, tables, counterpart, rays.rows(outliers))
     rest = compared._replace(outliers=outliers[~beyond])
-    left = rest.outliers[~trees.explained(rays, rest)]
+    left = rest.outliers[~trees.explained(rays, rest)[0]]
     wrong[left // (side * side)] = True
     return np.asarray(wrong)
 

@@ -184,7 +184,9 @@ def camera_of(camera: Any, film: Any) -> Data:
     if of.is_upside_down:
         axes[:, :2] *= -1.0
     width, height = r - l, t - b
-    aperture, focus = (0.0, 1.0) if of.lens is None else of.lens(camera)
+    lens = of.lens(camera)
+    if lens and lens.focus < 0.0:
+        raise NoCounterpartError("a pinhole whose hole has a size")
     return {
         "type": "ORTHO" if of.is_parallel else "PERSP",
         "matrix": np.column_stack([axes, eye]).tolist(),
@@ -194,8 +196,8 @@ def camera_of(camera: Any, film: Any) -> Data:
         "resolution": [film.width, film.height],
         # Cycles' near plane is not 0: of a scene of unit size it is nothing.
         "clip": [camera.near or 1e-5, camera.far or 1e6],
-        "aperture": aperture,
-        "focus": focus,
+        "aperture": lens.radius if lens else 0.0,
+        "focus": lens.focus if lens else 1.0,
     }
 
 

@@ -62,9 +62,9 @@ class Plugin(NamedTuple):
     whose quadratic Mitsuba solves in float32 (see `hits.CURVED`), else 0;  faceted: whether its
     triangles are so small that float32 turns their geometric normals, so that shading normals are
     compared;  heights: the smallest height of each triangle of a flat shape that we do not
-    triangulate, over its longest side in uv if that is less than 1;  aspects: the longest side of
-    each triangle of a mesh that stands in, over its height on it;  uv_of_mesh: whether the vertices
-    of such a mesh have our uv, which between them are interpolated.
+    triangulate, over its longest side in uv if that is less than 1;  aspects: of
+    triangles of a mesh that stands in, the longest side over the height on it;  uv_of_mesh: whether
+    the vertices of such a mesh have our uv, which between them are interpolated.
     """
 
     value: Any
@@ -77,7 +77,7 @@ class Plugin(NamedTuple):
     curved: float = 0.0
     faceted: bool = False
     heights: FloatArray | None = None
-    aspects: FloatArray | None = None
+    aspects: Callable[[IntArray], FloatArray] | None = None
     uv_of_mesh: bool = False
 
     @property
@@ -185,7 +185,7 @@ def read(hits: RawHits, mi_shapes: Sequence[MitsubaShape], o: FloatArray) -> Mit
         if plugin.heights is not None:
             in_ours.height[rows] = plugin.heights[hits.prim[rows]]
         if plugin.aspects is not None:
-            in_ours.aspect[rows] = plugin.aspects[hits.prim[rows]]
+            in_ours.aspect[rows] = plugin.aspects(hits.prim[rows])
         if plugin.stand_in is not None:
             in_ours.sag[rows], in_ours.turn[rows] = plugin.stand_in.sag, plugin.stand_in.turn
             in_ours.stands_in[rows] = True

@@ -52,8 +52,10 @@ def camera_of(scene: Scene) -> list[str]:
     params: Params = {"float screenwindow": resolved.camera_of(scene)["view"]}
     if not of.is_parallel:
         params["float fov"] = 90.0
-    if of.lens is not None:
-        params["float lensradius"], params["float focaldistance"] = of.lens(camera)
+    if lens := of.lens(camera):
+        if lens.focus < 0.0:
+            raise UnwritableError("a pinhole whose hole has a size")
+        params["float lensradius"], params["float focaldistance"] = lens.radius, lens.focus
     plugin = "orthographic" if of.is_parallel else "perspective"
     place = words("LookAt", numbers=(*camera.eye, *camera.target, *camera.up))
     return [words("Scale", numbers=mirror), place, words("Camera", plugin, params=params)]

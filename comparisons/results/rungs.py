@@ -1,13 +1,13 @@
 """The names of the rungs, in their order; imported without NumPy, for the options of commands."""
 
 RUNGS = (
-    *("scene", "run", "input", "files", "film", "geometry"),
+    *("scene", "run", "input", "files", "film", "solids", "geometry"),
     *("direct", "sampling", "whitted", "layers", "statistics", "images", "witness"),
 )
 """The ladder, in order: a failure is reported at the first rung that breaks.  `scene` exists only
 if the scene or one of its files is invalid, `run` only if the case could not be completed; `input`
-checks the pictures themselves, `files` what we hold of files and descriptions; `witness` is there
-only if a third renderer is asked."""
+checks the pictures themselves, `files` what we hold of files and descriptions; `solids` asks a
+third tracer, `witness` is there only if a third renderer is asked."""
 
 COMPARED = RUNGS[3:]
 """The rungs that compare the two renderers: those a suite can be limited to."""

@@ -2,12 +2,12 @@
 
 A rung is one test of the ladder `comparisons.results.rungs.RUNGS`.  `files` holds our tables
 against second sources of what the scene's files and descriptions say.  `film`, `geometry`, `direct`
-and `whitted` compare without noise, ray by ray; `sampling` holds our samples of lights and
-materials against their densities, and counts Russian roulette; `layers` compares what is written
-beside the colour; `input` checks the pictures themselves, `images` compares them by metrics,
-`comparisons.statistics` their means; `witness` asks a third renderer.  `limited` changes `differ`
-to `reference-limited` above a rung that shows that Mitsuba's precision is too low, where that
-explains what differs.
+and `whitted` compare without noise, ray by ray, and so does `solids`, with raysect; `sampling`
+holds our samples of lights and materials against their densities, and counts Russian roulette;
+`layers` compares what is written beside the colour; `input` checks the pictures themselves,
+`images` compares them by metrics, `comparisons.statistics` their means; `witness` asks a third
+renderer.  `limited` changes `differ` to `reference-limited` above a rung that shows that Mitsuba's
+precision is too low, where that explains what differs.
 
 Contract: a rung takes the scene, our tables and Mitsuba's counterpart (or pictures, or nothing else
 but the scene), and returns a
@@ -26,6 +26,7 @@ from comparisons.rungs.film import film
 from comparisons.rungs.geometry import geometry
 from comparisons.rungs.layers import layers
 from comparisons.rungs.sampling import sampling
+from comparisons.rungs.solids import solids
 from comparisons.rungs.whitted import whitted
 
-__all__ = ["direct", "files", "film", "geometry", "layers", "sampling", "whitted"]
+__all__ = ["direct", "files", "film", "geometry", "layers", "sampling", "solids", "whitted"]

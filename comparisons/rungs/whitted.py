@@ -76,7 +76,7 @@ def whitted(
     trees = Trees(scene, tables, counterpart, integrator)
     compared = trees.compare(rays)
     ours, theirs, error, bound, outliers = compared
-    settled = trees.explained(rays, compared)
+    settled, of_lamps = trees.explained(rays, compared)
     unexplained = outliers[~settled]
     right, lit = error <= bound, ours.any(axis=1) | theirs.any(axis=1)
     told = lit & right & arbiter.tells(bound, ours, theirs)
@@ -93,7 +93,7 @@ def whitted(
     }
     numbers["tells"] = arbiter.is_enough(numbers["lit_right"], numbers["lit"])
     numbers["explained_elsewhere"] = too_many_elsewhere(
-        scene, tables, counterpart, rays.rows(outliers[settled]), len(rays.o)
+        scene, tables, counterpart, rays.rows(outliers[settled & ~of_lamps]), len(rays.o)
     )
     if len(unexplained):
         numbers["elsewhere"] = elsewhere(scene, tables, counterpart, rays.rows(unexplained))
@@ -169,8 +169,12 @@ class Trees:
             bound[over] += slopes(ours[over], others, float(lit.max(initial=0.0)))
         return Compared(ours, theirs, error, bound, np.flatnonzero(~(error <= bound)))
 
-    def explained(self, rays: Rays, compared: Compared) -> arbiter.BoolArray:
-        """(m,): which outliers of the rays the arbiter explains."""
+    def explained(
+        self, rays: Rays, compared: Compared
+    ) -> tuple[arbiter.BoolArray, arbiter.BoolArray]:
+        """(m,): which outliers of the rays the arbiter explains, and which the textures of lamps
+        do: their light may be so much more or less where the middle of a lamp lies at the edge of a
+        texel, wherever the ray goes."""
         ours, theirs, _, bound, outliers = compared
         tables, setup = self._tables, self._setup
         some, integrator = rays.rows(outliers), self._integrator
@@ -192,7 +196,8 @@ class Trees:
         low, high = changes_of_lamps(context, setup)
         off = theirs[outliers] - ours[outliers]
         allowed = (bound[outliers] + of_direct_light(context))[:, None]
-        return np.asarray(settled | ((off >= low - allowed) & (off <= high + allowed)).all(axis=1))
+        within = ((off >= low - allowed) & (off <= high + allowed)).all(axis=1)
+        return settled | within, np.asarray(within & (np.abs(off) > allowed).any(axis=1))
 
     def _ours_along(
         self, o: FloatArray, d: FloatArray, tables: SceneTables | None = None

@@ -87,9 +87,9 @@ def meshed(surface: Surface, fineness: float) -> Soup:
             uvs.append(np.column_stack([u.ravel(), v.ravel()]))
         elif surface.ends is not None:
             flat_grid, flat_normals, some = clipped(flat_grid, flat_normals, some, surface.ends)
-        corners = flat_grid[some]
-        winding = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        front = flat_normals[some].sum(axis=1)
+        a, b, c = (flat_grid[some[:, k]] for k in range(3))
+        winding = np.cross(b - a, c - a)
+        front = sum(flat_normals[some[:, k]] for k in range(3))
         some = np.where((np.sum(winding * front, axis=1) < 0.0)[:, None], some[:, ::-1], some)
         some = some[np.linalg.norm(winding, axis=1) > 0.0]
         positions.append(flat_grid)
@@ -104,6 +104,8 @@ def _grid_normals(gradient: FloatArray) -> FloatArray:
     """Unit normals on a grid (a, b, 3); where the gradient vanishes (an apex), a neighbour's."""
     length = np.linalg.norm(gradient, axis=2, keepdims=True)
     n = np.divide(gradient, length, out=np.zeros_like(gradient), where=length > 0.0)
+    if (length > 0.0).all():
+        return np.asarray(n)
     for axis in (1, 0):
         for step in (-1, 1):
             beside = np.roll(n, step, axis=axis)

@@ -10,7 +10,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from comparisons.geometry.affine import Affine
+from comparisons.geometry.affine import IDENTITY, Affine
 from comparisons.geometry.exact.crossings import Crossings, Row
 from comparisons.geometry.exact.dyadic import Dyadic
 from comparisons.mitsuba.hits import Plugin
@@ -57,6 +57,15 @@ class PbrtPart(NamedTuple):
     plugin: str
     params: dict[str, Any]
     reversed: bool = False
+
+
+class RaysectPart(NamedTuple):
+    """A primitive of raysect's: its type, lengths, and its place in the shape's own coordinates;
+    see `comparisons.raysect.worker`.  Or "half_space", what is below z = 0."""
+
+    type: str
+    sizes: tuple[float, ...]
+    place: Affine = IDENTITY
 
 
 class PbrtPlace(NamedTuple):
@@ -124,5 +133,7 @@ class ShapeType(Generic[AnyShape]):
     """Its triangles before its transform for Cycles, which has no curved shapes."""
     to_pbrt: Callable[[AnyShape, PbrtPlace], list[PbrtPart]] | None = None
     """pbrt's own shapes; none where triangles must stand for it."""
+    to_raysect: Callable[[AnyShape], list[RaysectPart]] | None = None
+    """raysect's primitives whose intersection it is.  Raises NoCounterpartError."""
     is_sampled: bool = False
     """Whether `reference_rt` samples points of one that is a lamp."""

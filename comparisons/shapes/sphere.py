@@ -27,6 +27,7 @@ from comparisons.shapes.shape import (
     OwnPlugin,
     PbrtPart,
     PbrtPlace,
+    RaysectPart,
     ShapeType,
     TableType,
     always,
@@ -113,6 +114,10 @@ def _to_pbrt(shape: Sphere, at: PbrtPlace) -> list[PbrtPart]:
     return [PbrtPart(place, "sphere", radius, turned and not at.mirrored)]
 
 
+def _to_raysect(shape: Sphere) -> list[RaysectPart]:
+    return [RaysectPart("sphere", (shape.radius,), np.column_stack([np.eye(3), shape.center]))]
+
+
 def _own_plugin(shape: Sphere, linear: FloatArray, textured: bool) -> OwnPlugin | None:
     if not affine.is_similarity(linear) or np.linalg.det(linear) <= 0.0:
         return None
@@ -171,5 +176,6 @@ SPHERE = ShapeType(
     unwrapped=_unwrapped,
     to_cycles=_to_cycles,
     to_pbrt=_to_pbrt,
+    to_raysect=_to_raysect,
     is_sampled=True,
 )

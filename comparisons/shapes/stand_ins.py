@@ -4,6 +4,7 @@ how far they are off: in distance, normals, texture coordinates and tangents."""
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from comparisons.shapes.meshing import meshed
 from comparisons.shapes.site import MOST_INSTANCES, MOST_TRIANGLES, Site, placed, with_mesh_light
 from comparisons.shapes.soup import Soup, heights_of
 from comparisons.shapes.surface import Limits, Patch, Surface
-from reference_rt.core.arrays import FloatArray
+from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.shapes.shape import Shape
 
 # ---- errors --------------------------------------------------------------------------------------
@@ -25,7 +26,11 @@ from reference_rt.shapes.shape import Shape
 
 MEASURED = 50_000
 """Most triangles that are measured, evenly strided: on a smooth surface neighbours have nearly the
-same error."""
+same error.  Of coarser meshes (`coarser`) fewer in proportion to the cells along a side, so that as
+much of the surface lies between two."""
+
+ROUGHLY = 5_000
+"""The same where two digits of the distance are enough."""
 
 WEIGHTS = np.array([[1, 1, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]], np.float64)
 WEIGHTS /= WEIGHTS.sum(axis=1, keepdims=True)
@@ -33,13 +38,23 @@ WEIGHTS /= WEIGHTS.sum(axis=1, keepdims=True)
 sides."""
 
 
-def measured_error(soup: Soup, surface: Surface, m: affine.Affine) -> tuple[float, float]:
+_fineness = ContextVar("fineness", default=1.0)
+
+
+def _some_faces(soup: Soup, most: int = MEASURED) -> IntArray:
+    """Those of a mesh's triangles that are measured."""
+    return soup.faces[:: max(1, int(len(soup.faces) / (most * _fineness.get())))]
+
+
+def measured_error(
+    soup: Soup, surface: Surface, m: affine.Affine, most: int = MEASURED
+) -> tuple[float, float]:
     """The largest distance and the largest angle, in radians, between a mesh and its surface.
 
     The distance is f over its gradient in the scene, exact but for terms of second order.
     """
     inverse = affine.invert(m)[:, :3]
-    faces = soup.faces[:: max(1, len(soup.faces) // MEASURED)]
+    faces = _some_faces(soup, most)
     assert soup.normals is not None
     corners, normals = soup.positions[faces], soup.normals[faces]
     sag = turn = 0.0
@@ -61,7 +76,7 @@ def measured_slip(soup: Soup, patch: Patch, box: Limits | None) -> float:
     of the surface that has its interpolated uv: of a patch with these uv, or of a surface around
     the z axis of a box."""
     assert soup.uvs is not None
-    faces = soup.faces[:: max(1, len(soup.faces) // MEASURED)]
+    faces = _some_faces(soup)
     largest = 0.0
     for weights in WEIGHTS:
         q = weights @ soup.positions[faces]
@@ -107,7 +122,7 @@ def measured_twist(
     assert soup.uvs is not None
     assert soup.normals is not None
     linear, inverse = m[:, :3], affine.invert(m)
-    faces = soup.faces[:: max(1, len(soup.faces) // MEASURED)]
+    faces = _some_faces(soup)
     uv = round32(soup.uvs)[faces]
     mapped = round32(affine.apply_points(m, soup.positions))[faces]
     a, b = mapped[:, 1] - mapped[:, 0], mapped[:, 2] - mapped[:, 0]
@@ -134,22 +149,20 @@ def measured_twist(
     return float(angle[order][np.searchsorted(area, RARE * area[-1])])
 
 
-def aspects(soup: Soup, m: affine.Affine) -> FloatArray:
-    """(faces,): the longest side of each triangle, mapped by m, over its height on it.
+def aspects(soup: Soup, m: affine.Affine, faces: IntArray) -> FloatArray:
+    """(n,): the longest side of triangles `faces` (n,), mapped by m, over its height on it.
 
     Float32's error of the barycentric coordinates moves a point along the surface by its common
     error times this: by hundreds of times on the long triangles of a cylinder.
     """
-    corners = affine.apply_points(m, soup.positions)[soup.faces]
+    points = soup.positions[soup.faces[faces]].reshape(-1, 3)
+    corners = affine.apply_points(m, points).reshape(-1, 3, 3)
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     heights = heights_of(corners)
     return np.asarray(np.divide(longest, heights, out=np.zeros_like(heights), where=heights > 0.0))
 
 
 # ---- meshes --------------------------------------------------------------------------------------
-
-
-_fineness = ContextVar("fineness", default=1.0)
 
 
 @contextmanager
@@ -184,7 +197,8 @@ def stand_in(
     if key not in site.shared:
         soup = meshed(surface, fineness)
         sag, turn = measured_error(soup, surface, own)
-        coarse, _ = measured_error(meshed(surface, 0.5 * fineness), surface, own)
+        half = meshed(surface, 0.5 * fineness)
+        coarse, _ = measured_error(half, surface, own, ROUGHLY)
         name, ratio = type(shape).__name__.lower(), coarse / sag if sag > 0.0 else 1.0
         site.shared[key] = soup, StandIn(name, len(soup.faces), sag, turn, ratio)
     soup, found = site.shared[key]
@@ -226,7 +240,7 @@ def stand_in(
     return plugin._replace(
         faces=soup.all_of_face(0),
         stand_in=found,
-        aspects=aspects(soup, m),
+        aspects=partial(aspects, soup, m),
         uv_of_mesh=soup.uvs is not None,
     )
 

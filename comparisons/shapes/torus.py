@@ -18,7 +18,7 @@ from comparisons.geometry.exact.dyadic import (
 from comparisons.mitsuba.hits import Plugin
 from comparisons.mitsuba.plugins.exact_coordinates import Round
 from comparisons.shapes.fine import FINE, fine, widened
-from comparisons.shapes.shape import ShapeType, TableType, always, per_face
+from comparisons.shapes.shape import RaysectPart, ShapeType, TableType, always, per_face
 from comparisons.shapes.site import Site
 from comparisons.shapes.soup import Soup
 from comparisons.shapes.stand_ins import stand_in, tessellated
@@ -139,4 +139,5 @@ TORUS = ShapeType(
     triangles=lambda shape, m: tessellated(surface_of(shape), m),
     encloses=always,
     to_cycles=_to_cycles,
+    to_raysect=lambda shape: [RaysectPart("torus", (shape.major_radius, shape.minor_radius))],
 )

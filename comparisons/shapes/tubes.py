@@ -7,9 +7,10 @@ import numpy as np
 
 from comparisons.geometry import affine
 from comparisons.mitsuba.hits import Plugin, same_uv
+from comparisons.renderers import NoCounterpartError
 from comparisons.shapes.fine import FINE, fan, fine, on_circle, widened
 from comparisons.shapes.meshing import region
-from comparisons.shapes.shape import Tessellation
+from comparisons.shapes.shape import RaysectPart, Tessellation
 from comparisons.shapes.site import Site, to_world, with_mesh_light
 from comparisons.shapes.soup import Soup, heights_of, joined
 from comparisons.shapes.stand_ins import tessellated
@@ -46,6 +47,26 @@ class Tube(NamedTuple):
         """Face, radius, height and the side, -1 or 1, that each cap faces."""
         ends = ((BOTTOM, self.bottom, self.low, -1.0), (TOP, self.top, self.high, 1.0))
         return [end for end in ends if self.capped and end[1] > 0.0]
+
+
+def tube_for_raysect(tube: Tube) -> list[RaysectPart]:
+    """Where it narrows to an end that is no point, a longer cone within a box."""
+    bottom, top, height = tube.bottom, tube.top, tube.high - tube.low
+    if not tube.capped:
+        raise NoCounterpartError("a tube without caps: raysect's primitives are closed")
+    place = np.column_stack([np.eye(3), [0.0, 0.0, tube.low]])
+    if bottom == top:
+        return [RaysectPart("cylinder", (bottom, height), place)]
+    if bottom < top:  # turned upside down
+        bottom, top = top, bottom
+        place = np.column_stack([np.diag([1.0, -1.0, -1.0]), [0.0, 0.0, tube.high]])
+    whole = RaysectPart("cone", (bottom, height * bottom / (bottom - top)), place)
+    if top == 0.0:
+        return [whole]
+    # Its bottom is beyond the cone's: two faces in one place would leave a film.
+    middle = np.column_stack([np.eye(3), [0.0, 0.0, -0.5 * height]])
+    half = (2.0 * bottom, 2.0 * bottom, 1.5 * height)
+    return [whole, RaysectPart("box", half, affine.compose(middle, place))]
 
 
 def tube_surface(tube: Tube, textured: bool = False) -> Surface:

@@ -154,9 +154,11 @@ def camera_of(scene: Scene) -> dict[str, Any]:
         assert isinstance(camera, CentralCamera | Orthographic)
         edges = camera.rectangle(film.width, film.height)
     found |= {"right": right, "up": up, "back": back, "view": list(edges)}
-    if of.lens is not None:
-        lens = of.lens(camera)
+    if lens := of.lens(camera):
         found |= {"aperture_radius": lens.radius, "focus_distance": lens.focus}
+        found["type"] = "thin_lens"
+        if lens.exposure is not None:
+            found["exposure"] = lens.exposure
     return found
 
 

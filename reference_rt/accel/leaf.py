@@ -13,9 +13,9 @@ from reference_rt.shapes.csg import Solids
 from reference_rt.shapes.meshes import triangle
 from reference_rt.shapes.meshes.watertight import Shear, project_leaf
 
-SOLID, INSTANCE = 100, 101
-"""Kinds of references to rows of `Solids` and `Instances` rather than of a shape's table.  Rays hit
-the primitives in these: no `Hit` has such a kind."""
+SOLID, INSTANCE, OPERAND = 100, 101, 102
+"""Kinds of references to rows of `Solids`, of `Instances` and of the operands of solids, rather
+than to rows of a shape's table.  Rays hit the primitives in these: no `Hit` has such a kind."""
 
 
 @kernel

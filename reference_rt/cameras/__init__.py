@@ -19,7 +19,7 @@ from reference_rt.cameras.camera import LENS_CENTRE as LENS_CENTRE
 from reference_rt.cameras.camera import Seen as Seen
 from reference_rt.cameras.orthographic import Orthographic as Orthographic
 from reference_rt.cameras.perspective import Perspective as Perspective
-from reference_rt.cameras.perspective import Pinhole as Pinhole
+from reference_rt.cameras.pinhole import Pinhole as Pinhole
 from reference_rt.cameras.thin_lens import ThinLens as ThinLens
 from reference_rt.core.model import module_of, setups_of
 from reference_rt.core.ray import Ray
@@ -30,8 +30,7 @@ from reference_rt.jit.links import Linkable
 AnyCamera = Annotated[Perspective | Orthographic | Pinhole | ThinLens, Field(discriminator="type")]
 
 VIEWS = (*setups_of(AnyCamera),)
-"""The classes that `setup` returns.  `Pinhole` has no own one: its rays are those of a
-`PerspectiveView`."""
+"""The classes that `setup` returns.  `Pinhole` has no own one."""
 
 _ray_of = by_class("camera_ray", {view: module_of(view).camera_ray for view in VIEWS})
 

@@ -82,7 +82,8 @@ class Seen(NamedTuple):
 
     x, y: its film point, as in `camera_ray`, also outside of the picture;  weight: the film's area
     there, the picture's being 1, over that across the ray at the point: a small surface whose
-    normal has the cosine c to the ray covers weight c times its area; 0 for what no ray reaches;
+    normal has the cosine c to the ray covers weight c times its area; times what a film with an
+    exposure shows of radiance; 0 for what no ray reaches;
     o: the origin of its camera ray;  d: the ray's unit direction.
     """
 

@@ -9,7 +9,7 @@ from reference_rt.cameras.camera import Clip, Seen, clipped_ray, seen_through
 from reference_rt.cameras.view_rectangle import STEEPEST, CentralCamera, place, vec3
 from reference_rt.core.model import Examples, Positive
 from reference_rt.core.ray import Ray
-from reference_rt.core.vec3 import Vec3
+from reference_rt.core.vec3 import Vec3, cross, dot
 from reference_rt.jit.kernel import kernel
 from reference_rt.sampling.warp import concentric_disk
 
@@ -59,14 +59,16 @@ class ThinLens(CentralCamera):
             vec3(v),
             self.aperture_radius,
             self.aperture_radius / self.focus,
+            0.0,
             self.clip,
         )
 
 
 class ThinLensView(NamedTuple):
     """eye, corner, right, down: as in `PerspectiveView`, at distance 1;  u, v: unit axes of the
-    lens;  radius: its radius;  slope: radius / focus distance;
-    clip: the clipping planes."""
+    lens;  radius: its radius;  slope: radius / focus distance, below 0 for a focus behind the
+    lens;  exposure: what a pixel shows of a radiance that fills the lens is this times cos^4 of the
+    angle to the axis, or the radiance itself for 0;  clip: the clipping planes."""
 
     eye: Vec3
     corner: Vec3
@@ -76,6 +78,7 @@ class ThinLensView(NamedTuple):
     v: Vec3
     radius: float
     slope: float
+    exposure: float
     clip: Clip
 
 
@@ -96,8 +99,13 @@ def camera_ray(view: ThinLensView, x: float, y: float, lens: tuple[float, float]
 @kernel
 def see(view: ThinLensView, p: Vec3, lens: tuple[float, float]) -> Seen:
     """The point `p` as the lens point for `lens` sees it.  Lens points are uniform, and a pixel is
-    the mean over the lens."""
+    the mean over the lens, or what the film's exposure shows of it."""
     a, b = concentric_disk(lens[0], lens[1])
     q = view.u * a + view.v * b
     o, shift = view.eye + q * view.radius, q * view.slope
-    return seen_through(view.clip, o, view.corner, view.right, view.down, shift, p)
+    seen = seen_through(view.clip, o, view.corner, view.right, view.down, shift, p)
+    if view.exposure == 0.0:
+        return seen
+    cosine = dot(seen.d, cross(view.v, view.u))
+    shown = view.exposure * (cosine * cosine) * (cosine * cosine)
+    return Seen(seen.x, seen.y, seen.weight * shown, seen.o, seen.d)

@@ -77,7 +77,8 @@ def heading(tree: Tree) -> list[str]:
         f"{tree['scene']}: pixel {x},{y} of {width} x {height}, sample {tree['sample']} of "
         f"{tree['spp']}, {tree['integrator']}",
         f"value {_numbers(tree['value'])}: the sum of {terms} terms, times the filter's weight "
-        f"{tree['filter_weight']:.6g}",
+        f"{tree['filter_weight']:.6g}"
+        + (f" and the exposure {tree['exposure']:.6g}" if tree["exposure"] != 1.0 else ""),
     ]
 
 

@@ -471,7 +471,9 @@ def setups_of(union: Any) -> dict[type, type[Description]]:
     of: dict[type, type[Description]] = {}
     for cls in types_of(union):
         if hasattr(cls, "setup"):
-            of.setdefault(get_type_hints(cls.setup)["return"], cls)
+            made = get_type_hints(cls.setup)["return"]
+            for setup in get_args(made) or (made,):
+                of.setdefault(setup, cls)
     return of
 
 

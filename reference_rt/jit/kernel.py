@@ -110,6 +110,9 @@ def precompile(compiled: Callable[..., Any], signature: Signature) -> Callable[.
     """
     if numba.config.DISABLE_JIT:
         return compiled
+    known = compiled.overloads.get(_types_of(signature))  # type: ignore[attr-defined]
+    if known is not None:  # Numba's own way to it takes 0.2 ms
+        return known.entry_point  # type: ignore[no-any-return]
     with _no_collections():
         ready: Callable[..., Any] = compiled.compile(signature)  # type: ignore[attr-defined]
     return ready
@@ -133,8 +136,13 @@ def is_compiled(compiled: Callable[..., Any], signature: Signature) -> bool:
     """Whether an entry kernel is compiled for these types, in this process or in the cache."""
     if numba.config.DISABLE_JIT:
         return True
-    types_of = signature if isinstance(signature, tuple) else signature.args
-    return types_of in compiled.overloads or is_cached(compiled, signature)  # type: ignore[attr-defined]
+    known = compiled.overloads  # type: ignore[attr-defined]
+    return _types_of(signature) in known or is_cached(compiled, signature)
+
+
+def _types_of(signature: Signature) -> tuple[Any, ...]:
+    """The types of the arguments alone."""
+    return signature if isinstance(signature, tuple) else tuple(signature.args)
 
 
 def is_cached(compiled: Callable[..., Any], signature: Signature) -> bool:

@@ -20,10 +20,10 @@ neither knows the other.  `by_code.py` shows the caller's side.
 """
 
 import functools
-import struct
 import typing
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar
 
@@ -43,7 +43,6 @@ from reference_rt.jit.kernel import (
     overload_kernel,
 )
 from reference_rt.jit.numba_codegen import (
-    array_at,
     call_llvm,
     define,
     function_at,
@@ -52,6 +51,7 @@ from reference_rt.jit.numba_codegen import (
     parameters_of,
     signature,
 )
+from reference_rt.jit.table_words import table_at, type_of_table, word_at, words_of
 
 _TYPE_OF: dict[Any, Any] = {
     float: types.float64,
@@ -93,90 +93,6 @@ def type_of(annotation: Any) -> Any:
         f"{annotation}: not one type; expected float, int, bool, a NumPy array, a tuple or a "
         "NamedTuple of these, or what is declared"
     )
-
-
-# The content of a table in memory, as code reads it that knows the table's type: `words_of` writes
-# it, `table_at` reads it.
-#
-# A word has eight bytes.  A number is one word; an array is its address and its shape, a word each;
-# a tuple is its parts one after another; None has no words.
-
-
-_WORD, _REAL = ir.IntType(64), ir.DoubleType()
-
-
-def words_of(value: Any) -> list[int]:
-    """The words of a table.  They hold addresses of its arrays, which must outlive them.  Raises
-    TypeError for an array that is not C-contiguous, and for what has no words."""
-    if value is None:
-        return []
-    if isinstance(value, tuple):
-        return [word for part in value for word in words_of(part)]
-    if isinstance(value, np.ndarray):
-        if not value.flags.c_contiguous:
-            raise TypeError("an array of a table is not C-contiguous")
-        return [value.ctypes.data, *value.shape]
-    if isinstance(value, float):
-        return [int(struct.unpack("<q", struct.pack("<d", value))[0])]
-    if isinstance(value, bool | np.bool_ | int | np.int64):
-        return [int(value)]
-    raise TypeError(f"a table holds a {type(value).__name__}; expected numbers, arrays and tuples")
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def table_at(typing_context: Any, pointer: Any) -> Any:
-    """The table whose words begin at a pointer."""
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        start = builder.bitcast(values[0], _WORD.as_pointer())
-        return _Reader(context, builder, start).value(pointer.dtype)
-
-    return pointer.dtype(pointer), generate
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def word_at(typing_context: Any, address: Any, k: Any) -> Any:
-    """Word k from an address on."""
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        start = builder.inttoptr(values[0], _WORD.as_pointer())
-        return builder.load(builder.gep(start, [values[1]]))
-
-    return types.int64(types.int64, types.int64), generate
-
-
-class _Reader:
-    """Emits the code that reads words one after another."""
-
-    def __init__(self, context: Any, builder: Any, start: Any) -> None:
-        self.context, self.builder, self.start, self.at = context, builder, start, 0
-
-    def word(self, of: ir.Type = _WORD) -> Any:
-        place = self.builder.gep(self.start, [_WORD(self.at)])
-        self.at += 1
-        return self.builder.load(self.builder.bitcast(place, of.as_pointer()))
-
-    def value(self, numba_type: Any) -> Any:
-        context, builder = self.context, self.builder
-        if isinstance(numba_type, types.NoneType):
-            return nothing(context)
-        if isinstance(numba_type, types.BaseTuple):
-            parts = [self.value(part) for part in numba_type.types]
-            return context.make_tuple(builder, numba_type, parts)
-        if isinstance(numba_type, types.Array):
-            return self._array(numba_type)
-        if numba_type == types.float64:
-            return self.word(_REAL)
-        if numba_type == types.boolean:
-            return builder.icmp_signed("!=", self.word(), _WORD(0))
-        if numba_type == types.int64:
-            return self.word()
-        raise TypeError(f"{numba_type}: no words")
-
-    def _array(self, numba_type: Any) -> Any:
-        data = self.word(self.context.get_data_type(numba_type.dtype).as_pointer())
-        shape = [self.word() for _ in range(numba_type.ndim)]
-        return array_at(self.context, self.builder, numba_type, data, shape)
 
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -240,6 +156,20 @@ def _emit_call(
     return invoke(context, builder, function, returns, declared, arguments)
 
 
+@dataclass(eq=False)
+class Callee:
+    """What stands behind links for an operation and a type of table.
+
+    table: Numba's type;  call: the entry kernel, and the signature to compile it for;  pointer: to
+    the function once it is compiled in this process, else 0.  It is found by identity: to hash the
+    types of a table takes as long as to trace some rays.
+    """
+
+    table: Any
+    call: tuple[Any, Any]
+    pointer: int = 0
+
+
 class Row(NamedTuple):
     """A type of table in a group: its code, the field of its table, its kernel."""
 
@@ -262,6 +192,7 @@ class Operation:
         self.rows = {row.code: row.kernel for row in rows}
         self.parameters = parameters_of(function)[1:]
         self._entries: dict[int, Any] = {}
+        self._callees: dict[tuple[int, int], Callee] = {}
 
     @cached_property
     def arguments(self) -> tuple[Any, ...]:
@@ -281,6 +212,13 @@ class Operation:
             self._entries[code] = self._entry(code)
         pointer = types.CPointer(table)
         return self._entries[code], signature(self.returns, pointer, *self.arguments)
+
+    def callee_for(self, code: int, table: Any) -> Callee:
+        """`call_for`, made once in a process."""
+        key = code, id(table)  # of an object that lives as long as the callee
+        if key not in self._callees:
+            self._callees[key] = Callee(table, self.call_for(code, table))
+        return self._callees[key]
 
     def _entry(self, code: int) -> Any:
         # The code is part of the name, because all compiled code of a process shares one table of
@@ -402,14 +340,24 @@ class Linkable(Group):
 class Linker:
     """Makes the links of a scene.  They are valid as long as the linker lives.
 
-    calls: the entry kernels to be compiled, with their signatures.
+    callees: what it links, with the places of its function pointers.
     """
 
     def __init__(self, is_plain: bool = bool(numba.config.DISABLE_JIT)) -> None:
         """is_plain: for kernels that run as plain Python, which take the tables themselves."""
-        self.calls: dict[tuple[Any, Any], list[tuple[Words, int]]] = {}
+        self.callees: dict[Callee, list[tuple[Words, int]]] = {}
         self.nothing: Any = None if is_plain else Link(0)
         self._is_plain, self._kept = is_plain, list[Any]()
+
+    @property
+    def calls(self) -> list[tuple[Any, Any]]:
+        """The entry kernels behind the links, with their signatures."""
+        return [callee.call for callee in self.callees]
+
+    @property
+    def missing(self) -> list[tuple[Any, Any]]:
+        """Those of `calls` that this process has not linked before."""
+        return [callee.call for callee in self.callees if not callee.pointer]
 
     def link(
         self,
@@ -434,20 +382,21 @@ class Linker:
             content = np.array(words_of(table), np.int64)
             self._kept += [table, content]
             words[STRIDE * code] = content.ctypes.data
-            of_table = numba.typeof(table)  # once: it takes up to 1 ms
+            of_table = type_of_table(table)
             for operation in found:
                 if code in operation.rows and code in (only or {}).get(operation.name, tables):
-                    call = operation.call_for(code, of_table)
+                    callee = operation.callee_for(code, of_table)
                     place = words, STRIDE * code + operation.number
-                    self.calls.setdefault(call, []).append(place)
+                    self.callees.setdefault(callee, []).append(place)
         self._kept.append(words)
         return Link(words.ctypes.data)
 
     def resolve(self) -> None:
         """Write the function pointers, once all calls are compiled."""
-        for call, places in self.calls.items():
+        for callee, places in self.callees.items():
+            callee.pointer = callee.pointer or pointer_to(*callee.call)
             for words, k in places:
-                words[k] = pointer_to(*call)
+                words[k] = callee.pointer
 
 
 @intrinsic  # type: ignore[untyped-decorator]

@@ -22,7 +22,7 @@ _lock = threading.Lock()
 
 
 def _compile_for(linker: Linker) -> None:
-    precompile_all([*linker.calls], os.cpu_count() or 1)
+    precompile_all(linker.missing, os.cpu_count() or 1)
 
 
 def linked(

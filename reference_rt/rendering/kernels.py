@@ -80,7 +80,7 @@ def kernels_for(
         return [linked_scene(linker, tables, calls) for calls in called]
 
     def compile_for(linker: Linker) -> None:
-        calls = [*given.calls, *sorted(linker.calls, key=cost, reverse=True)]
+        calls = [*given.calls, *sorted(linker.missing, key=cost, reverse=True)]
         precompile_all(calls, threads, say, ahead)
 
     purpose = tuple((job.kernel, job.setup) for job in jobs)

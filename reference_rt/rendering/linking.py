@@ -8,6 +8,8 @@ import numpy as np
 from reference_rt.accel.geometry import Geometry, geometries
 from reference_rt.cameras import has_lens, views
 from reference_rt.cameras.film import film_filters
+from reference_rt.cameras.thin_lens import ThinLensView
+from reference_rt.core.vec3 import Vec3, cross
 from reference_rt.integrators.scene_tables import KernelScene, SceneTables
 from reference_rt.jit.called import called
 from reference_rt.jit.links import Group, Link, Linker, Operation
@@ -33,7 +35,7 @@ _NO_LIGHTS = LightSampler(_NO_INTEGERS, _NO_INTEGERS, _NO_FLOATS, _NO_FLOATS, np
 
 _NO_RAYS = GivenRays(np.zeros((0, 3)), np.zeros((0, 3)))
 
-EMPTY_VIEW = View(Link(0), 0, _NO_RAYS)
+EMPTY_VIEW = View(Link(0), 0, 0.0, Vec3(0.0, 0.0, 0.0), _NO_RAYS)
 
 EMPTY_SCENE = KernelScene(
     geometry=Link(0),
@@ -62,8 +64,12 @@ def linked_view(linker: Linker, view: Any, calls: "Calls") -> View:
     """A camera's view, or `GivenRays`, as kernels take it, with those operations of `calls` that
     are a view's."""
     if isinstance(view, GivenRays):
-        return View(linker.nothing, 0, view)
-    return View(linker.link(views, _names(calls, views), view), int(has_lens(view)), _NO_RAYS)
+        return EMPTY_VIEW._replace(link=linker.nothing, given=view)
+    link = linker.link(views, _names(calls, views), view)
+    exposure, forward = 0.0, EMPTY_VIEW.forward
+    if isinstance(view, ThinLensView):
+        exposure, forward = view.exposure, cross(view.v, view.u)
+    return View(link, int(has_lens(view)), exposure, forward, _NO_RAYS)
 
 
 def linked_filter(linker: Linker, setup: Any, calls: "Calls") -> Any:

@@ -71,7 +71,8 @@ SCATTERED, SHADOW = "scattered", "shadow"
 
 def ray_trees(scene: BuiltScene, places: Sequence[tuple[int, int, int]]) -> list[dict[str, Any]]:
     """What samples are made of, each given by its pixel's column and row and its number: its
-    `rays`, its radiance, the filter_weight, and value, the product of both.  Raises SceneError."""
+    `rays`, its radiance, the filter_weight, the exposure of its film (1 for cameras without), and
+    value, the product of these.  Raises SceneError."""
     if isinstance(scene.integrator, Light):
         raise scene.error(
             "a pixel of 'light' is no mean of samples of its own; expected 'path'",
@@ -118,6 +119,7 @@ def _tree(is_cast: bool, arguments: Any, pixel: int, sample: int) -> dict[str, A
             "rays": [_described(ray, scene) for ray in recorder.rays],
             "radiance": radiance,
             "filter_weight": recorder.filter_weight,
+            "exposure": recorder.exposure,
             "value": out[0][0, :3],
         }
     )
@@ -179,7 +181,7 @@ class _Recorder:
 
     def __init__(self) -> None:
         self.rays: list[RayRecord] = []
-        self.filter_weight = 1.0
+        self.filter_weight = self.exposure = 1.0
         self._surface: int | None = None
         """The ray at whose end others begin."""
         self._waiting: dict[int, tuple[int | None, str]] = {}
@@ -231,7 +233,7 @@ class _Recorder:
         return self._ray(SHADOW, self._surface, ray, weight, occluded=occluded)
 
     def _film_ray(self, r: _Return) -> None:
-        self.filter_weight = r.result.weight
+        self.filter_weight, self.exposure = r.result.weight, r.result.exposure
 
     def _shade(self, r: _Return) -> None:
         if r.caller in (_WHITTED, _DIRECT):

@@ -30,7 +30,7 @@ from reference_rt.core.ray import (
     put_ray,
     vector_of,
 )
-from reference_rt.core.vec3 import Vec3, row
+from reference_rt.core.vec3 import Vec3, dot, row
 from reference_rt.integrators import radiances
 from reference_rt.integrators.path import STATE_FLOATS, VECTOR_FLOATS, Scratch, prepare
 from reference_rt.integrators.ray_cast import cast
@@ -53,10 +53,12 @@ from reference_rt.textures import colour_at
 
 
 class FilmRay(NamedTuple):
-    """A camera ray through a film point, and the filter weight of its radiance in the pixel."""
+    """A camera ray through a film point, the filter weight of its radiance in the pixel, and what
+    the film shows of the radiance."""
 
     ray: Ray
     weight: float
+    exposure: float
 
 
 class GivenRays(NamedTuple):
@@ -69,11 +71,14 @@ class GivenRays(NamedTuple):
 
 class View(NamedTuple):
     """Where rays come from.  link: a camera's view behind a link, in plain Python itself;
-    has_lens: whether lens points are drawn;  given: the rays in place of a camera's, of length 0
-    for a camera."""
+    has_lens: whether lens points are drawn;  exposure: see `ThinLensView`, 0 for others;  forward:
+    the unit direction of view where there is an exposure;  given: the rays in place of a camera's,
+    of length 0 for a camera."""
 
     link: Any
     has_lens: int
+    exposure: float
+    forward: Vec3
     given: GivenRays
 
 
@@ -89,7 +94,7 @@ def _film_ray(
 ) -> FilmRay:
     given = view.given
     if len(given.o) > 0:
-        return FilmRay(Ray(row(given.o, x), row(given.d, x), math.inf), 1.0)
+        return FilmRay(Ray(row(given.o, x), row(given.d, x), math.inf), 1.0, 1.0)
     width, height = shape
     u0, u1 = draw_pair(sampler, sampling.FILM)
     u0 = stratum.part_x[0] + stratum.part_x[1] * u0
@@ -100,7 +105,12 @@ def _film_ray(
     if view.has_lens != 0:
         lens = draw_pair(sampler, sampling.LENS)
     ray = camera_ray(view.link, (x + 0.5 + dx) / width, (y + 0.5 + dy) / height, lens)
-    return FilmRay(ray, weight_x * weight_y * stratum.weight)
+    exposure = 1.0
+    if view.exposure > 0.0:
+        # Light through the hole on the film: both are inclined, and the way is longer.
+        cosine = dot(ray.d, view.forward)
+        exposure = view.exposure * (cosine * cosine) * (cosine * cosine)
+    return FilmRay(ray, weight_x * weight_y * stratum.weight, exposure)
 
 
 @kernel
@@ -173,7 +183,7 @@ def render_tile(
             y, x = pixel // shape[0], pixel % shape[0]
             seen = _film_ray(view, film_filter, stratum, sampler_of(samplers, k), shape, x, y)
             put_ray(scratch.rays, k, seen.ray)
-            weights[k] = seen.weight
+            weights[k] = seen.weight * seen.exposure
         radiances(integrator, scene, samplers, n, scratch)
         for k in range(n):
             i, sample = (start + k) // count, first + (start + k) % count

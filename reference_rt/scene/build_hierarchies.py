@@ -25,14 +25,14 @@ ONE_BY_ONE = 10
 
 
 Kinds = npt.NDArray[np.int8]
-"""Kinds of primitives: codes of tables, SOLID or INSTANCE."""
+"""Kinds of primitives: codes of tables, SOLID, INSTANCE or OPERAND."""
 
 _TOGETHER = 1 << 15
 """Primitives whose boxes are computed together: more only take more memory."""
 
 
 class TableRows(NamedTuple):
-    """Primitives or solids of one kind: their rows (n,)."""
+    """Primitives, solids or operands of one kind: their rows (n,)."""
 
     kind: int
     rows: IdArray

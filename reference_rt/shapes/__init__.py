@@ -29,6 +29,7 @@ To add a shape: its file, and its lines in `tables.py`.  Step by step: docs/exte
 
 from reference_rt.shapes.brute_force import nearest as nearest
 from reference_rt.shapes.brute_force import nearest_of_rays as nearest_of_rays
+from reference_rt.shapes.csg import Solid as Solid  # which completes the models of solids
 from reference_rt.shapes.dispatch import colour as colour
 from reference_rt.shapes.dispatch import enters as enters
 from reference_rt.shapes.dispatch import face as face

@@ -2,10 +2,10 @@
 
 `sphere & box - cylinder` in Python; in a scene file a tree of unions, intersections and
 differences, whose `of` lists the operands.  Operands are primitives with spans and closed meshes.
-`Solids` has operands and postfix programs of all solids of a scene.
+`Solids` has operands and gates of all solids of a scene.
 
-Rays are evaluated in `accel/csg.py`: the program combines, for each stretch of the ray, whether it
-is inside of each operand.
+Rays are evaluated in `accel/csg.py`: the gates combine, for each stretch of the ray, whether it is
+inside of each operand.
 
 The anchor of a solid is a local origin for the coordinates of its operands, next to them.
 If the operands of a solid at a distance D from the world's origin were tabulated in the world, each
@@ -13,11 +13,11 @@ would be rounded by itself, by u D.  That would separate faces that coincide, an
 as that.  Here all maps are composed exactly and moved to one anchor: operands round as if the solid
 stood at the origin, and the anchor is subtracted from a ray's origin once for all of them.
 
-To add an operation: a description as `Union` in `shapes/shape.py`; a code here; a case in
-`postfix`, and one in `accel/csg.py`.
+To add an operation: a description as `Union` in `shapes/shape.py`; a case in `postfix`, in terms of
+OR, AND and NOT.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import Annotated, Any, NamedTuple
 
@@ -29,10 +29,10 @@ from reference_rt.core.ray import UNIT_ROUNDOFF, Ray, SurfacePoint
 from reference_rt.core.transform import Affine, Transform, affine, compose, identity
 from reference_rt.core.vec3 import dot, length, max_abs, row
 from reference_rt.jit.kernel import kernel
-from reference_rt.shapes import Primitive
 from reference_rt.shapes.instances import Instance
 from reference_rt.shapes.rounding import along_from
 from reference_rt.shapes.shape import Difference, Intersection, Shape, Solid, Union
+from reference_rt.shapes.tables import Primitive
 
 __all__ = [
     "AND",
@@ -41,11 +41,13 @@ __all__ = [
     "Anchored",
     "AnyShape",
     "Difference",
+    "Gates",
     "Intersection",
     "Solid",
     "Solids",
     "Union",
     "anchored",
+    "gates_of",
     "operands_of",
     "postfix",
 ]
@@ -57,22 +59,30 @@ OR, AND, NOT = -1, -2, -3
 class Solids(NamedTuple):
     """n solids of m operands in all.
 
-    first, operands (n,): a solid's operands;  step_first, step_count (n,): its program in `steps`;
-    depth (n,): the stack depth of its program.  kind, row (m,): the table and row of an operand's
-    primitive;  root (m,): for a mesh, whose row is -1, the root of the BVH over its triangles.
+    first, operands (n,): a solid's operands;  tree (n,): the root of the BVH over them, -1 for
+    none;  asked_first, asked_count (n,): the place in `asked` of those that are in no BVH, which
+    every ray is tested against.  kind, row (m,): the table and row of an operand's primitive;  root
+    (m,): for a mesh, whose row is -1, the root of the BVH over its triangles.
+    gate_first, gates (n,): the rows of a solid's gates;  up (m,), gate_up, gate_start (k,): see
+    `Gates`.
     anchor (n, 3): the local origin for the coordinates of a solid's operands;  reach (n,): the
     largest distance of their points from there, inf for infinite ones.
     """
 
     first: IntArray
     operands: IntArray
-    step_first: IntArray
-    step_count: IntArray
-    depth: IntArray
-    steps: IntArray
+    tree: IntArray
+    asked_first: IntArray
+    asked_count: IntArray
+    asked: IntArray
     kind: IntArray
     row: IntArray
     root: IntArray
+    gate_first: IntArray
+    gates: IntArray
+    up: IntArray
+    gate_up: IntArray
+    gate_start: IntArray
     anchor: FloatArray
     reach: FloatArray
 
@@ -135,6 +145,65 @@ def postfix(shape: Shape) -> list[int]:
 
     visit(shape)
     return steps
+
+
+class Gates(NamedTuple):
+    """A program as gates, each of which is on where any of its inputs is; an input may be negated.
+    The solid changes where gate 0 does.
+
+    up (m,): where an operand goes, 2 gate + 1 if negated, else 2 gate;  gate_up (k,): where a gate
+    goes, likewise, -1 for gate 0;  start (k,): how many of its inputs are on where a point is
+    outside of all operands.
+    """
+
+    up: list[int]
+    gate_up: list[int]
+    start: list[int]
+
+
+class _Gate(list[tuple["int | _Gate", bool]]):
+    """The inputs of a gate, operands or gates, and whether each is negated."""
+
+
+def gates_of(steps: Sequence[int]) -> Gates:
+    """The gates of a program: a and b is not (not a or not b), and a gate that goes to another
+    unchanged is part of it, so that a union of any number of operands is a single gate."""
+    stack: list[tuple[int | _Gate, bool]] = []
+    for step in steps:
+        if step >= 0:
+            stack.append((step, False))
+        elif step == NOT:
+            of, negated = stack.pop()
+            stack.append((of, not negated))
+        else:
+            (b, not_b), (a, not_a) = stack.pop(), stack.pop()
+            turned = step == AND
+            gate = a if isinstance(a, _Gate) and not_a == turned else _Gate([(a, not_a != turned)])
+            if isinstance(b, _Gate) and not_b == turned:
+                gate += b
+            else:
+                gate.append((b, not_b != turned))
+            stack.append((gate, turned))
+    whole, _ = stack.pop()
+    waiting = [(whole if isinstance(whole, _Gate) else _Gate([(whole, False)]), -1)]
+    up = [0] * (1 + max(steps))
+    gate_up: list[int] = []
+    while waiting:
+        gate, to = waiting.pop()
+        number = len(gate_up)
+        gate_up.append(to)
+        for of, negated in gate:
+            if isinstance(of, _Gate):
+                waiting.append((of, 2 * number + negated))
+            else:
+                up[of] = 2 * number + negated
+    start = [0] * len(gate_up)
+    for to in up:
+        start[to >> 1] += to & 1
+    for number in range(len(gate_up) - 1, 0, -1):  # each goes to one before it
+        to = gate_up[number]
+        start[to >> 1] += int((start[number] > 0) != (to & 1 == 1))
+    return Gates(up, gate_up, start)
 
 
 _exact = np.vectorize(Fraction, otypes=[object])

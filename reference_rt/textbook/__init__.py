@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy.typing as npt
 
-from reference_rt.textbook import box, csg, hierarchy, polygon, sphere, triangle
+from reference_rt.textbook import box, csg, hierarchy, picture, polygon, sphere, triangle
 from reference_rt.textbook.box import BoxParameters
 from reference_rt.textbook.hierarchy import SceneParameters
 from reference_rt.textbook.method import FloatArray, Method
@@ -39,14 +39,14 @@ __all__ = [
 
 METHODS: dict[str, Method] = {
     method.name: method
-    for family in (sphere, triangle, box, polygon, csg, hierarchy)
+    for family in (sphere, triangle, box, polygon, csg, hierarchy, picture)
     for method in family.METHODS
 }
 
 
 def names(family: str | None = None) -> tuple[str, ...]:
     """The names of all methods, or of one family: "sphere", "triangle", "box", "polygon", "csg",
-    "hierarchy"."""
+    "hierarchy", "picture"."""
     families = list(dict.fromkeys(name.partition(".")[0] for name in METHODS))
     if family is not None and family not in families:
         raise ValueError(f"unknown family {family!r}; expected one of {', '.join(families)}")

@@ -1,4 +1,4 @@
-"""Axis-aligned closed box: six planes, and two slab tests (row T8).
+"""Axis-aligned closed box: six planes, and three slab tests (row T8).
 
 Costs are for a hit from outside, without comparisons.
 """
@@ -120,6 +120,45 @@ def slabs_ieee(ray: Ray, lower: Vec3, upper: Vec3) -> float:
     return t if t_near <= t_far and t > 0.0 else math.inf
 
 
+@kernel
+def slabs_unrolled(ray: Ray, lower: Vec3, upper: Vec3) -> float:
+    """`slabs_ieee` with its loop written out: no axis is looked up, and a ray that misses in x and
+    y is not tested in z.
+
+    The bits of `slabs_ieee`: t0 and t1 are in order by the sign of 1 / d, and NaN is replaced.
+    Cost: 6 +, 6 *, 3 /; a miss by y needs 4 +, 4 *, 2 /.
+    Fails: as `slabs_ieee` does.
+    """
+    inverse = 1.0 / ray.d.x
+    t_near, t_far = (lower.x - ray.o.x) * inverse, (upper.x - ray.o.x) * inverse
+    if inverse < 0.0:
+        t_near, t_far = t_far, t_near
+    if math.isnan(t_near):
+        t_near = -math.inf
+    if math.isnan(t_far):
+        t_far = math.inf
+    inverse = 1.0 / ray.d.y
+    t0, t1 = (lower.y - ray.o.y) * inverse, (upper.y - ray.o.y) * inverse
+    if inverse < 0.0:
+        t0, t1 = t1, t0
+    if t0 > t_near:
+        t_near = t0
+    if t1 < t_far:
+        t_far = t1
+    if t_near > t_far:
+        return math.inf
+    inverse = 1.0 / ray.d.z
+    t0, t1 = (lower.z - ray.o.z) * inverse, (upper.z - ray.o.z) * inverse
+    if inverse < 0.0:
+        t0, t1 = t1, t0
+    if t0 > t_near:
+        t_near = t0
+    if t1 < t_far:
+        t_far = t1
+    t = t_near if t_near > 0.0 else t_far
+    return t if t_near <= t_far and t > 0.0 else math.inf
+
+
 @entry_kernel
 def _six_planes(box: Prepared, o: FloatArray, d: FloatArray, t: FloatArray) -> None:
     for i in range(len(o)):
@@ -138,6 +177,12 @@ def _slabs_ieee(box: Prepared, o: FloatArray, d: FloatArray, t: FloatArray) -> N
         t[i] = slabs_ieee(ray_of(o, d, i), *box)
 
 
+@entry_kernel
+def _slabs_unrolled(box: Prepared, o: FloatArray, d: FloatArray, t: FloatArray) -> None:
+    for i in range(len(o)):
+        t[i] = slabs_unrolled(ray_of(o, d, i), *box)
+
+
 _method = family("box", "T8", BoxParameters, prepare)
 
 METHODS = (
@@ -153,5 +198,11 @@ METHODS = (
         "three slabs by reciprocals and IEEE infinities",
         "Williams, Barrus, Morley & Shirley 2005, Journal of Graphics Tools 10(1)",
         _slabs_ieee,
+    ),
+    _method(
+        "slabs_unrolled",
+        "the same, its loop over the axes written out",
+        "Williams, Barrus, Morley & Shirley 2005, Journal of Graphics Tools 10(1)",
+        _slabs_unrolled,
     ),
 )

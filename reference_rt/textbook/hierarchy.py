@@ -27,14 +27,15 @@ def prepare(hierarchy: bvh.Method, parameters: SceneParameters) -> Geometry:
 
 
 @entry_kernel
-def _trace(geometry: Geometry, o: FloatArray, d: FloatArray, t: FloatArray) -> None:
+def trace(geometry: Geometry, o: FloatArray, d: FloatArray, t: FloatArray) -> None:
+    """`Method.run`, for any hierarchy."""
     for i in range(len(o)):
         t[i] = closest_hit(geometry, ray_of(o, d, i)).t
 
 
 def _method(hierarchy: bvh.Method, summary: str, source: str) -> Method:
     build = partial(prepare, hierarchy)
-    return Method(f"hierarchy.{hierarchy}", "T18", summary, source, SceneParameters, build, _trace)
+    return Method(f"hierarchy.{hierarchy}", "T18", summary, source, SceneParameters, build, trace)
 
 
 METHODS = (

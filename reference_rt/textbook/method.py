@@ -25,6 +25,7 @@ class Method:
     name: "family.method";  row: the textbook row that it is from;  summary: one line;  source:
     author, year;  parameters: the NamedTuple of the family;  prepare(parameters): checks them and
     returns the first argument of `run`;  run(prepared, origins, directions, t): writes t (n,).
+    whole: whether it takes all rays of a picture at once, in their order.
     To measure time, call `prepare` once and `run` many times.
     """
 
@@ -35,6 +36,7 @@ class Method:
     parameters: type
     prepare: Callable[[Any], Any]
     run: Run
+    whole: bool = False
 
     def intersect(
         self, parameters: Any, origins: npt.ArrayLike, directions: npt.ArrayLike

@@ -1,6 +1,7 @@
 """The machine's memory: data that cannot fit are refused before they are read."""
 
 import ctypes
+import functools
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -73,4 +74,10 @@ def give_back() -> None:
     """Gives freed memory back to the system.  glibc keeps up to 32 MB of every array that it has
     freed, in case it is needed again; other systems' allocators are left alone."""
     with suppress(AttributeError, OSError, TypeError):
-        ctypes.CDLL(None).malloc_trim(0)
+        _program().malloc_trim(0)
+
+
+@functools.cache
+def _program() -> ctypes.CDLL:
+    """What this process has loaded."""
+    return ctypes.CDLL(None)

@@ -19,6 +19,7 @@ CAMERAS = {
     "orthographic by width": rt.Orthographic(**TILTED, width=3),
     "orthographic by view": rt.Orthographic(**TILTED, view=VIEW),
     "pinhole": Pinhole(**TILTED, film_width=0.3, film_distance=0.2),
+    "pinhole with a hole, no lens": Pinhole(**TILTED, hole_radius=0.1, exposure=3),
     "thin lens by fov": ThinLens(**TILTED, aperture_radius=0.2),
     "thin lens by view": ThinLens(**TILTED, view=VIEW, aperture_radius=0.2, focus_distance=3),
 }

@@ -23,6 +23,11 @@ SCENE = rt.Scene(
         rt.Box(transform=(transform.Scale(scale=0.3),)),
     )
 )
+PICTURE = rt.Scene(
+    camera=rt.Perspective(eye=(0.5, 0.3, 3)),
+    film=rt.Film(width=8, height=6),
+    shapes=(rt.Triangle(v0=(-1, 1, -1), v1=(1, 1, 0), v2=(0, -1, 1)),),
+)
 EXAMPLES = {
     "sphere": UNIT_SPHERE,
     "box": CUBE,
@@ -30,6 +35,7 @@ EXAMPLES = {
     "polygon": L_SHAPE,
     "csg": textbook.CsgParameters(ROUNDED),
     "hierarchy": textbook.SceneParameters(SCENE),
+    "picture": textbook.SceneParameters(PICTURE),
 }
 DIRECTIONS = [d for d in itertools.product((-1.0, -0.0, 0.0, 1.0), repeat=3) if any(d)]
 

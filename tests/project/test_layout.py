@@ -19,7 +19,7 @@ FLOORS = {
     "comparisons": (
         *("results", "geometry", "statistics", "renderers", "mitsuba", "textures", "materials"),
         *("cameras", "lights", "integrators", "shapes", "referee", "translator", "pbrt", "gltf"),
-        *("runs", "cycles", "rungs", "report", "compare", "gate", "truth", "suites"),
+        *("runs", "raysect", "cycles", "rungs", "report", "compare", "gate", "truth", "suites"),
         *("experiments", "commands"),
     ),
 }

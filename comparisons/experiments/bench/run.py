@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from llvmlite import binding
 
-from comparisons.experiments.bench import mesh_rays, program, scenes
+from comparisons.experiments.bench import mesh_rays, program, scenes, solids
 from comparisons.experiments.bench.outputs import Display, markdown
 from comparisons.experiments.bench.row import Row, Setting, row_from
 from comparisons.results.files import write_json
@@ -42,6 +42,7 @@ GROUPS = (
         "mesh_rays", (*(f"rays_{kind}" for kind in mesh_rays.GOALS), "any_hit"), mesh_rays.measure
     ),
     Group("threads", ("threads",), scenes.measure_threads),
+    Group("solids", tuple(f"solids_{name}" for name in solids.OPERATIONS), solids.measure),
     Group("cold", ("cold", "cold_median"), program.measure_ever),
     Group("new_kind", ("new_kind", "new_kind_median"), program.measure_new),
     Group("warm_up", ("warm_up", "after_warm_up"), program.measure_warmed),

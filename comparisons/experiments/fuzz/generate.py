@@ -2,6 +2,7 @@
 
 import json
 import warnings
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -302,7 +303,7 @@ def generate(seed: int, number: int, grammar: Grammar, folder: Path) -> Data:
     if draw.extreme and draw.chance(0.4):
         found = _far(draw, found)
     for _ in range(MENDED):
-        if _shows_light(found, folder):
+        if _shows_light(found, number, folder):
             break
         found = _mended(draw, found)
     return found
@@ -312,13 +313,13 @@ MENDED = 3
 """Times that a scene whose picture is black is seen from another place."""
 
 
-def _shows_light(data: Data, folder: Path) -> bool:
+def _shows_light(data: Data, number: int, folder: Path) -> bool:
     """Whether a small picture is not black; a scene that cannot be rendered is left as it is, to be
     found."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)
-            scene = parse(data, "small", folder)
+            scene = parse(data, number, folder)
             if isinstance(scene.integrator, RayCast):
                 return True
             return bool(render(scene, size=(8, 6), spp=4, threads=1).colour.any())
@@ -340,7 +341,12 @@ def _mended(draw: Draw, data: Data) -> Data:
 
 def parse(data: Data, number: int | str, folder: Path) -> Scene:
     """The scene, through its text.  Raises SceneError."""
-    return Scene.parse(text_of(data), f"{number}.yaml", folder)
+    return _parsed(text_of(data), f"{number}.yaml", folder)
+
+
+_parsed = lru_cache(maxsize=1)(Scene.parse)
+"""The last one is kept: whether a scene shows light is asked where it is made, and what was built
+for that is there when it is checked."""
 
 
 def _wanted(draw: Draw, features: tuple[str, ...]) -> dict[str, list[str]]:

@@ -208,7 +208,17 @@ def camera(draw: Draw, kind: str, width: int, height: int) -> Data:
     far = draw.between(4.5, 8.0)
     eye = [rounded(x) for x in (far * direction(draw, 0.0)).tolist()]
     found = values(cls, draw, Names())
-    for field in ("fov", "fov_axis", "view", "distance", "width", "near", "far"):
+    for field in (
+        "fov",
+        "fov_axis",
+        "view",
+        "distance",
+        "width",
+        "near",
+        "far",
+        "hole_radius",
+        "exposure",
+    ):
         found.pop(field, None)
     found |= {"eye": eye, "target": draw.vector(0.3)}
     found["up"] = [0.0, 1.0, 0.0] if draw.chance(0.7) else draw.vector()
@@ -228,6 +238,7 @@ def camera(draw: Draw, kind: str, width: int, height: int) -> Data:
             found["fov_axis"] = draw.pick(("x", "y", "diagonal", "smaller", "larger"))
     if "film_width" in fields:
         found |= {"film_width": draw.between(0.8, 1.2), "film_distance": 1.0}
+        found |= {"hole_radius": draw.between(0.005, 0.05)} if draw.chance(0.5) else {}
     if "aperture_radius" in fields:
         found |= {"aperture_radius": draw.between(0.02, 0.3), "focus_distance": rounded(far)}
     if draw.chance(0.2):  # planes through what is seen

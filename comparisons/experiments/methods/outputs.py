@@ -8,7 +8,7 @@ from types import ModuleType
 from typing import Any
 
 from markupsafe import Markup
-from rich.console import RenderableType
+from rich.console import Group, RenderableType
 
 from comparisons.experiments.methods.run import SERIES, Effort, Row, methods
 from comparisons.report.plots import Curve, log_log
@@ -16,7 +16,7 @@ from comparisons.report.table import Cell, Column, Table
 from comparisons.report.templates import template
 from comparisons.report.templates import write as write_text
 from comparisons.results.files import write_json
-from reference_rt.textbook import box, csg, polygon, sphere, triangle
+from reference_rt.textbook import box, csg, picture, polygon, sphere, triangle
 
 SCHEMA = 2
 """Increased whenever a reader of the former layout would misread the new one."""
@@ -28,6 +28,7 @@ MEANING = {
     "ns_high": "upper quartile",
     "timed": "rays of a run",
     "build_seconds": "to build the acceleration structure, the best of three",
+    "error": "of the barycentrics, against rational arithmetic: median, in roundings of 2^-53",
 }
 
 
@@ -45,6 +46,7 @@ COLUMNS = tuple(
         ("runs", lambda row: row.time.runs),
         ("timed", lambda row: row.time.rays),
         ("build_seconds", lambda row: row.build),
+        ("error", lambda row: row.error),
     )
 )
 """Of both files."""
@@ -76,8 +78,27 @@ def write(
 
 def terminal(rows: Sequence[Row], width: int) -> RenderableType:
     """Of one family, for a terminal of so many columns."""
-    name = Column[str]("method", short)
-    return _table(rows, name, between="\n").terminal(width, f"{rows[0].family}: ns per ray")
+    name, family = Column[str]("method", short), rows[0].family
+    times = _table(rows, name, between="\n").terminal(width, f"{family}: ns per ray")
+    inexact = _errors(rows)
+    return Group(times, *(e.terminal(width, f"{family}: {ERRORS}") for e in inexact))
+
+
+ERRORS = "errors of barycentrics, in roundings of 2^-53"
+
+
+def _errors(rows: Sequence[Row]) -> list[Table[str]]:
+    """Of one family: one table, or none."""
+    of = {(row.method, row.x): row.error for row in rows if row.error is not None}
+    if not of:
+        return []
+    axis = next(row.axis for row in rows if row.error is not None)
+
+    def setting(x: float) -> Column[str]:
+        return Column(f"{axis} {x:g}", lambda name: f"{of[name, x]:.2g}", right=True)
+
+    columns = (Column[str]("method", short), *map(setting, dict.fromkeys(x for _, x in of)))
+    return [Table(columns, list(dict.fromkeys(method for method, _ in of)))]
 
 
 def _table(rows: Sequence[Row], *first: Column[str], between: str) -> Table[str]:
@@ -117,6 +138,7 @@ _SPELT = {
     "sah": "SAH",
     "slabs_ieee": "IEEE slabs",
     "slabs_parallel_test": "slabs",
+    "slabs_unrolled": "IEEE slabs, unrolled",
 }
 
 
@@ -128,6 +150,7 @@ _MODULES: dict[str, ModuleType] = {
     "box": box,
     "polygon": polygon,
     "csg": csg,
+    "picture": picture,
 }
 """By family; acceleration structures share one kernel, whose docstring counts no operations."""
 
@@ -175,13 +198,15 @@ def _family(name: str, rows: Sequence[Row]) -> dict[str, Any]:
         "name": name,
         "about": [f"{one.name}: {one.about}" for one in SERIES if one.family == name],
         "table": table,
+        "errors": _errors(rows),
         "fails": {each: how for each, how in fails.items() if how},
         "plots": [Markup(svg) for svg in _plots(rows)],  # our own, not from outside
     }
 
 
 def _plots(rows: Sequence[Row]) -> list[str]:
-    """Of each series of several settings: times against x, and those of building hierarchies."""
+    """Of each series of several settings: times against x, those of building hierarchies, and
+    errors."""
     plots = []
     for series, axis in dict.fromkeys((row.series, row.axis) for row in rows if row.axis):
         of = [row for row in rows if row.series == series]
@@ -189,13 +214,17 @@ def _plots(rows: Sequence[Row]) -> list[str]:
         by = {name: [row for row in of if row.method == name] for name in names}
         times = [_times(name, some) for name, some in by.items()]
         plots.append(log_log(times, axis, "ns per ray", series))
-        built = {name: some for name, some in by.items() if some[0].build}
-        if built:
+        for field, unit, what in (
+            ("build", "seconds", "to build"),
+            ("error", "roundings", "errors of barycentrics"),
+        ):
             curves = [
-                Curve(short(name), [r.x for r in some], [r.build or 0.0 for r in some])
-                for name, some in built.items()
+                Curve(short(name), [r.x for r in some], [getattr(r, field) for r in some])
+                for name, some in by.items()
+                if getattr(some[0], field) is not None
             ]
-            plots.append(log_log(curves, axis, "seconds", f"{series}: to build"))
+            if curves:
+                plots.append(log_log(curves, axis, unit, f"{series}: {what}"))
     return plots
 
 

@@ -2,6 +2,7 @@
 take turns.
 """
 
+import math
 import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping
@@ -12,6 +13,7 @@ from typing import Any, NamedTuple, get_args
 import numpy as np
 
 import reference_rt as rt
+from comparisons.experiments.methods.errors import barycentric_error
 from comparisons.geometry.affine import across, unit_rows, unit_vectors
 from reference_rt import textbook
 from reference_rt.accel import bvh
@@ -102,6 +104,21 @@ def triangles(draw: Draw, _: float) -> list[Trial]:
     return trials
 
 
+def slivers(draw: Draw, aspect: float) -> list[Trial]:
+    """Triangles of length 1, ever thinner, turned any way; from some units away, at points in and
+    around them.  Errors are those of the barycentrics."""
+    trials = []
+    for _shape in range(SHAPES):
+        along = unit_vectors(draw.rng, 1)
+        height = across(draw.rng, along)[0] / aspect
+        v0 = draw.rng.uniform(-1.0, 1.0, 3)
+        v = np.stack([v0, v0 + along[0], v0 + draw.rng.uniform(0.2, 0.8) * along[0] + height])
+        o = _outside(draw.rng, draw.rays // SHAPES, v.mean(axis=0))
+        share = draw.rng.dirichlet((1.0, 1.0, 1.0), len(o)) * 2.0 - 1.0 / 3.0
+        trials.append(Trial(TriangleParameters(*v), o, share @ v - o))
+    return trials
+
+
 def polygons(draw: Draw, vertices: float) -> list[Trial]:
     """Gears with teeth of random height, at points in and around them, up to 60° from the
     normal."""
@@ -168,14 +185,45 @@ def needles(draw: Draw, number: float) -> list[Trial]:
     return _meshes(draw, np.stack([*ends, third], axis=1))
 
 
+def _picture(draw: Draw, number: float, size: int) -> list[Trial]:
+    """`strewn` triangles, as many, in a picture of size x size pixels."""
+    (strewn_ones,) = strewn(draw, number)
+    scene = strewn_ones.part.scene.changed(
+        camera=rt.Perspective(eye=(0.0, 0.0, 4.0), target=(0.0, 0.0, 0.0), fov=40.0),
+        film=rt.Film(width=size, height=size),
+    )
+    rays = scene.camera_rays()
+    o, d = (np.ascontiguousarray(a.reshape(-1, 3)) for a in rays)
+    return [Trial(SceneParameters(scene), o, d)]
+
+
+def picture_of_triangles(draw: Draw, number: float) -> list[Trial]:
+    """64 x 64 pixels, and ever more and smaller triangles scattered in a cube."""
+    return _picture(draw, number, 64)
+
+
+def picture_of_pixels(draw: Draw, pixels: float) -> list[Trial]:
+    """1000 triangles scattered in a cube, and ever more pixels."""
+    return _picture(draw, 1000.0, math.isqrt(int(pixels)))
+
+
 SERIES = (
     Series("sphere", "all around", "", (1.0,), spheres),
     Series("triangle", "all around", "", (1.0,), triangles),
+    Series("triangle", "slivers", "length / height", (1.0, 1e2, 1e4, 1e6, 1e8), slivers),
     Series("box", "all around", "", (1.0,), boxes),
     Series("polygon", "gears", "vertices", (4.0, 16.0, 64.0, 256.0, 1024.0), polygons),
-    Series("csg", "solids", "operands", (2.0, 4.0, 8.0, 16.0, 32.0, 64.0), solids),
+    Series("csg", "solids", "operands", (2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 256.0), solids),
     Series("hierarchy", "strewn", "triangles", (1e1, 1e2, 1e3, 1e4, 1e5), strewn),
     Series("hierarchy", "needles", "triangles", (1e1, 1e2, 1e3, 1e4), needles),
+    Series("picture", "triangles", "triangles", (1e1, 1e2, 1e3, 1e4, 1e5), picture_of_triangles),
+    Series(
+        "picture",
+        "pixels",
+        "pixels",
+        (32.0**2, 64.0**2, 128.0**2, 256.0**2, 512.0**2),
+        picture_of_pixels,
+    ),
 )
 FAMILIES = tuple(dict.fromkeys(series.family for series in SERIES))
 
@@ -209,17 +257,22 @@ class Prepared:
     """A method with its precomputed data for some trials, to be run repeatedly."""
 
     def __init__(self, method: Method, trials: list[Trial]) -> None:
-        self.run, self.trials = method.run, trials
+        self.run, self.whole, self.trials = method.run, method.whole, trials
         with np.errstate(all="ignore"):
             self.parts = [method.prepare(trial.part) for trial in trials]
         self._t = np.empty(max(len(trial.o) for trial in trials))
 
+    def traced(self, trial: Trial, rays: int) -> int:
+        """How many rays of a trial a run over `rays` takes."""
+        return len(trial.o) if self.whole else min(rays, len(trial.o))
+
     def nanoseconds(self, rays: int) -> float:
-        """Time one run over the first `rays` rays of all trials: nanoseconds per ray."""
-        jobs = [
-            (part, trial.o[:rays], trial.d[:rays], self._t[: min(rays, len(trial.o))])
-            for trial, part in zip(self.trials, self.parts, strict=True)
-        ]
+        """Time one run over `rays` rays of all trials, evenly chosen: nanoseconds per ray."""
+        jobs = []
+        for trial, part in zip(self.trials, self.parts, strict=True):
+            n = self.traced(trial, rays)
+            of = np.arange(n) * len(trial.o) // n
+            jobs.append((part, trial.o[of], trial.d[of], self._t[:n]))
         with np.errstate(all="ignore"):
             begin = time.perf_counter_ns()
             for job in jobs:
@@ -249,7 +302,8 @@ def measure(prepared: Mapping[str, Prepared], runs: int) -> dict[str, Time]:
     times = {}
     for name, values in found.items():
         low, median, high = (float(q) for q in np.quantile(values, (0.25, 0.5, 0.75)))
-        traced = sum(min(rays[name], len(trial.o)) for trial in prepared[name].trials)
+        method = prepared[name]
+        traced = sum(method.traced(trial, rays[name]) for trial in method.trials)
         times[name] = Time(median, low, high, runs, traced)
     return times
 
@@ -275,7 +329,8 @@ FULL = Effort(rays=32768, runs=15)
 
 @dataclass(frozen=True)
 class Row:
-    """One method in one setting;  build: seconds, None without an acceleration structure."""
+    """One method in one setting;  build: seconds, None without an acceleration structure;  error:
+    see `barycentric_error`, None but for slivers."""
 
     family: str
     series: str
@@ -284,6 +339,7 @@ class Row:
     method: str
     time: Time
     build: float | None
+    error: float | None = None
 
 
 def run(family: str, effort: Effort, seed: int, progress: Progress) -> list[Row]:
@@ -305,17 +361,25 @@ def _setting(series: Series, x: float, effort: Effort, seed: int) -> Iterator[Ro
         trials = series.make(Draw(rng, effort.rays, folder), x)
         prepared = {name: Prepared(m, trials) for name, m in methods(series.family).items()}
         for name, found in measure(prepared, effort.runs).items():
-            built = _build(name, trials[0]) if series.family == "hierarchy" else None
-            yield Row(series.family, series.name, series.axis, x, name, found, built)
+            kind = _BUILT.get(name)
+            built = _build(kind, trials[0]) if kind else None
+            error = barycentric_error(name, trials) if series.make is slivers else None
+            yield Row(series.family, series.name, series.axis, x, name, found, built, error)
 
 
-def _build(method: str, trial: Trial) -> float:
+_BUILT: dict[str, bvh.Method] = {
+    **{f"hierarchy.{kind}": kind for kind in get_args(bvh.Method)},
+    "picture.cast_hierarchy": "sah",
+}
+"""The hierarchy of a method."""
+
+
+def _build(kind: bvh.Method, trial: Trial) -> float:
     """Seconds to build a hierarchy, the best of three: other load on the machine only adds to
     it."""
     triangles = trial.part.scene.tables.geometry.shapes.triangles
     v = triangles.vertices.reshape(-1, 3, 3)
     bounds, corners = (v.min(axis=1), v.max(axis=1)), v.reshape(-1, 9)
-    kind = next(k for k in get_args(bvh.Method) if method == f"hierarchy.{k}")
     times = []
     for _ in range(3):
         begin = time.perf_counter()

@@ -300,6 +300,12 @@ FAULTS = (
         "        return min(i, 2 * n - 1 - i)\n    return n - 1 if i == n else i % n\n", "files",
     ),
     SourceFault(
+        "normals of what a solid lacks not turned", "csg_inside", "accel/geometry.py",
+        "                point.p, -point.n, -point.ns, point.error, point.material, point.light\n",
+        "                point.p, point.n, point.ns, point.error, point.material, point.light\n",
+        "solids",
+    ),
+    SourceFault(
         "a sky clamped at its seam", SKY, "lights/emitters/environment_map.py",
         "    beside, row = select(x + 1.0 < sky.width, x + 1.0, 0.0), y * sky.width\n",
         "    beside, row = smaller(x + 1.0, sky.width - 1.0), y * sky.width\n",

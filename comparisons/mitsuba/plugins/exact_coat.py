@@ -49,8 +49,7 @@ def approximate_g1(a: FloatArray) -> FloatArray:
 
 def exact_g1(a: FloatArray) -> FloatArray:
     """Smith's G1: 2 / (1 + erf a + exp(-a²) / (a sqrt pi)) (Walter et al. 2007, section 5.2)."""
-    erf = np.vectorize(math.erf)(a)
-    return np.asarray(2.0 / (1.0 + erf + np.exp(-a * a) / (a * math.sqrt(math.pi))))
+    return np.asarray(2.0 / (1.0 + special.erf(a) + np.exp(-a * a) / (a * math.sqrt(math.pi))))
 
 
 def correction(mi: Any, alpha_u: Any, alpha_v: Any, v: Any) -> Any:
@@ -102,8 +101,13 @@ def _register_beckmann(mi: Any) -> None:
 
 
 CELLS = 512
-"""Cells of T's table, evenly spaced in the square root of the cosine: linear interpolation is exact
-to 1e-5."""
+"""Cells of T's table, evenly spaced in the square root of the cosine: for an index above 1 linear
+interpolation is exact to 5e-6 (measured)."""
+
+NODES, NEAR_TOTAL = (64, 32), (192, 64)
+"""Of the quadrature over visible normals.  Where reflection may be total, F behaves like a square
+root: T for an index below 1 is off by up to 0.3 % at single cosines, by 2 % with NODES (against 900
+nodes)."""
 
 COLOURS = ("diffuse_reflectance", "specular_reflectance")
 """Mitsuba's names of a plastic's colours."""
@@ -156,12 +160,12 @@ class RoughCoat:
 
     def __init__(self, distribution: str, alpha: float, eta: float) -> None:
         self.is_beckmann, self.alpha = distribution == "beckmann", alpha
-        self.nodes = 64, 32
+        self.nodes = NODES if eta > 1.0 else NEAR_TOTAL
         self.transmittance = self.scattered(np.linspace(0.0, 1.0, CELLS + 1) ** 2, eta, True)
         critical = math.sqrt(1.0 - 1.0 / (eta * eta)) if eta > 1.0 else 0.5
         parts = (_rule(64, 0.0, critical), _rule(64, critical, 1.0))
         nodes, weights = (np.concatenate(column) for column in zip(*parts, strict=True))
-        self.nodes = 192, 64  # near total reflection F behaves like a square root
+        self.nodes = NEAR_TOTAL
         within = self.scattered(nodes, 1.0 / eta, False)
         self.reflectance = float(np.sum(2.0 * nodes * weights * within))
 

@@ -2,7 +2,8 @@
 
 Mitsuba's own cameras have square pixels, and its thin lens looks along its axis.  Counterpart of
 `reference_rt.cameras.Perspective` and `ThinLens` with a `view`: rays start at the eye, or on a lens
-around it, and pass a rectangle of any shape, anywhere in front of it.
+around it, and pass a rectangle of any shape, anywhere in front of it.  Also of a `Pinhole` whose
+hole has a radius.
 """
 
 from typing import Any
@@ -16,8 +17,9 @@ def register(mi: Any) -> None:
     class ViewRectangle(mi.Sensor):  # type: ignore[misc]
         """Parameters: to_world, a rigid map whose columns are left, up, forward and the eye, as of
         Mitsuba's cameras; left, right, bottom and top, the edges of the view rectangle at distance
-        1; aperture_radius, 0 for none; focus_distance, to the plane in focus; near_clip and
-        far_clip, the clipping planes."""
+        1; aperture_radius, 0 for none; focus_distance, to the plane in focus, below 0 for a film
+        behind a hole without a lens; exposure, that radiance is weighted as irradiance of that film
+        by, 0 for radiance; near_clip and far_clip, the clipping planes."""
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
@@ -31,6 +33,7 @@ def register(mi: Any) -> None:
             self.across, self.up = across.tolist(), up.tolist()
             self.radius = properties.get("aperture_radius", 0.0)
             self.focus = properties.get("focus_distance", 1.0)
+            self.exposure = properties.get("exposure", 0.0)
             self.near, self.far = properties["near_clip"], properties["far_clip"]
 
         def sample_ray(
@@ -55,7 +58,12 @@ def register(mi: Any) -> None:
             # d ends at distance 1 along the direction of view.
             ray = mi.Ray3f(o + d * self.near, dr.normalize(d), time, mi.Color0f())
             ray.maxt = (self.far - self.near) * dr.norm(d)
-            return ray, mi.Color3f(1.0)
+            if self.exposure == 0.0:
+                return ray, mi.Color3f(1.0)
+            # From the film to the hole: cos^2 over the square of the way, times the hole's area;
+            # d, from the film through the hole, is so many film distances long.
+            area = dr.pi * self.radius**2
+            return ray, mi.Color3f(self.exposure * area / (self.focus * dr.squared_norm(d)) ** 2)
 
         def sample_ray_differential(
             self,

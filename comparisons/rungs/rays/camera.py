@@ -85,10 +85,12 @@ def compare_camera(scene: Scene, counterpart: Counterpart, most: int) -> CameraC
     """
     camera, film = scene.camera, scene.film
     x, y = pixel_centres(film, most)
-    lens_of = type_of(camera).lens
-    samples = (LENS_CENTRE,) if lens_of is None else LENS_SAMPLES
-    o, d = _stacked(camera_rays(scene, x, y, lens) for lens in samples)
-    their_o, their_d, their_end = _stacked(sensor_rays(counterpart, x, y, lens) for lens in samples)
+    lens = type_of(camera).lens(camera)
+    samples = (LENS_CENTRE,) if lens is None else LENS_SAMPLES
+    o, d = _stacked(camera_rays(scene, x, y, sample) for sample in samples)
+    their_o, their_d, their_end = _stacked(
+        sensor_rays(counterpart, x, y, sample) for sample in samples
+    )
     their_o, their_end = counterpart.frame.out(their_o), counterpart.frame.out(their_end)
     forward = -camera.basis[2]
     # Before normalisation a direction is 1 along the axis and tan(angle) across: its rounding
@@ -97,9 +99,8 @@ def compare_camera(scene: Scene, counterpart: Counterpart, most: int) -> CameraC
     corners = np.array([[0.0, 0.0, 1.0, 1.0], [0.0, 1.0, 0.0, 1.0]])
     _, rim = camera_rays(scene, corners[0] * film.width, corners[1] * film.height)
     steepest = 1.0 / (rim @ forward).min()
-    if lens_of is not None:
-        lens = lens_of(camera)
-        steepest += lens.radius / lens.focus
+    if lens is not None:
+        steepest += lens.radius / abs(lens.focus)
     direction = np.linalg.norm(their_d - d, axis=1)
     direction_bound = ROUNDINGS * UNIT_ROUNDOFF * (1.0 + (d @ forward) * steepest)
     shift = their_o - o

@@ -22,6 +22,9 @@ RHO = np.array([0.8, 0.5, 0.2])
 AREA = r"$L A$, $A$ the area of the projected outline in the pixel"
 
 
+SEGMENT = r"$L (\frac{1}{2} + \frac{u \sqrt{1 - u^2} + \arcsin u}{\pi})$"
+
+
 def _triangles(view: View) -> Expected:
     """Two triangles that shine, over black."""
     first, second = view.drawn(FIRST), view.drawn(SECOND)
@@ -64,6 +67,37 @@ def pinhole_film() -> Expected:
     degrees."""
     view = View((0, 0, 4), (0.1, 0, 0), (0, 1, 0), (0.36, 0.36), (32, 32))
     return Expected(_triangles(view).pixels[::-1, ::-1])
+
+
+@case(
+    SEGMENT,
+    "the blur of a hole without a lens",
+)
+def pinhole_blur() -> Expected:
+    """Through a hole of radius r a film point at distance d behind it sees at depth z a disk of
+    radius r (1 + z / d).  Of it an edge leaves the segment beyond, at u radii from its middle.
+    Turned by 180 degrees."""
+    return Expected(_beyond_an_edge(6.0 * 0.54, 0.04 * (1.0 + 6.0 / 1.0)).pixels[::-1, ::-1], 1e-6)
+
+
+@case(
+    r"$\frac{x \pi L}{2} (1 - \frac{a - r^2}{\sqrt{(a + r^2)^2 - 4 r^2 \rho^2}})$, "
+    r"$a = d^2 + \rho^2$",
+    "the light that a hole lets onto the film",
+    "Howell, Menguc & Siegel 2015, appendix C",
+)
+def pinhole_exposure() -> Expected:
+    """A sky of radiance L lights the film through a disk of radius r at distance d as if the disk
+    shone: by its form factor at the distance rho from the axis.  The film shows x times that."""
+    r2, place = 0.3**2, level(2.0, 32)
+
+    def exposed(x: FloatArray, y: FloatArray) -> FloatArray:
+        across, up = place(x, y)
+        rho2 = across * across + up * up
+        far = 1.0 + rho2
+        return np.asarray(1.0 - (far - r2) / np.sqrt((far + r2) ** 2 - 4.0 * r2 * rho2))
+
+    return Expected(mix(pixel_means(exposed, 32, 32), WARM * 5.0 * np.pi / 2.0))
 
 
 @case(AREA, "parallel rays, and the scale of their picture")
@@ -208,15 +242,20 @@ def paraboloid_normals() -> Expected:
 
 
 @case(
-    r"$L (\frac{1}{2} + \frac{u \sqrt{1 - u^2} + \arcsin u}{\pi})$",
+    SEGMENT,
     "the circle of confusion",
     "Potmesil & Chakravarty 1981",
 )
 def lens_blur() -> Expected:
     """A lens of radius A in focus at f blurs points at depth z over a disk of radius A |1 - z / f|
     in their plane.  Of it an edge leaves the segment beyond, at u radii from its middle."""
-    radius = 0.2 * abs(1.0 - 6.0 / 4.0)
-    place = level(2 * 6.0 * np.tan(np.radians(15.0)), 32)
+    width = 2 * 6.0 * np.tan(np.radians(15.0))
+    return _beyond_an_edge(width, 0.2 * abs(1.0 - 6.0 / 4.0))
+
+
+def _beyond_an_edge(width: float, radius: float) -> Expected:
+    """A half plane x > 0.07 that shines, in a picture so wide there, each point seen as a disk."""
+    place = level(width, 32)
 
     def shining(x: FloatArray, y: FloatArray) -> FloatArray:
         u = np.clip((place(x, y)[0] - 0.07) / radius, -1.0, 1.0)

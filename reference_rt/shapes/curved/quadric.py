@@ -6,6 +6,7 @@ those of `fit`.
 
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import lru_cache
 from itertools import combinations
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
@@ -151,6 +152,10 @@ def fit(form: Form, lower: Point, upper: Point) -> Fitted:
     )
 
 
+_fitted = lru_cache(maxsize=256)(fit)
+"""A scene that is changed makes its tables anew, with the same quadrics in other places."""
+
+
 def _determinant(rows: Rows) -> Fraction:
     """By expansion along the first row (Laplace)."""
     if not rows:
@@ -234,7 +239,7 @@ def tabulate(
     The box must contain the whole surface along the axes that it does not clip.
     """
     try:
-        fitted = fit(form, lower, upper)
+        fitted = _fitted(form, tuple(lower), tuple(upper))
     except OverflowError:
         raise ValueError("its size overflows; expected finite numbers") from None
     # In exact arithmetic: an origin far away and a map that brings it back would cancel.

@@ -45,6 +45,9 @@ CASES: tuple[tuple[AnyCamera, tuple[int, int]], ...] = (
     (Orthographic(eye=(0.0, 9.0, 0.0), up=(0.0, 0.0, -1.0), view=(0.0, 1e-2, -50.0, 3.0)), WIDE),
     (Pinhole(**TILTED), WIDE),
     (Pinhole(**TILTED, film_width=0.3, film_distance=2.0), TALL),
+    (Pinhole(**TILTED, hole_radius=0.1), WIDE),
+    (Pinhole(**TILTED, film_width=0.3, film_distance=0.2, hole_radius=0.5, exposure=2.0), TALL),
+    (Pinhole(**TILTED, film_width=8.0, film_distance=4.0, hole_radius=1e-4), WIDE),
     *((ThinLens(**TILTED, fov=50.0, fov_axis=a, aperture_radius=0.2), WIDE) for a in AXES),
     (ThinLens(**TILTED, view=(-0.6, 0.6, -0.4, 0.4), aperture_radius=0.01), WIDE),
     (ThinLens(**TILTED, fov=90.0, aperture_radius=3.0, focus_distance=0.4), TALL),
@@ -89,6 +92,8 @@ def test_cameras_in_files_send_the_same_rays(
     write_xml(scene, tmp_path / "scene.xml")
     again = Scene.load(tmp_path / "scene.xml")
     assert (again.camera.near, again.camera.far) == (0.3, 9.0)
+    exposures = {getattr(one.camera, "exposure", None) for one in (scene, again)}
+    assert len(exposures) == 1
     x, y = (np.linspace(0.01, 0.99, 7) * length for length in size)
     for ours, theirs in zip(
         *(camera_rays(one, x, y, (0.8, 0.3)) for one in (scene, again)), strict=True
@@ -100,6 +105,7 @@ PLAIN = Perspective(**TILTED, fov=70.0)
 FRONTAL = Perspective(**TILTED, view=OFF_AXIS)
 LENS = ThinLens(**TILTED, fov=50.0, aperture_radius=0.2, focus_distance=4.0)
 BOX = Pinhole(**TILTED)
+HOLE = Pinhole(**TILTED, hole_radius=0.2)
 
 
 @pytest.mark.parametrize(
@@ -117,6 +123,10 @@ BOX = Pinhole(**TILTED)
         (Orthographic(**TILTED, view=OFF_AXIS), Orthographic(**TILTED, view=(-0.15, 0.75, 0, 0.6))),
         (BOX, Perspective(**TILTED, view=(-0.5, 0.5, -1 / 3, 1 / 3))),
         (BOX, Pinhole(**TILTED, film_distance=1.0001)),
+        (HOLE, BOX),
+        (HOLE, HOLE.model_copy(update={"hole_radius": 0.2001})),
+        (HOLE, HOLE.model_copy(update={"film_width": 2.001, "film_distance": 2.001})),
+        (HOLE, ThinLens(**TILTED, view=(-0.5, 0.5, -1 / 3, 1 / 3), aperture_radius=0.2)),
         (LENS, Perspective(**TILTED, fov=50.0)),
         (LENS, LENS.model_copy(update={"aperture_radius": 0.2001})),
         (LENS, LENS.model_copy(update={"focus_distance": 4.001})),

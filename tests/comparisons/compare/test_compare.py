@@ -95,7 +95,7 @@ def test_scenes_agree(tmp_path: Path) -> None:
     case = found["cases"][0]
     assert set(case) >= {"scene", "verdict", "reason", "tiers", "metrics", "seconds"}
     of_light = ["direct", "sampling", "whitted", "statistics", "images"]
-    assert list(case["tiers"]) == ["input", "files", "geometry", *of_light]
+    assert list(case["tiers"]) == ["input", "files", "solids", "geometry", *of_light]
     assert set(case["metrics"]) >= {"ssim", "flip", "psnr", "rmse", "relmse", "mean_bias"}
     geometry = case["tiers"]["geometry"]
     assert (geometry["decided_ours"], geometry["undecided"]) == (0, 0)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from bench_rows import FIELDS, a_table, made_up
 
-from comparisons.experiments.bench import scenes
+from comparisons.experiments.bench import scenes, solids
 from comparisons.experiments.bench.outputs import tables_of
 from comparisons.experiments.bench.row import (
     LIMIT,
@@ -25,6 +25,8 @@ from comparisons.experiments.bench.row import (
 )
 from comparisons.experiments.bench.run import machine
 from comparisons.experiments.convergence.methods import Taken
+from reference_rt.rendering.render import render
+from reference_rt.sampling import Sobol
 
 SCENES = Path(__file__).parents[3] / "scenes"
 
@@ -210,6 +212,21 @@ def test_kinds_of_scenes_that_suites_lack(name: str, tmp_path: Path) -> None:
     scene = scenes.STRANGERS[name](tmp_path)
     assert len(scene.shapes) > int(name.rpartition("_")[2])
     assert len(set(map(repr, scene.materials.values()))) == len(scene.materials)
+
+
+def test_solids_of_few_and_of_many_operands(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of about the same size in the picture; times are made up."""
+    seen = {}
+    for operation in solids.OPERATIONS:
+        for n in (solids.FEW, solids.MANY):
+            assert len(solids.solid_of(operation, n).of) == n
+            picture = render(solids.scene_of(operation, n).changed(sampler=Sobol(spp=1)))
+            seen[operation, n] = float((picture.colour < 1.0).any(axis=-1).mean())
+        assert 0.5 < seen[operation, solids.FEW] / seen[operation, solids.MANY] < 2.0
+    monkeypatch.setattr(solids, "alternate", lambda measures, say: {"few": [1.0], "many": [5.0]})
+    found = solids.measure(Setting(scenes=SCENES, threads=1))
+    assert [row.name for row in found] == ["solids_union", "solids_difference"]
+    assert [(row.ratio, row.met) for row in found] == [(5.0, False)] * 2
 
 
 # ---- table --------------------------------------------------------------------------------------

@@ -202,6 +202,7 @@ DEFAULTS: tuple[tuple[Any, str, Any, str], ...] = (
     (Perspective, "fov_axis", "y", "camera: {type: perspective, fov: 30}"),
     (Orthographic, "width", 1.0, "camera: {type: orthographic}"),
     (Pinhole, "film_distance", 2.0, "camera: {type: pinhole}"),
+    (Pinhole, "hole_radius", 0.1, "camera: {type: pinhole}"),
     (ThinLens, "focus_distance", 1.0, "camera: {type: thin_lens, aperture_radius: 0.1}"),
     (GaussianFilter, "stddev", 0.6, "film: {filter: {type: gaussian}}"),
     (Sobol, "seed", 1, "sampler: {type: sobol}"),

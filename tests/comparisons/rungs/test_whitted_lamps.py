@@ -4,10 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import SCENES
 from PIL import Image
 
 from comparisons.mitsuba.backend import mitsuba, scalar
-from comparisons.rungs import whitted
+from comparisons.rungs import direct, whitted
 from comparisons.shapes.stand_ins import coarser
 from comparisons.translator import load
 from reference_rt.core.transform import rotate
@@ -58,6 +59,24 @@ def test_lamps_on_a_ceiling(ceiling: str, light: str) -> None:
     assert found.status == "agree", found.reason
     assert found.numbers["explained"] == 0
     assert wrong.status == "differ"
+
+
+BETWEEN = (SCENES / "regressions" / "lamp_between_texels.yaml").read_text(encoding="utf-8")
+
+
+def test_a_lamp_whose_middle_is_between_texels() -> None:
+    """Half of the rays see another texel in Mitsuba, though no edge is near them.  A lamp that is
+    brighter than both differs; one that is between them is seen by the rung below."""
+    scene = Scene.parse(BETWEEN)
+    brighter, darker = (Scene.parse(BETWEEN.replace("0.9", other)) for other in ("1.2", "0.6"))
+    with scalar():
+        found = whitted(scene, scene.tables, load(scene))
+        wrong = whitted(scene, scene.tables, load(brighter))
+        below = [direct(scene, scene.tables, load(one), 48).status for one in (scene, darker)]
+    assert found.status == "reference-limited", found.reason
+    assert found.numbers["explained"] > 10
+    assert wrong.status == "differ"
+    assert below == ["agree", "differ"]
 
 
 SHOWN = """

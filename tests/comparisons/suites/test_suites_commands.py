@@ -49,7 +49,7 @@ def test_annotations_for_github_need_no_option(tmp_path, program, monkeypatch):
         (("nothing",), 2, "there is no suite 'nothing'"),
         (("smoke", "--scenes", "nowhere"), 2, "there is no folder 'nowhere'"),
         (("smoke", "--only", "z*"), 2, "nothing to run"),
-        (("smoke", "--tier", "run"), 2, "--rung: expected one of files, film, geometry"),
+        (("smoke", "--tier", "run"), 2, "--rung: expected one of files, film, solids, geometry"),
         (("smoke", "--jobs", "0"), 2, "jobs"),
     ],
 )

@@ -209,6 +209,10 @@ WRONG = {
     "no film": ("type: pinhole, film_width: 0", ".film_width", "expected greater than 0"),
     "film in the hole": ("type: pinhole, film_distance: -1", ".film_distance", "expected greater"),
     "film beside the hole": ("type: pinhole, film_distance: 1.0e-17", "", "the rectangle fills"),
+    "hole of no size": ("type: pinhole, hole_radius: 0", ".hole_radius", "expected greater than 0"),
+    "light through a point": ("type: pinhole, exposure: 1", "", "expected 'hole_radius' too"),
+    "wide hole": ("type: pinhole, hole_radius: 1, film_distance: 1.0e-16, film_width: 1.0e-16", "",
+                  "the hole is too wide"),
     "no lens": ("type: thin_lens", ".aperture_radius", "missing; expected"),
     "empty lens": ("type: thin_lens, aperture_radius: 0", ".aperture_radius", "expected greater"),
     "focus in the lens": ("type: thin_lens, aperture_radius: 1, focus_distance: 0",
@@ -256,6 +260,8 @@ def test_no_direction_is_ever_nan():
         ThinLens(**TILTED, aperture_radius=1e-320, focus_distance=1e-320),
         ThinLens(**TILTED, aperture_radius=1, focus_distance=1e308),
         Pinhole(**TILTED, film_width=1e300, film_distance=1e290),
+        Pinhole(**TILTED, film_width=1e300, film_distance=1e290, hole_radius=1e300),
+        Pinhole(**TILTED, hole_radius=1e-320),
     ]:
         for size in ((8, 6), (1, 2**31 - 1)):
             for lens in LENSES:

@@ -32,6 +32,7 @@ CAMERAS = (
     rt.Perspective(**_PLACE, fov=50.0),
     rt.Perspective(**_PLACE, view=(-1.0, 2.0, -0.5, 1.0), distance=2.0),
     rt.Pinhole(**_PLACE, film_width=2.0, film_distance=1.5),
+    rt.Pinhole(**_PLACE, film_width=2.0, film_distance=1.5, hole_radius=0.05),
     rt.Orthographic(**_PLACE, view=(-1.0, 2.0, -0.5, 1.0)),
     rt.ThinLens(**_PLACE, aperture_radius=0.3, focus_distance=4.0),
 )

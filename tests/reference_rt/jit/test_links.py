@@ -29,6 +29,7 @@ from linked_tables import (
 
 from reference_rt.jit.kernel import entry_kernel, kernel
 from reference_rt.jit.links import STRIDE, Link, Linkable, Linker, is_absent
+from reference_rt.jit.table_words import type_of_table
 
 needs_jit = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
@@ -81,7 +82,56 @@ def test_only_what_is_asked_for_is_compiled():
     assert len(linker.calls) == 3
     linker.link(by_code, ["count"], tables)  # two lists, one kernel
     assert len(linker.calls) == 3
-    assert sum(len(places) for places in linker.calls.values()) == 6
+    assert sum(len(places) for places in linker.callees.values()) == 6
+
+
+@needs_jit
+def test_what_was_linked_before_is_not_compiled_again():
+    """Other tables of the same types have the same kernels, and links that give the same."""
+    first, _ = linked(by_code, tables_of(True, True, True))
+    again, tables = Linker(), tables_of(True, True, True)
+    link = again.link(by_code, by_code.operations, tables)
+    assert again.calls == first.calls != []
+    assert again.missing == []
+    again.resolve()
+    through, plain = (np.zeros((2, len(CODES))) for _ in range(2))
+    values(link, CODES, through)
+    values_of(tables, [int(code) for code in CODES], plain)
+    assert through.tolist() == plain.tolist()
+
+
+OF_ONE_KIND = np.zeros((2, 3))
+_READ_ONLY = np.zeros((2, 3))
+_READ_ONLY.flags.writeable = False
+PARTS = {
+    "floats": OF_ONE_KIND,
+    "of another size": np.zeros((5, 1)),
+    "one index": np.zeros(2),
+    "float32": np.zeros((2, 3), np.float32),
+    "integers": np.zeros((2, 3), np.int64),
+    "columns": np.zeros((3, 2)).T,
+    "spaced": np.zeros((4, 3))[::2],
+    "read only": _READ_ONLY,
+    "none": None,
+    "int": 3,
+    "large": 2**63,
+    "bool": True,
+    "float": 0.5,
+    "scalar": np.float64(1),
+    "scalar integer": np.int64(1),
+    "tuple": (1, 0.5),
+    "record": Adders(np.zeros(2)),
+    "its tuple": (np.zeros(2),),
+}
+
+
+@needs_jit
+@pytest.mark.parametrize("first", PARTS)
+def test_the_type_of_a_table_is_that_of_numba(first):
+    """Whatever was asked for before."""
+    for part in (PARTS[first], *PARTS.values()):
+        for table in ((part,), Adders(part), ((part, 1), part)):
+            assert type_of_table(table) == numba.typeof(table)
 
 
 @needs_jit
@@ -100,7 +150,7 @@ def test_a_block_is_one_text_for_all_types():
 def test_plain_python_takes_the_tables_themselves():
     linker, tables = Linker(is_plain=True), tables_of(True, False, True)
     assert linker.link(by_code, by_code.operations, tables) is tables
-    assert (linker.nothing, linker.calls) == (None, {})
+    assert (linker.nothing, linker.calls) == (None, [])
     assert is_absent(linker.nothing)
 
 

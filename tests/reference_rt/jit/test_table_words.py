@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from reference_rt.jit.links import words_of
+from reference_rt.jit.table_words import words_of
 
 NAN = np.array([0x7FF8_0000_0000_0123], np.uint64).view(np.float64)[0]
 """A NaN with a payload."""

@@ -77,6 +77,13 @@ def test_a_light_tree_adds_up():
     check_sums(rt.Scene.load(SCENES / "many_lights.yaml").changed(film=SMALL))
 
 
+def test_a_tree_adds_up_on_a_film_that_is_exposed():
+    scene = rt.Scene.load(SCENES / "cornell_box.yaml").changed(film=SMALL)
+    place = {field: getattr(scene.camera, field) for field in ("eye", "target", "up")}
+    camera = rt.Pinhole(**place, hole_radius=0.1, exposure=7.0)
+    check_sums(scene.changed(camera=camera))
+
+
 def check_sums(scene):
     film, spp = scene.film, 1 if isinstance(scene.integrator, rt.RayCast) else 2
     places = [(x, y, (x + y) % spp) for x in (1, film.width // 2) for y in range(1, film.height, 2)]
@@ -84,7 +91,8 @@ def check_sums(scene):
     for tree, place in zip(trees, places, strict=True):
         expected = rendered(prepared, *place)
         assert np.array_equal(tree["value"], expected)
-        assert np.array_equal(np.multiply(tree["radiance"], tree["filter_weight"]), expected)
+        weight = tree["filter_weight"] * tree["exposure"]
+        assert np.array_equal(np.multiply(tree["radiance"], weight), expected)
     rays = [ray for tree in trees for ray in tree["rays"]]
     assert any(ray["adds"] for ray in rays)
     assert len(rays) > len(places) or spp == 1

@@ -2,6 +2,9 @@
 
 F7 of the stability suites has the laws of sets, volumes and films."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from builders import cube, write_obj
@@ -102,6 +105,13 @@ def test_in_groups_and_under_maps():
     assert hits.shape.tolist() == [-1, 1]
 
 
+def test_operators_work_before_a_scene_is_made():
+    """In a new process, which has imported nothing else."""
+    line = "import reference_rt as rt; print((rt.Box() - rt.Sphere()).type)"
+    found = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
+    assert found.stdout == "difference\n"
+
+
 # ---- what is refused ----------------------------------------------------------------------------
 
 
@@ -122,3 +132,14 @@ def test_operands_must_be_solids(tmp_path):
     assert "edge" in message
     with pytest.raises(rt.SceneError, match="shapes"):
         rt.Scene.parse("shapes: [{type: union, of: []}]")
+
+
+def test_a_solid_has_at_most_ten_thousand_operands():
+    """Beyond, a ray's walk would not fit into the stack of a thread."""
+    balls = [rt.Sphere()] * 10_001
+    message = refusal(shapes=(rt.Box(), rt.Union(of=balls)))
+    assert message == "shapes[1]: over 10,000 operands; expected fewer in one solid"
+    centers = np.random.default_rng(3).uniform(-1.0, 1.0, (3_000, 3)).tolist()
+    many = rt.Union(of=[rt.Sphere(center=c, radius=0.02) for c in centers])
+    hits = solid_of(many).intersect(np.full((20, 3), -3.0), 3.0 + np.array(centers[:20]))
+    assert hits.hit.all()

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from method_checks import CUBE, EXAMPLES, L_SHAPE, SCENE, TRIANGLE, UNIT_SPHERE
+from method_checks import CUBE, EXAMPLES, L_SHAPE, PICTURE, SCENE, TRIANGLE, UNIT_SPHERE
 
 import reference_rt as rt
 from reference_rt import textbook
@@ -13,14 +13,17 @@ from reference_rt import textbook
 def test_names():
     assert {f: len(textbook.names(f)) for f in EXAMPLES} == {
         "sphere": 3,
-        "box": 3,
-        "triangle": 5,
-        "polygon": 3,
+        "box": 4,
+        "triangle": 7,
+        "polygon": 4,
         "csg": 2,
         "hierarchy": 4,
+        "picture": 3,
     }
     assert set(textbook.names()) == set(textbook.METHODS)
-    assert {m.row for m in textbook.METHODS.values()} == {"T5", "T7", "T8", "T9", "T12", "T18"}
+    assert {m.row for m in textbook.METHODS.values()} == {
+        *("T3", "T5", "T7", "T8", "T9", "T12", "T18")
+    }
     for name, method in textbook.METHODS.items():
         assert method.name == name
         assert method.summary
@@ -46,6 +49,12 @@ def test_names():
         ),
         (r"takes CsgParameters, got Sphere", ("csg.intervals", UNIT_SPHERE)),
         (r"takes SceneParameters, got Box", ("hierarchy.sah", CUBE)),
+        (r"triangles and meshes", ("picture.rasterise", textbook.SceneParameters(SCENE))),
+        (r"1 rays; expected those of all", ("picture.rasterise", EXAMPLES["picture"])),
+        (
+            r"perspective, without clipping",
+            ("picture.cast", textbook.SceneParameters(PICTURE.changed(camera=rt.Orthographic()))),
+        ),
         (r"0\.577 off", ("polygon.winding", L_SHAPE._replace(rings=[[*np.eye(3), (0, 0, 0)]]))),
     ],
 )

@@ -65,6 +65,7 @@ INSIDE = {
     "polygon.even_odd": lambda w: w % 2 == 1,
     "polygon.winding": lambda w: w != 0,
     "polygon.angle_sum": lambda w: w != 0,
+    "polygon.along_normal": lambda w: w != 0,
 }
 
 
@@ -135,12 +136,12 @@ def test_rules_differ_where_they_must():
         ([[(0, 0), (3, 0), (3, 3), (0, 3)] * 2], (1, 1), (False, True)),
     ):
         shape = in_space(rings)
-        even_odd, winding, angle_sum = (
+        even_odd, winding, angle_sum, along_normal = (
             bool(np.isfinite(textbook.intersect(n, shape, [[*p, 5]], down)[0]))
             for n in textbook.names("polygon")
         )
         assert (even_odd, winding) == expected
-        assert angle_sum == winding
+        assert angle_sum == along_normal == winding
 
 
 TILES = [
@@ -193,3 +194,6 @@ def test_points_on_a_common_edge():
     assert np.mean(owners["polygon.even_odd"] == 2) > 0.05
     assert np.all(owners["polygon.angle_sum"] >= 1)
     assert np.mean(owners["polygon.angle_sum"] == 2) > 0.1
+    # Its frames are those of each triangle: neighbours do not share their rounded vertices.
+    assert np.mean(owners["polygon.along_normal"] == 0) > 0.02
+    assert np.mean(owners["polygon.along_normal"] == 2) > 0.02

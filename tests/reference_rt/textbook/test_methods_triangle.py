@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from fractions import Fraction as Q
 
 import numpy as np
 import pytest
@@ -11,6 +12,9 @@ from rational import cross, dot, q, sub
 
 import reference_rt as rt
 from reference_rt import textbook
+from reference_rt.core.ray import Ray
+from reference_rt.core.vec3 import Vec3
+from reference_rt.textbook import triangle
 
 
 def exact_triangle(v, o, d):
@@ -39,11 +43,18 @@ def triangle_cases(kind, n):
         yield v, p - d * rng.uniform(0.5, 3), d * 10.0 ** rng.uniform(-2, 2)
 
 
+BARYCENTRIC = {
+    f"triangle.{name}": getattr(triangle, name)
+    for name in ("areas", "projected_areas", "cramer", "lu", "moller_trumbore", "watertight")
+}
+
+
 @pytest.mark.parametrize("kind", ["any", "sliver", "grazing"])
 def test_triangle_is_exact_to_its_bound(kind):
     """Hits are right; t is off by 8 u L² S / |n·d|: L the longest edge, S the farthest vertex.
 
     Adding up all roundings gives 25 (watertight 60) in place of 8; measured over 1500 rays: 2.1.
+    So are the barycentrics, by what that moves the point.
     """
     relative = {name: [] for name in textbook.names("triangle")}
     hits = 0
@@ -60,6 +71,15 @@ def test_triangle_is_exact_to_its_bound(kind):
             assert error <= 8 * U * size2 * far / abs(n @ d)
             if exact != math.inf:
                 errors.append(error / float(exact) / U)
+            if kernel := BARYCENTRIC.get(name):
+                # The point is as far off as t |d| and the rounding of its coordinates, and the
+                # barycentrics by that over the height, |n| / L.
+                moved = 8 * U * far * (size2 * np.linalg.norm(d) / abs(n @ d) + 1)
+                ray = Ray(Vec3(*map(np.float64, o)), Vec3(*map(np.float64, d)), math.inf)
+                found = kernel(ray, *triangle.prepare(textbook.TriangleParameters(*v)))
+                if found.t != math.inf:
+                    wrong = max(abs(Q(float(x)) - y) for x, y in ((found.u, u), (found.v, w)))
+                    assert wrong <= moved * np.sqrt(size2) / np.linalg.norm(n)
     assert 30 < hits <= 120
     if kind == "sliver":
         # t by elimination does not feel that the triangle is thin; determinants do.
@@ -109,9 +129,10 @@ def test_triangle_leaks(offset):
         lost[name] = np.sum(np.isinf(np.min(t, axis=0)))
     assert lost.pop("triangle.watertight") == 0
     assert all(n > 0 for n in lost.values())
-    assert lost["triangle.two_step"] == max(lost.values())
+    by_plane = [lost.pop(f"triangle.{m}") for m in ("two_step", "areas", "projected_areas")]
+    assert min(by_plane) > max(lost.values())
     if offset == (0, 0, 0):
-        assert lost["triangle.two_step"] > 0.05 * len(o)
+        assert min(by_plane) > 0.05 * len(o)
         assert lost["triangle.lu"] < lost["triangle.cramer"] < 0.1 * len(o)
 
 

@@ -142,10 +142,15 @@ def _alone(tables: SceneTables, k: int, o: FloatArray, d: FloatArray) -> Lists:
     alone = solids._replace(
         first=solids.first + k,
         operands=one,
-        step_first=zero,
-        step_count=one,
-        depth=one,
-        steps=zero,
+        tree=-one,
+        asked_first=zero,
+        asked_count=one,
+        asked=solids.first[:1] + k,
+        gate_first=zero,
+        gates=one,
+        up=np.zeros_like(solids.up),
+        gate_up=-one,
+        gate_start=zero,
     )
     geometry = tables.geometry._replace(solids=alone)
     return _lists(solid_crossings(dataclasses.replace(tables, geometry=geometry), 0, o, d, MOST))
