@@ -30,7 +30,7 @@ from comparisons.translator.notes import notes_of
 from comparisons.translator.reference import changes_to, own_scene
 from reference_rt.cameras.film import BoxFilter, Film
 from reference_rt.cli.explain import explain
-from reference_rt.integrators import RayCast, Whitted
+from reference_rt.integrators import Light, RayCast, Whitted
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid, Sobol
@@ -82,7 +82,8 @@ def budgeted(scene: Scene, budget: Budget) -> Scene:
 
     With a filter wider than a pixel, Mitsuba's neighbouring pixels share samples and hence noise,
     but the statistics need independent pixels.  The scene's own filter and layers have rungs of
-    their own.
+    their own.  Caustics of points, which no path from the camera finds, are left out of light
+    tracing, since Mitsuba's path tracer stands beside it.
     """
     film: dict[str, object] = {"filter": BoxFilter(), "layers": ()}
     if budget.size is not None:
@@ -98,7 +99,11 @@ def budgeted(scene: Scene, budget: Budget) -> Scene:
             pixels = math.prod(budget.size)
         spp = budget.spp or part_of(sampler.spp, budget.parts, pixels)
         sampler = sampler.model_copy(update={"spp": spp})
-    return scene.changed(film=scene.film.model_copy(update=film), sampler=sampler)
+    scene = scene.changed(film=scene.film.model_copy(update=film), sampler=sampler)
+    if isinstance(scene.integrator, Light):
+        found = scene.integrator.model_copy(update={"caustics_of_points": False})
+        return scene.changed(integrator=found)
+    return scene
 
 
 def gather(
@@ -172,6 +177,8 @@ def _gather(
         notes.insert(0, "compared with random samples in place of a grid, as Mitsuba has them")
     if scene.integrator.deterministic and not isinstance(subject.scene.resolved_sampler, Grid):
         notes.insert(0, "compared with a grid of samples in each pixel, whose rays both trace")
+    if isinstance(scene.integrator, Light):
+        notes.append("compared without caustics of lamps without extent, which no path finds")
     if moved > 0.0:
         notes.append(
             f"compared with the vertices of meshes rounded to float32, as Mitsuba holds them: they "
@@ -179,7 +186,7 @@ def _gather(
         )
     films = (subject.scene.film, (subject.reference or subject.scene).film)
     rungs = _deterministic_rungs(
-        subject.scene, scene, tables, counterpart, films, budget, only, say
+        subject.scene, scene, tables, counterpart, films, budget, only, say, threads
     )
     pictured = not only or not {"statistics", "images"}.isdisjoint(only)
     reason = _no_pictures(counterpart, scene)
@@ -254,6 +261,7 @@ def _deterministic_rungs(
     budget: Budget,
     only: tuple[str, ...],
     say: Say,
+    threads: int | None,
 ) -> list[RungResult]:
     """Files, film, geometry, light, layers; each only if the rungs below it hold: a wrong
     convention must not be reported as wrong light.  written: the scene as its author wrote it."""
@@ -265,6 +273,7 @@ def _deterministic_rungs(
         ),
         "direct": lambda: ladder.direct(scene, tables, counterpart, budget.light_pixels),
         "sampling": lambda: ladder.sampling(scene, tables),
+        "transport": lambda: ladder.transport(scene, tables, threads),
         "whitted": lambda: ladder.whitted(scene, tables, counterpart, budget.pixels),
     }
     if any(not isinstance(film_filter, BoxFilter) for film_filter in film_filters):

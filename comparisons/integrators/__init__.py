@@ -8,13 +8,13 @@ from typing import Any
 
 from comparisons.integrators.direct import DIRECT
 from comparisons.integrators.integrator import Data, IntegratorType
-from comparisons.integrators.light import LIGHT
+from comparisons.integrators.light import LIGHT, by_particles
 from comparisons.integrators.path import PATH
 from comparisons.integrators.ray_cast import LAYER_OF, RAY_CAST, SHOWN
 from comparisons.integrators.whitted import WHITTED
 from comparisons.mitsuba.context import UntranslatableError
 from comparisons.mitsuba.node import Node, Reading
-from reference_rt.integrators import AnyIntegrator, Direct, Path, RayCast
+from reference_rt.integrators import AnyIntegrator, Direct, Light, Path, RayCast
 
 INTEGRATORS: tuple[IntegratorType[Any], ...] = (PATH, LIGHT, DIRECT, WHITTED, RAY_CAST)
 """All integrators."""
@@ -40,6 +40,11 @@ def translate_integrator(integrator: Any) -> Data | None:
     """
     to_mitsuba = type_of(integrator).to_mitsuba
     return None if to_mitsuba is None else to_mitsuba(integrator)
+
+
+def particles_of(integrator: Any) -> Light:
+    """Light tracing with an integrator's expected picture.  Raises NoCounterpartError."""
+    return by_particles(integrator, type_of(integrator).edges)
 
 
 def read_integrator(reading: Reading, node: Node | None) -> tuple[AnyIntegrator, tuple[str, ...]]:

@@ -9,7 +9,7 @@ MOST_ROULETTE = 4096
 """Our largest `rr_depth`."""
 
 
-def _to_mitsuba(integrator: Path) -> Data:
+def translate_path(integrator: Path) -> Data:
     """The sampling strategy of ours does not change the mean."""
     depth = -1 if integrator.max_depth is None else integrator.max_depth
     found = {"type": "path", "max_depth": depth, "rr_depth": integrator.rr_depth}
@@ -17,7 +17,7 @@ def _to_mitsuba(integrator: Path) -> Data:
 
 
 def _of_solids(integrator: Path) -> Data:
-    return {**_to_mitsuba(integrator), "type": "path_of_solids"}
+    return {**translate_path(integrator), "type": "path_of_solids"}
 
 
 def _from_mitsuba(reading: Reading, node: Node) -> Path:
@@ -46,7 +46,7 @@ def _without_media(reading: Reading, node: Node) -> Path:
 
 PATH = IntegratorType(
     description=Path,
-    to_mitsuba=_to_mitsuba,
+    to_mitsuba=translate_path,
     of_solids=_of_solids,
     from_mitsuba={
         "path": _from_mitsuba,

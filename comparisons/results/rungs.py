@@ -2,7 +2,8 @@
 
 RUNGS = (
     *("scene", "run", "input", "files", "film", "solids", "geometry"),
-    *("direct", "sampling", "whitted", "layers", "statistics", "images", "witness"),
+    *("direct", "sampling", "transport", "whitted", "layers"),
+    *("statistics", "images", "witness"),
 )
 """The ladder, in order: a failure is reported at the first rung that breaks.  `scene` exists only
 if the scene or one of its files is invalid, `run` only if the case could not be completed; `input`

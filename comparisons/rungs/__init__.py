@@ -4,6 +4,7 @@ A rung is one test of the ladder `comparisons.results.rungs.RUNGS`.  `files` hol
 against second sources of what the scene's files and descriptions say.  `film`, `geometry`, `direct`
 and `whitted` compare without noise, ray by ray, and so does `solids`, with raysect; `sampling`
 holds our samples of lights and materials against their densities, and counts Russian roulette;
+`transport` holds our paths from the camera against particles from the lamps;
 `layers` compares what is written beside the colour; `input` checks the pictures themselves,
 `images` compares them by metrics, `comparisons.statistics` their means; `witness` asks a third
 renderer.  `limited` changes `differ` to `reference-limited` above a rung that shows that Mitsuba's
@@ -27,6 +28,17 @@ from comparisons.rungs.geometry import geometry
 from comparisons.rungs.layers import layers
 from comparisons.rungs.sampling import sampling
 from comparisons.rungs.solids import solids
+from comparisons.rungs.transport import transport
 from comparisons.rungs.whitted import whitted
 
-__all__ = ["direct", "files", "film", "geometry", "layers", "sampling", "solids", "whitted"]
+__all__ = [
+    "direct",
+    "files",
+    "film",
+    "geometry",
+    "layers",
+    "sampling",
+    "solids",
+    "transport",
+    "whitted",
+]

@@ -84,7 +84,7 @@ from reference_rt.sampling import Samplers, draw_pair, sampler_of
 class Light(Description):
     """Light tracing: particles from the lamps, each connected with the camera at every surface.
 
-    The expected picture is that of `path`.  What is seen in perfect mirrors and through glass is
+    The expected picture is that of `path`, and has caustics of lamps without extent besides.  What is seen in perfect mirrors and through glass is
     traced from the camera as there, since no particle finds the camera so.
     """
 
@@ -98,15 +98,19 @@ class Light(Description):
     rr_depth: Annotated[int, Field(ge=1, le=4096)] = 5
     """Edges, counted from the lamp, after which Russian roulette may end a particle, from 1 to
     4096.  The mean does not depend on it."""
+    caustics_of_points: bool = True
+    """Whether light of lamps without extent that a mirror or glass is the first to meet is there.
+    `path` never finds it; without it the expected picture is that of `path`."""
 
     def setup(self) -> "LightSetup":
         limit = UNLIMITED if self.max_depth is None else min(self.max_depth, UNLIMITED)
-        return LightSetup(limit, self.rr_depth)
+        return LightSetup(limit, self.rr_depth, self.caustics_of_points)
 
 
 class LightSetup(NamedTuple):
     max_depth: int
     rr_depth: int
+    caustics_of_points: bool
 
 
 @kernel
@@ -196,7 +200,8 @@ def _emit(
     scene: KernelScene, emission: Emission, samplers: Samplers, n: int, scratch: Scratch
 ) -> int:
     """The particles' first rays; how many there are.  A state's `previous` is the power of its
-    particle at the lamp, `throughput` what is left of it."""
+    particle at the lamp, `throughput` what is left of it, and `bsdf_pdf` 0 for a lamp without
+    extent, which no sampled direction finds."""
     going = 0
     for j in range(n):
         sampler = sampler_of(samplers, j)
@@ -205,7 +210,8 @@ def _emit(
         sent = emit(scene.lights, emission, scene.shapes, scene.textures, u_pick, at, around)
         if not is_black(sent.power):
             put_ray(scratch.rays, going, sent.ray)
-            state = State(Vec3(1.0, 1.0, 1.0), 1.0, 0.0, sent.power, sent.ray.d)
+            found = 0.0 if sent.is_delta else 1.0
+            state = State(Vec3(1.0, 1.0, 1.0), 1.0, found, sent.power, sent.ray.d)
             put_state(scratch, going, j, state)
             going += 1
     return going
@@ -345,7 +351,8 @@ def _go_on(
         if scratch.scattered.codes[j] < 0:
             continue
         drawn, state, k = drawn_in(scratch.scattered, j), state_of(scratch, j), scratch.samples[j]
-        if drawn.pdf == 0.0:
+        is_lost = drawn.is_delta and depth == 1 and state.bsdf_pdf == 0.0
+        if drawn.pdf == 0.0 or (is_lost and not light.caustics_of_points):
             continue
         point, l = point_of(scratch.points, j), -vector_of(scratch.rays.numbers, 3, j)
         share = abs(dot(drawn.wi, point.n) / dot(l, point.n))

@@ -52,11 +52,12 @@ def no_emission(n: int) -> Emission:
 
 
 class Emitted(NamedTuple):
-    """A ray from a lamp, and its power over its density, in W, linear sRGB; black if none is
-    sent."""
+    """A ray from a lamp.  power: over its density, in W, linear sRGB; black if none is sent;
+    is_delta: whether the lamp has no extent."""
 
     ray: Ray
     power: Vec3
+    is_delta: bool
 
 
 @kernel
@@ -76,18 +77,19 @@ def emit(
     if emission.is_far[k] != 0.0:
         far = sample_one(lights, k, shapes, textures, centre, at[0], at[1])
         if far.pdf == 0.0:
-            return Emitted(Ray(centre, far.wi, 0.0), Vec3(0.0, 0.0, 0.0))
+            return Emitted(Ray(centre, far.wi, 0.0), Vec3(0.0, 0.0, 0.0), False)
         x, y = concentric_disk(around[0], around[1])
         o = centre + to_world(frame_from_normal(far.wi), Vec3(x, y, 1.0)) * radius
         area = math.pi * radius * radius
-        return Emitted(Ray(o, -far.wi, math.inf), far.radiance * (area / (far.pdf * chance)))
+        power = far.radiance * (area / (far.pdf * chance))
+        return Emitted(Ray(o, -far.wi, math.inf), power, far.is_delta)
     below = around[0] * emission.height[k]
     across, (cosine, sine) = math.sqrt(below * (2.0 - below)), on_circle(around[1])
     frame = frame_from_normal(row(emission.axis, k))
     n = to_world(frame, Vec3(across * cosine, across * sine, 1.0 - below))
     near = sample_one(lights, k, shapes, textures, centre + n * radius, at[0], at[1])
     if near.pdf == 0.0:
-        return Emitted(Ray(centre, n, 0.0), Vec3(0.0, 0.0, 0.0))
+        return Emitted(Ray(centre, n, 0.0), Vec3(0.0, 0.0, 0.0), False)
     area = 2.0 * math.pi * emission.height[k] * radius * radius
     power = near.radiance * (abs(dot(n, near.wi)) * area / (near.pdf * chance))
-    return Emitted(Ray(near.target, -near.wi, math.inf), power)
+    return Emitted(Ray(near.target, -near.wi, math.inf), power, near.is_delta)

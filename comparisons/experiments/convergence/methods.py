@@ -19,6 +19,7 @@ from comparisons.experiments.convergence.store import (
     size_within,
     weights,
 )
+from comparisons.integrators import particles_of
 from comparisons.mitsuba.backend import LLVM, SCALAR
 from comparisons.renderers import NoCounterpartError, other
 from comparisons.renderers import Renderer as Other
@@ -29,7 +30,7 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.render import Progress, render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Independent, Sobol
-from reference_rt.util.errors import ReferenceUnavailableError, UsageError
+from reference_rt.util.errors import ReferenceUnavailableError, SceneError, UsageError
 
 
 class Shot(NamedTuple):
@@ -55,12 +56,14 @@ BEST = "best"
 @dataclass(frozen=True)
 class Method:
     """name: for files and options;  title: for people;  sampler: its name, or BEST;  side: "ours",
-    CYCLES, or the Mitsuba variant, methods of which share what is loaded."""
+    CYCLES, or the Mitsuba variant, methods of which share what is loaded;  by_particles: from the
+    lamps, in place of the scene's integrator."""
 
     name: str
     title: str
     sampler: str
     side: str
+    by_particles: bool = False
 
     @property
     def is_independent(self) -> bool:
@@ -93,6 +96,7 @@ METHODS = (
     Method("mitsuba_scalar", "Mitsuba scalar, independent (default)", "independent", SCALAR),
     Method("mitsuba_scalar_best", "Mitsuba scalar, its best sampler", BEST, SCALAR),
     Method("cycles", "Cycles, Sobol' (default)", "sobol", CYCLES),
+    Method("ours_light", "ours, particles from the lamps", "sobol", "ours", by_particles=True),
 )
 
 NAMES = tuple(method.name for method in METHODS)
@@ -146,8 +150,11 @@ class Stable:
 
     def ready(self, method: Method, progress: Progress | None = None) -> Renderer:
         """Load and compile.  Raises SceneError, AbsentError."""
+        if method.by_particles:
+            with _absent():
+                return self._by_particles(method, progress)
         if method.side == "ours":
-            return self._ours(method, progress)
+            return self._ours(self._scene, method, progress)
         renderer: Other = (
             other(CYCLES) if method.side == CYCLES else Native(method.side, method.sampler)
         )
@@ -162,11 +169,18 @@ class Stable:
 
         return shot
 
-    def _ours(self, method: Method, progress: Progress | None) -> Renderer:
+    def _by_particles(self, method: Method, progress: Progress | None) -> Renderer:
         scene = self._scene
+        light = scene.changed(integrator=particles_of(scene.integrator))
+        try:
+            return self._ours(light, method, progress)
+        except SceneError as error:
+            raise AbsentError(error.message) from None
+
+    def _ours(self, scene: Scene, method: Method, progress: Progress | None) -> Renderer:
         make: Callable[..., Sobol | Independent]
         make = Sobol if method.sampler == "sobol" else Independent
-        tables = scene.tables
+        tables = self._scene.tables
         # Far from the seeds that users choose, and from those of the reference.
         first = FIRST_SEED if method.sampler == "sobol" else 2 * FIRST_SEED
 

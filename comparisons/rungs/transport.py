@@ -1,0 +1,157 @@
+"""The rung `transport`: the picture by paths from the camera against that by particles from the
+lamps.
+
+Both have the same expectation (Veach 1997, 4.7), by other samples: particles know no light
+sampling, no multiple importance sampling, and no density with which another strategy would have
+found a path.  What our path tracer and Mitsuba's have wrong alike, since both are written from the
+same books, is seen here.
+
+Particles say little of what few of them reach, and paths little of what few of them find.  The
+statistics know both, by the noise of replicates and by light that few replicates met.  What they
+cannot tell is no difference, and the reason says how large a bias could be overlooked.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from comparisons.integrators import particles_of
+from comparisons.integrators.light import as_path
+from comparisons.renderers import NoCounterpartError
+from comparisons.results.case import RungResult
+from comparisons.statistics.cells import Margins
+from comparisons.statistics.decide import compare
+from reference_rt.cameras.film import BoxFilter
+from reference_rt.core.arrays import FloatArray
+from reference_rt.integrators import Direct, Light, Path
+from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.rendering.render import render
+from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import Sobol
+from reference_rt.util.errors import SceneError
+
+LONGER = 24
+"""Pixels along the picture's longer side: few, so that many particles are seen in each."""
+
+TILE = 8
+"""Pixels along a tile's side, of those whose means are compared."""
+
+SAMPLES = 1 << 13
+"""Paths, and particles, of a replicate."""
+
+REPLICATES = 32
+
+AGAIN = 8
+"""Times as many samples, with other seeds, with which a difference must be seen again: light that
+few samples find looks like one, and is then another."""
+
+EXACT = Margins(image=0.0, tile=0.0, pixel=0.0, stored=0.0, constant=1e-9)
+"""Both sides compute in float64, and leave surfaces by some 1e-15 of the scene: the rays that this
+sends elsewhere, at the edges of shadows, are far fewer than 1e-9."""
+
+FIRST_SEED = 7 << 40
+"""Far from the seeds of users and of other experiments."""
+
+WORST = 0.5
+"""The largest bias that may be overlooked, of the image mean and of half of the tiles, for which
+agreement still says something."""
+
+
+def transport(scene: Scene, tables: SceneTables, threads: int | None = None) -> RungResult:
+    """Compare small pictures by the scene's integrator and by `light`.  threads: None for all
+    cores.  Raises SceneError."""
+    paths = _small(scene)
+    try:
+        light = particles_of(paths.integrator)
+    except NoCounterpartError as error:
+        return RungResult("transport", "not-applicable", str(error))
+    if light.max_depth is not None and light.max_depth < 2:
+        return RungResult("transport", "not-applicable", "no light falls on any surface")
+    sides = paths, paths.changed(integrator=light)
+    try:
+        found, reached = _look(sides, tables, SAMPLES, FIRST_SEED, threads)
+        if found.status == "differ":
+            more = AGAIN * SAMPLES
+            found, reached = _look(sides, tables, more, FIRST_SEED + 2 * REPLICATES, threads)
+    except SceneError as error:
+        return RungResult("transport", "not-applicable", f"no particles: {error.message}")
+    return _judged(found, reached)
+
+
+def _small(scene: Scene) -> Scene:
+    """The scene's small picture, by `path` where it is by `light`, and with hidden lamps shown."""
+    integrator, film = scene.integrator, scene.film
+    if isinstance(integrator, Light):
+        integrator = as_path(integrator)
+    elif isinstance(integrator, Path | Direct):
+        integrator = integrator.model_copy(update={"hide_emitters": False})
+    share = min(1.0, LONGER / max(film.width, film.height))
+    small: dict[str, Any] = {
+        "width": max(1, round(share * film.width)),
+        "height": max(1, round(share * film.height)),
+        "filter": BoxFilter(),
+        "layers": (),
+    }
+    return scene.changed(film=film.model_copy(update=small), integrator=integrator)
+
+
+def _look(
+    sides: tuple[Scene, Scene], tables: SceneTables, samples: int, seed: int, threads: int | None
+) -> tuple[RungResult, float]:
+    """What the statistics say of replicates, and the share of the lit pixels that some particle
+    reaches, or the camera's own part.  Raises SceneError."""
+    pictures: list[FloatArray] = []
+    for side in sides[::-1]:  # first that which may be refused
+        spp = max(1, samples // (side.film.width * side.film.height))
+        pictures.append(
+            np.array(
+                [
+                    render(
+                        side.changed(sampler=Sobol(spp=spp, seed=seed + k)),
+                        tables=tables,
+                        threads=threads,
+                    ).colour
+                    for k in range(REPLICATES)
+                ]
+            )
+        )
+        seed += REPLICATES
+    particles, paths = pictures
+    lit = paths.any(axis=(0, -1))
+    reached = particles.any(axis=(0, -1))[lit]
+    found = compare(paths, particles, limit=WORST, tile=TILE, margins=EXACT)
+    return found, float(reached.mean()) if len(reached) else 1.0
+
+
+def _judged(found: RungResult, reached: float) -> RungResult:
+    """The result in the rung's words."""
+    numbers: dict[str, Any] = {"lit_pixels_reached": reached}
+    if "image" not in found.numbers:
+        return RungResult("transport", found.status, found.reason, numbers)
+    for scale in ("image", "tiles", "pixels"):
+        numbers[scale] = found.numbers.get(scale)
+    if found.status in ("differ", "invalid"):
+        reason = f"paths from the camera against particles from the lamps: {found.reason}"
+        return RungResult("transport", found.status, reason, numbers)
+    of_image = _largest(found.numbers["detectable_bias"])
+    of_tiles = _largest(numbers["tiles"] and numbers["tiles"]["median_detectable_bias"])
+    if not min(of_image, of_tiles) <= WORST:
+        reason = f"particles tell too little: they reach {reached:.0%} of the lit pixels"
+        return RungResult("transport", "not-applicable", f"{reason}, and are noisy there", numbers)
+    told = [
+        f"{bias:.2g} of {what}"
+        for bias, what in ((of_image, "the image mean"), (of_tiles, "half of the tiles"))
+        if bias <= WORST
+    ]
+    reason = (
+        f"particles from the lamps agree with paths from the camera; seen would be a bias of "
+        f"{' or '.join(told)}; they reach {reached:.0%} of the lit pixels"
+    )
+    return RungResult("transport", "agree", reason, numbers)
+
+
+def _largest(values: Any) -> float:
+    """Of channels; infinite for what is not known."""
+    several = list(values.values()) if isinstance(values, dict) else [values]
+    return max(math.inf if value is None else float(value) for value in several)
