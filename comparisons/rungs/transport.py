@@ -61,6 +61,8 @@ agreement still says something."""
 def transport(scene: Scene, tables: SceneTables, threads: int | None = None) -> RungResult:
     """Compare small pictures by the scene's integrator and by `light`.  threads: None for all
     cores.  Raises SceneError."""
+    if tables.lights.choice is None:
+        return RungResult("transport", "not-applicable", "the scene has no light")
     paths = _small(scene)
     try:
         light = particles_of(paths.integrator)

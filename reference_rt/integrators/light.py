@@ -84,8 +84,9 @@ from reference_rt.sampling import Samplers, draw_pair, sampler_of
 class Light(Description):
     """Light tracing: particles from the lamps, each connected with the camera at every surface.
 
-    The expected picture is that of `path`, and has caustics of lamps without extent besides.  What is seen in perfect mirrors and through glass is
-    traced from the camera as there, since no particle finds the camera so.
+    The expected picture is that of `path`, and has caustics of lamps without extent besides.  What
+    is seen in perfect mirrors and through glass is traced from the camera as there, since no
+    particle finds the camera so.
     """
 
     EXAMPLES: ClassVar[Examples] = ({}, {"max_depth": 3, "rr_depth": 2})

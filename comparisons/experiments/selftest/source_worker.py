@@ -8,23 +8,26 @@ import sys
 from pathlib import Path
 
 from comparisons.compare.budget import Budget
-from comparisons.compare.compare import Subject
+from comparisons.compare.compare import Subject, compare_scene
 from comparisons.experiments.selftest.fault import SourceFault, compared, finding
 from reference_rt.rendering.scene import Scene
 
 
 def main() -> None:
-    """{"fault", "scenes", "budgets": {suite: budget}, "threads", "until_caught"} on standard
-    input."""
+    """{"fault", "scenes", "budgets": {suite: budget}, "threads", "until_caught", "rungs": only
+    these} on standard input."""
     task = json.load(sys.stdin)
     fault = SourceFault(**task["fault"])
     scene = Scene.load(Path(task["scenes"]) / f"{fault.scene}.yaml")
     found = []
     for suite, fields in task["budgets"].items():
         budget = Budget.model_validate(fields)
-        case = compared(Subject(scene), budget, task["threads"])
+        if rungs := tuple(task.get("rungs", ())):
+            case = compare_scene(Subject(scene), budget, lambda step: None, task["threads"], rungs)
+        else:
+            case = compared(Subject(scene), budget, task["threads"])
         found.append(finding(fault, suite, case))
-        if task["until_caught"] and found[-1].caught:
+        if task.get("until_caught") and found[-1].caught:
             break
     json.dump([one.as_json() for one in found], sys.stdout)
 
