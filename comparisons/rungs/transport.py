@@ -62,7 +62,9 @@ def transport(scene: Scene, tables: SceneTables, threads: int | None = None) -> 
     """Compare small pictures by the scene's integrator and by `light`.  threads: None for all
     cores.  Raises SceneError."""
     if tables.lights.choice is None:
-        return RungResult("transport", "not-applicable", "the scene has no light")
+        return RungResult(
+            "transport", "not-applicable", "there is no lamp that particles could leave"
+        )
     paths = _small(scene)
     try:
         light = particles_of(paths.integrator)

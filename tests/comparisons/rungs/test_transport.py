@@ -72,9 +72,9 @@ def test_what_has_no_particles_is_left_out_with_a_reason() -> None:
         ({"integrator": rt.RayCast()}, "'ray_cast' does not follow light"),
         ({"integrator": rt.Path(max_depth=1)}, "no light falls on any surface"),
         ({"integrator": rt.Direct(shadows=False)}, "without shadows"),
-        ({"shapes": (rt.Torus(material="lamp"),)}, "cannot draw points"),
+        ({"shapes": (rt.Torus(material="lamp"), LAMP)}, "cannot draw points"),
         ({"shapes": (rt.Plane(material="grey"),), "lights": sun}, "has no end"),
-        ({"shapes": (FLOOR,)}, "no light"),
+        ({"shapes": (FLOOR,)}, "no lamp that particles could leave"),
     ):
         result = found(room(**parts))
         assert result.status == "not-applicable"
