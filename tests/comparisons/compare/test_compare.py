@@ -94,7 +94,7 @@ def test_scenes_agree(tmp_path: Path) -> None:
     assert [case["verdict"] for case in found["cases"]] == ["agree", "agree"]
     case = found["cases"][0]
     assert set(case) >= {"scene", "verdict", "reason", "tiers", "metrics", "seconds"}
-    of_light = ["direct", "sampling", "whitted", "statistics", "images"]
+    of_light = ["direct", "sampling", "transport", "whitted", "statistics", "images"]
     assert list(case["tiers"]) == ["input", "files", "solids", "geometry", *of_light]
     assert set(case["metrics"]) >= {"ssim", "flip", "psnr", "rmse", "relmse", "mean_bias"}
     geometry = case["tiers"]["geometry"]
