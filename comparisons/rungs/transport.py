@@ -122,8 +122,8 @@ def _look(
         )
         seed += REPLICATES
     particles, paths = pictures
-    lit = paths.any(axis=(0, -1))
-    reached = particles.any(axis=(0, -1))[lit]
+    lit = np.count_nonzero(paths, axis=(0, -1)) > 0
+    reached = np.count_nonzero(particles, axis=(0, -1))[lit] > 0
     found = compare(paths, particles, limit=WORST, tile=TILE, margins=EXACT)
     return found, float(reached.mean()) if len(reached) else 1.0
 
