@@ -60,13 +60,17 @@ class Renderer(Protocol):
         SceneError for a file that cannot be used."""
 
 
-PLACES = {"mitsuba": "comparisons.translator.native", "cycles": "comparisons.cycles.backend"}
+PLACES = {
+    "mitsuba": "comparisons.translator.native",
+    "cycles": "comparisons.cycles.backend",
+    "povray": "comparisons.povray.backend",
+}
 """The modules of the other renderers, by name.  Imported when one is needed."""
 
 ReferenceSampler = Literal["independent", "multijitter"]
 """Mitsuba's samplers of a comparison, see `comparisons.compare.budget`."""
 
-WitnessName = Literal["cycles"]
+WitnessName = Literal["cycles", "povray"]
 """Those that are no party to a comparison, and may be asked who is right."""
 
 

@@ -36,13 +36,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from comparisons.gate.reference import is_noise_free
 from comparisons.results.case import FloatArray, RungResult
 from comparisons.statistics.cells import CHANNELS
 from reference_rt.cameras.film import BoxFilter
 from reference_rt.integrators import Direct, RayCast
 from reference_rt.rendering.image import srgb
 from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import Grid
 from reference_rt.textures.image_file import linear
 
 BoolArray = npt.NDArray[np.bool_]
@@ -126,6 +126,11 @@ Curve = Callable[[FloatArray], FloatArray]
 
 Look = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """The radiance (..., 3) at points of the film, and the distance (...) of what is seen there."""
+
+
+def is_noise_free(scene: Scene) -> bool:
+    """Whether a correct picture of the scene has no noise, because its samples are fixed."""
+    return scene.integrator.type == "ray_cast" or isinstance(scene.resolved_sampler, Grid)
 
 
 def look_at(scene: Scene, threads: int | None = None) -> Look | None:
