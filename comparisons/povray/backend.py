@@ -7,29 +7,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from comparisons.povray import run, translate
-from comparisons.renderers import NoCounterpartError, Replicates
+from comparisons.renderers import FirstHits, NoCounterpartError, Replicates
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
-
-
-class FirstHits(NamedTuple):
-    """What the pixels' centres show, in scene units.
-
-    scene: with the shapes alone that POV-Ray has;  p, n (height, width, 3): points, and normals
-    towards the camera;  hit, front (height, width): whether there is one, and on its front;
-    left_out: of other shapes the reason, and how many;  rounding: of a coordinate.
-    """
-
-    scene: Scene
-    p: FloatArray
-    n: FloatArray
-    hit: npt.NDArray[np.bool_]
-    front: npt.NDArray[np.bool_]
-    left_out: dict[str, int]
-    rounding: float
 
 
 @dataclass(frozen=True)
@@ -63,13 +45,14 @@ class PovRay:
         front = shown[3].any(axis=-1)
         n = np.where(front[..., None], -np.cos(np.pi * shown[3]), 0.0)
         return FirstHits(
-            given.scene,
+            given.shapes,
             p.reshape(film.height, film.width, 3),
             n,
-            shown[:3].any(axis=(0, 3)),
+            np.asarray(shown[:3].any(axis=(0, 3))),
             front,
             given.left_out,
-            span * 2.0**-40 / given.frame.scale,
+            given.rounding / given.frame.scale,
+            *given.frame.out(np.outer([-translate.RANGE, translate.RANGE], np.ones(3))),
         )
 
 

@@ -19,7 +19,7 @@ from comparisons import shapes
 from comparisons.cameras import type_of as type_of_camera
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import Copy, Leaf, Member, Tree, copies_of, place_of
-from comparisons.geometry.frame import Frame
+from comparisons.geometry.frame import UNIT_ROUNDOFF, Frame
 from comparisons.integrators import type_of as type_of_integrator
 from comparisons.lights import type_of as type_of_light
 from comparisons.lights.constant import ambient_of
@@ -31,6 +31,7 @@ from comparisons.renderers.vocabulary import PovLook, pov_vector
 from comparisons.textures import type_of as type_of_texture
 from comparisons.translator.moved import moved
 from reference_rt.cameras.film import BoxFilter
+from reference_rt.core.arrays import FloatArray
 from reference_rt.core.model import name_of
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Mesh, Triangle
@@ -131,14 +132,15 @@ def picture(scene: Scene) -> str:
     """The text of a scene whose picture has the radiance of pixels' centres.  Raises
     NoCounterpartError with all reasons."""
     writing = Writing(moved(scene, frame_of(scene)))
-    scene, settings, lines = writing.scene, "", []
+    scene, settings = writing.scene, ""
+    lines: list[str] = []
+    backgrounds: list[str] = []
     with writing.collected():
         if (to_povray := type_of_integrator(scene.integrator).to_povray) is None:
             raise NoCounterpartError(f"the integrator {scene.integrator.type}")
         settings = to_povray(scene.integrator)
     with writing.collected():
         lines.append(camera(scene))
-    backgrounds = []
     for light in scene.lights:
         with writing.collected():
             known = type_of_light(light)
@@ -290,11 +292,13 @@ def _check_glass(
 
 
 class Hits(NamedTuple):
-    """text: a scene of FRAMES frames, see `hits`;  scene: ours, without the shapes that POV-Ray
-    lacks;  frame: POV-Ray's coordinates;  left_out: of other shapes, the reason and how many."""
+    """text: a scene of FRAMES frames, see `hits`;  shapes: the indices of those in it;  frame:
+    POV-Ray's coordinates, and rounding (shapes,): of each there;  left_out: of other shapes, the
+    reason and how many."""
 
     text: str
-    scene: Scene
+    shapes: tuple[int, ...]
+    rounding: FloatArray
     frame: Frame
     left_out: dict[str, int]
 
@@ -330,13 +334,18 @@ def hits(scene: Scene) -> Hits:
     some = scene.changed(shapes=tuple(scene.shapes[k] for k in kept), film=film)
     frame = frame_of(some)
     there = moved(some, frame)
+    rounding = np.full(len(kept), 2.0 * RANGE * 2.0**-40)
+    for copy in copies_of(there):
+        leaves = (leaf for member in copy.members for leaf in member.leaves)
+        if any(isinstance(leaf.shape, Mesh | Triangle) for leaf in leaves):
+            rounding[copy.shape] += 2.0 * SIZE * UNIT_ROUNDOFF  # POV-Ray's vertices are float32
     lines = [camera(there), _SHOWN]
     lines += [
         _of_member(member, copy, there, lambda leaf, m: _BOTH)
         for copy in copies_of(there)
         for member in copy.members
     ]
-    return Hits(_text("max_trace_level 1", lines), some, frame, left_out)
+    return Hits(_text("max_trace_level 1", lines), tuple(kept), rounding, frame, left_out)
 
 
 def _averaged(patterns: Sequence[str]) -> str:

@@ -295,6 +295,27 @@ def edges_rung(
     return RungResult("statistics", "differ" if faults else "agree", reason, numbers)
 
 
+MOST_STRAYS = 1 << 10
+"""Pixels of a picture of the same samples that are looked at: more are no matter of edges."""
+
+
+def strays(
+    candidate: FloatArray, reference: FloatArray, edges: Edges
+) -> tuple[BoolArray, BoolArray]:
+    """Of a picture whose samples are at the reference's places: which pixels (height, width)
+    differ, and in which of these an edge explains it, on which a sample falls to either side."""
+    floor = DARK * np.abs(reference.mean(axis=(0, 1))) if edges.floor is None else edges.floor
+    law = _Law(edges.tolerance, floor, False, None)
+    differs = np.any(law.beyond(candidate, reference, reference), axis=-1)
+    explained = np.zeros_like(differs)
+    row, column = np.nonzero(differs)
+    if 0 < len(row) <= MOST_STRAYS:
+        values = candidate[row, column]
+        seen = _seen(edges.look, law, row, column, values)
+        explained[row, column] = seen.step & ~law.beyond(values, *seen.edge).any(axis=-1)
+    return differs, explained
+
+
 def _crossed(look: Look, law: _Law, shape: tuple[int, ...]) -> BoolArray:
     """Which pixels seem to have an edge, by their corners, sides and centre (height, width)."""
     height, width = shape
