@@ -155,10 +155,13 @@ def picture(scene: Scene) -> str:
     for k, (copy, member) in enumerate(members):
         with writing.collected():
             index = _index_of(member, writing)
-            lines.append(_of_member(member, copy, writing.scene, writing.texture))
+            text = _of_member(member, copy, scene, writing.texture)
             if index is not None:
                 glass.append(k)
-                lines[-1:] = _glass(lines[-1], index)
+                text = f"{text.removesuffix('}')} interior {{ ior {index!r} }} no_shadow }}"
+                opaque = _of_member(member, copy, scene, lambda leaf, m: _BLACK)
+                lines.append(f"{opaque.removesuffix('}')} no_image no_reflection }}")
+            lines.append(text)
     with writing.collected():
         _check_glass(scene, members, glass)
     if writing.reasons:
@@ -167,13 +170,19 @@ def picture(scene: Scene) -> str:
 
 
 def obstacles(scene: Scene) -> list[str]:
-    """Why POV-Ray does not vote on a scene's picture, rendered with a box filter; [] if it does."""
+    """Why POV-Ray does not vote on a scene's picture, rendered with a box filter, and on its first
+    hits; [] if it votes on both."""
     film = scene.film.model_copy(update={"filter": BoxFilter(), "layers": ()})
+    found = []
     try:
         picture(scene.changed(film=film))
     except NoCounterpartError as error:
-        return str(error).split("; ")
-    return []
+        found += [f"picture: {reason}" for reason in str(error).split("; ")]
+    try:
+        found += [f"first hits: {reason}" for reason in hits(scene).left_out]
+    except NoCounterpartError as error:
+        found += [f"first hits: {reason}" for reason in str(error).split("; ")]
+    return found
 
 
 def _text(settings: str, lines: Sequence[str]) -> str:
@@ -263,11 +272,8 @@ def _is_smooth(leaf: Leaf, scene: Scene) -> bool:
     return to_cycles is not None and to_cycles(leaf.shape, scene.folder).normals is not None
 
 
-def _glass(text: str, index: float) -> list[str]:
-    """Glass, and what casts its shadow: POV-Ray's own lets light pass."""
-    opened = text.removesuffix("}")
-    opaque = "texture { pigment { rgb 0 } } no_image no_reflection"
-    return [f"{opened} interior {{ ior {index!r} }} no_shadow }}", f"{opened} {opaque} }}"]
+_BLACK = "texture { pigment { rgb 0 } }"
+"""Of what casts the shadow of glass: POV-Ray's own lets light pass."""
 
 
 def _check_glass(
@@ -376,7 +382,7 @@ _SHOWN = "\n".join(
         f"#else #declare Front = texture {{ {_SLOPES} }}",
         "#end",
         f"#if (frame_number < {FRAMES}) #declare Back = Front;",
-        "#else #declare Back = texture { pigment { rgb 0 } }",
+        f"#else #declare Back = {_BLACK}",
         "#end",
     )
 )

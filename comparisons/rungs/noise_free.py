@@ -55,6 +55,9 @@ edges may explain.  More means that it was given another scene."""
 BESIDE = 8
 """Rays beside one, at whose hit rounding may decide which of two surfaces there is seen."""
 
+FEW_COPIES = 64
+"""Copies that are all asked for faces in one place: of more, only ours."""
+
 MOST_JUDGED = 2_000
 """Most rays that exact arithmetic judges, evenly chosen."""
 
@@ -94,7 +97,7 @@ def vote_of_hits(scene: Scene, theirs: FirstHits, whose: str, threads: int | Non
     some = wrong[:: -(-len(wrong) // MOST_JUDGED)] if len(wrong) else wrong
     at_edge = _beside(scene, seen.rows(some), (o[some], d[some]), tolerance[some], sizes)
     share, edges, some = len(wrong) / max(len(some), 1), some[at_edge], some[~at_edge]
-    cleared, together = _decided(sizes, Rays(o, d), ours, tolerance, same_hit, some)
+    cleared, together = _decided(sizes, Rays(o, d), ours, seen, tolerance, same_hit, some)
     by_us = np.setdiff1d(some, np.concatenate([cleared, together]))
     hits = int(np.count_nonzero(is_hit & ~beyond))
     numbers = {
@@ -184,6 +187,7 @@ def _decided(
     sizes: ShapeSizes,
     rays: Rays,
     ours: Intersections,
+    seen: _Seen,
     tolerance: FloatArray,
     same_hit: BoolArray,
     wrong: IntArray,
@@ -193,8 +197,12 @@ def _decided(
     if not len(wrong):
         return wrong, wrong
     truths = Referee(sizes, TOGETHER).decide(rays.o[wrong], rays.d[wrong])
-    copies = np.stack([sizes.copy_of(ours)] * 2)[:, wrong]
-    open_to_both = coincide(sizes, rays.rows(wrong), copies, ours.t[wrong], tolerance[wrong])
+    copies = sizes.copy_of(ours)[None, wrong]
+    if len(sizes.copies) <= FEW_COPIES:
+        copies = np.tile(np.arange(len(sizes.copies))[:, None], len(wrong))
+    theirs = np.where(seen.hit, np.linalg.norm(seen.p - rays.o, axis=1), np.inf)
+    first = np.minimum(ours.t, theirs)[wrong]
+    open_to_both = coincide(sizes, rays.rows(wrong), copies, first, tolerance[wrong])
     exact = nearest(np.array([truth.t for truth in truths], object)).astype(float)
     hits = np.array([bool(truth.identities) for truth in truths])
     at_hand = np.abs(ours.t[wrong] - np.where(hits, exact, 0.0)) <= tolerance[wrong]
