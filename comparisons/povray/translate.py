@@ -46,14 +46,17 @@ RANGE = 4.0 * SIZE
 VIEW = 1e-3
 """Least distance of the target over the scene's size: POV-Ray's epsilons are nothing beside it."""
 
-MOST_COPIES = 4_096
+MOST_COPIES = 256
 """Most copies of groups: POV-Ray is given each as text."""
+
+
+def _check_copies(scene: Scene) -> None:
+    if sum(copy.instance >= 0 for copy in copies_of(scene)) > MOST_COPIES:
+        raise NoCounterpartError(f"more than {MOST_COPIES} copies of groups")
 
 
 def frame_of(scene: Scene) -> Frame:
     """POV-Ray's coordinates of a scene.  Raises NoCounterpartError."""
-    if len(copies_of(scene)) > MOST_COPIES:
-        raise NoCounterpartError(f"more than {MOST_COPIES:,} copies of groups")
     sizes, eye = ShapeSizes(scene), np.array(scene.camera.eye)
     lower, upper = np.minimum(sizes.lower, eye), np.maximum(sizes.upper, eye)
     half = float((upper - lower).max()) / 2.0
@@ -131,10 +134,10 @@ def matrix(m: affine.Affine) -> str:
 def picture(scene: Scene) -> str:
     """The text of a scene whose picture has the radiance of pixels' centres.  Raises
     NoCounterpartError with all reasons."""
+    _check_copies(scene)
     writing = Writing(moved(scene, frame_of(scene)))
     scene, settings = writing.scene, ""
     lines: list[str] = []
-    backgrounds: list[str] = []
     with writing.collected():
         if (to_povray := type_of_integrator(scene.integrator).to_povray) is None:
             raise NoCounterpartError(f"the integrator {scene.integrator.type}")
@@ -146,10 +149,7 @@ def picture(scene: Scene) -> str:
             known = type_of_light(light)
             if known.to_povray is None:
                 raise NoCounterpartError(f"the light {light.type}")
-            (backgrounds if known.surrounds else lines).append(known.to_povray(light))
-    if len(backgrounds) > 1:
-        writing.reasons.append("several lights from all directions")
-    lines += backgrounds
+            lines.append(known.to_povray(light))
     glass: list[int] = []
     members = [(copy, member) for copy in copies_of(scene) for member in copy.members]
     for k, (copy, member) in enumerate(members):
@@ -322,6 +322,7 @@ def hits(scene: Scene) -> Hits:
 
     Raises NoCounterpartError.
     """
+    _check_copies(scene)
     left_out: dict[str, int] = {}
     kept = []
     for k, shape in enumerate(scene.shapes):
