@@ -51,7 +51,7 @@ class PovRay:
             np.asarray(shown[:3].any(axis=(0, 3))),
             front,
             given.left_out,
-            given.rounding / given.frame.scale,
+            given.rounding / given.frame.scale + 2.0**-52 * np.abs(given.frame.center).max(),
             *given.frame.out(np.outer([-translate.RANGE, translate.RANGE], np.ones(3))),
         )
 

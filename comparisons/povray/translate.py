@@ -240,8 +240,8 @@ def _of_member(member: Member, copy: Copy, scene: Scene, texture: Texture) -> st
         if known.to_povray is None:
             raise NoCounterpartError(f"the shape {name}")
         m = affine.map_in(leaf.shape, place_of(scene, leaf, copy.outer))
-        text = known.to_povray(leaf.shape, scene.folder)
-        return f"{text} {matrix(m)} {texture(leaf, m)} }}"
+        text, place = known.to_povray(leaf.shape, scene.folder)
+        return f"{text} {matrix(affine.compose(place, m))} {texture(leaf, m)} }}"
 
     return of_tree(0 if member.tree is None else member.tree)
 

@@ -99,7 +99,7 @@ def vote_of_hits(scene: Scene, theirs: FirstHits, whose: str, threads: int | Non
     share, edges, some = len(wrong) / max(len(some), 1), some[at_edge], some[~at_edge]
     cleared, together = _decided(sizes, Rays(o, d), ours, seen, tolerance, same_hit, some)
     by_us = np.setdiff1d(some, np.concatenate([cleared, together]))
-    hits = int(np.count_nonzero(is_hit & ~beyond))
+    hits = int(np.count_nonzero(is_hit & ~beyond)) - int(np.count_nonzero(is_hit[wrong]))
     numbers = {
         "rays": len(o),
         "hits": hits,
@@ -128,9 +128,12 @@ def vote_of_hits(scene: Scene, theirs: FirstHits, whose: str, threads: int | Non
     text = f"{hits} first hits are {whose}"
     if len(edges):
         text += f", but for {len(edges)} beside an edge"
-    for count, what in ((len(cleared), "are"), (len(together), "on coincident faces are")):
-        if count:
-            text += f"; exact arithmetic decides {count} more for ours, which {what} not"
+    if len(cleared):
+        text += f"; exact arithmetic decides {len(cleared)} more for ours, which are not"
+    if len(together):
+        text += f"; {len(together)} of {len(some)} others that were judged are on coincident faces"
+    if numbers["beyond"]:
+        text += f"; {numbers['beyond']} are too far to be told"
     if theirs.left_out:
         told = "; ".join(f"{count} of {reason}" for reason, count in theirs.left_out.items())
         text += f"; left out: {told}"
@@ -206,7 +209,8 @@ def _decided(
     exact = nearest(np.array([truth.t for truth in truths], object)).astype(float)
     hits = np.array([bool(truth.identities) for truth in truths])
     at_hand = np.abs(ours.t[wrong] - np.where(hits, exact, 0.0)) <= tolerance[wrong]
-    right = ~same_hit[wrong] & np.where(hits, at_hand, ours.shape[wrong] < 0)
+    is_hit = ours.shape[wrong] >= 0
+    right = ~same_hit[wrong] & np.where(hits, is_hit & at_hand, ~is_hit)
     open_to_both |= [truth.touching or len(truth.identities) > 1 for truth in truths]
     return wrong[right & ~open_to_both], wrong[open_to_both]
 

@@ -17,7 +17,7 @@ from comparisons.mitsuba.second import described
 from comparisons.renderers import NoCounterpartError
 from comparisons.renderers.vocabulary import pov_vector
 from comparisons.shapes.reading_meshes import mesh as read
-from comparisons.shapes.shape import Features, ShapeType, TableType, never
+from comparisons.shapes.shape import Features, PovShape, ShapeType, TableType, never, pov_points
 from comparisons.shapes.site import Site, placed, with_mesh_light
 from comparisons.shapes.soup import Soup, heights_of
 from reference_rt.core.arrays import FloatArray, IntArray
@@ -110,16 +110,18 @@ MOST_TRIANGLES = 200_000
 """Of a mesh for POV-Ray, which reads them as text, some 100,000 a second."""
 
 
-def _to_povray(shape: Triangle | Mesh, folder: Path) -> str:
+def _to_povray(shape: Triangle | Mesh, folder: Path) -> PovShape:
     """POV-Ray's front is the side from which corners go round clockwise."""
     corners = described(shape, folder).points.reshape(-1, 3)
     if len(corners) > 3 * MOST_TRIANGLES:
         raise NoCounterpartError(f"a mesh of more than {MOST_TRIANGLES:,} triangles")
+    corners, place = pov_points(corners)
     faces = (f"<{k},{k + 2},{k + 1}>" for k in range(0, len(corners), 3))
-    return (
+    text = (
         f"mesh2 {{ vertex_vectors {{ {len(corners)}, {', '.join(map(pov_vector, corners))} }} "
         f"face_indices {{ {len(corners) // 3}, {', '.join(faces)} }} inside_vector <0.1,0.2,1>"
     )
+    return PovShape(text, place)
 
 
 TRIANGLES = TableType(

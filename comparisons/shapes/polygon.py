@@ -13,7 +13,7 @@ from comparisons.mitsuba.hits import Plugin, same_uv
 from comparisons.renderers import NoCounterpartError
 from comparisons.renderers.vocabulary import pov_vector
 from comparisons.shapes.flat import on_plane
-from comparisons.shapes.shape import ShapeType, TableType, never, per_face
+from comparisons.shapes.shape import PovShape, ShapeType, TableType, never, per_face, pov_points
 from comparisons.shapes.site import Site, with_mesh_light
 from comparisons.shapes.soup import Soup, heights_of
 from reference_rt.core.arrays import FloatArray, IntArray
@@ -109,7 +109,7 @@ def _targets(table: Any) -> FloatArray:
     return np.concatenate([on_plane(table, a), on_plane(table, 0.5 * (a + b))])
 
 
-def _to_povray(shape: Polygon, folder: Path) -> str:
+def _to_povray(shape: Polygon, folder: Path) -> PovShape:
     """Convex: of others POV-Ray's front may be another one."""
     if len(shape.rings) > 1:
         raise NoCounterpartError("a polygon of several rings: POV-Ray's front may be another one")
@@ -118,8 +118,8 @@ def _to_povray(shape: Polygon, folder: Path) -> str:
     turns = np.cross(sides, np.roll(sides, -1, axis=0))
     if not (np.sum(turns * turns.sum(axis=0), axis=1) >= 0.0).all() or _windings(sides) != 1:
         raise NoCounterpartError("a polygon that is not convex: POV-Ray's front may be another one")
-    points = [*shape.rings[0], shape.rings[0][0]]
-    return f"polygon {{ {len(points)}, {', '.join(map(pov_vector, points))}"
+    points, place = pov_points(np.array([*shape.rings[0], shape.rings[0][0]]))
+    return PovShape(f"polygon {{ {len(points)}, {', '.join(map(pov_vector, points))}", place)
 
 
 def _windings(sides: FloatArray) -> int:

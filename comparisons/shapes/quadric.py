@@ -23,7 +23,15 @@ from comparisons.mitsuba.plugins.exact_coordinates import of_quadric
 from comparisons.renderers.vocabulary import pov_vector
 from comparisons.shapes.canonical import patches_of
 from comparisons.shapes.meshing import cap_faces, cut_away, heights_over_uv
-from comparisons.shapes.shape import Features, ShapeType, TableType, Tessellation, is_capped
+from comparisons.shapes.shape import (
+    Features,
+    PovShape,
+    ShapeType,
+    TableType,
+    Tessellation,
+    is_capped,
+    pov_size,
+)
 from comparisons.shapes.site import Site, placed, with_mesh_light
 from comparisons.shapes.soup import Soup
 from comparisons.shapes.stand_ins import stand_in, tessellated
@@ -207,15 +215,19 @@ def _triangles(shape: Quadric, m: affine.Affine) -> Tessellation:
     return parts, distance
 
 
-def _to_povray(shape: Quadric, folder: Path) -> str:
+def _to_povray(shape: Quadric, folder: Path) -> PovShape:
     """POV-Ray's coefficients are of x², y², z²; xy, xz, yz; x, y, z; 1."""
-    a, b, c, d, e, f, *linear = shape.coefficients
+    size = pov_size([shape.lower, shape.upper])
+    powers = np.repeat([size * size, size, 1.0], [6, 3, 1])
+    a, b, c, d, e, f, *linear = powers * shape.coefficients
     terms = ",".join(map(pov_vector, ((a, b, c), (d, f, e), linear[:3])))
-    whole = f"quadric {{ {terms}, {linear[3]!r}"
-    box = f"box {{ {pov_vector(shape.lower)}, {pov_vector(shape.upper)} }}"
+    whole = f"quadric {{ {terms}, {float(linear[3])!r}"
+    corners = np.array([shape.lower, shape.upper]) / size
+    box = f"box {{ {', '.join(map(pov_vector, corners))} }}"
+    text = f"{whole} clipped_by {{ {box} }}"
     if shape.capped:
-        return f"intersection {{ {whole} }} {box}"
-    return f"{whole} clipped_by {{ {box} }}"
+        text = f"intersection {{ {whole} }} {box}"
+    return PovShape(text, size * np.eye(3, 4))
 
 
 QUADRIC = ShapeType(

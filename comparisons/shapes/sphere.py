@@ -15,7 +15,6 @@ from comparisons.mitsuba.hits import CURVED, Plugin, same_uv
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.parse import as_transform
 from comparisons.mitsuba.plugins.exact_coordinates import Round
-from comparisons.renderers.vocabulary import pov_vector
 from comparisons.shapes.fine import FINE, fine, on_circle, widened
 from comparisons.shapes.reading_maps import (
     TOLERANCE,
@@ -28,6 +27,7 @@ from comparisons.shapes.shape import (
     OwnPlugin,
     PbrtPart,
     PbrtPlace,
+    PovShape,
     RaysectPart,
     ShapeType,
     TableType,
@@ -119,8 +119,9 @@ def _to_raysect(shape: Sphere) -> list[RaysectPart]:
     return [RaysectPart("sphere", (shape.radius,), np.column_stack([np.eye(3), shape.center]))]
 
 
-def _to_povray(shape: Sphere, folder: Path) -> str:
-    return f"sphere {{ {pov_vector(shape.center)}, {float(shape.radius)!r}"
+def _to_povray(shape: Sphere, folder: Path) -> PovShape:
+    place = np.column_stack([shape.radius * np.eye(3), shape.center])
+    return PovShape("sphere { <0,0,0>, 1", place)
 
 
 def _own_plugin(shape: Sphere, linear: FloatArray, textured: bool) -> OwnPlugin | None:

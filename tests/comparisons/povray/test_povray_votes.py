@@ -287,11 +287,12 @@ def _turned(hits):
 
 
 def _moved(hits):
-    return replace(hits, p=hits.p * (1.0 + 2.0**-36), t=hits.t * (1.0 + 2.0**-36))
+    return replace(hits, p=hits.p * (1.0 + 2.0**-30), t=hits.t * (1.0 + 2.0**-30))
 
 
 def _missed(hits):
-    return replace(hits, shape=np.where(hits.shape == 2, -1, hits.shape))
+    missed = hits.shape == 2
+    return replace(hits, shape=np.where(missed, -1, hits.shape), t=np.where(missed, np.inf, hits.t))
 
 
 @pytest.mark.parametrize("fault", [_turned, _moved, _missed])
