@@ -14,7 +14,6 @@ from comparisons.compare.compare import Subject, budgeted, compare_scene
 from comparisons.geometry import affine
 from comparisons.povray.run import program
 from comparisons.renderers import NoCounterpartError, other
-from comparisons.rungs import noise_free
 from comparisons.rungs.noise_free import vote_of_hits, vote_of_picture
 from comparisons.rungs.witness import witness_of
 from reference_rt.core.transform import Matrix
@@ -370,9 +369,28 @@ def test_who_has_noise_does_not_vote_without(monkeypatch):
     assert rung.reason == "Cycles has noise: it does not vote on pictures without"
 
 
-def test_few_edges_are_explained_and_many_are_not(right):
-    scene, theirs, _ = right
-    assert noise_free.FEW * theirs.shape[0] * theirs.shape[1] > 1.0
-    shifted = np.roll(shown(), 1, axis=1)
-    vote = vote_of_picture((shifted, shifted, theirs), (OURS, MITSUBAS, THEIRS), scene)
+def test_few_edges_are_explained_and_many_are_not():
+    """Of a square of one colour other samples change edges alone."""
+    square = rt.Scene(
+        camera=rt.Orthographic(eye=(0.01, 0.02, 5), target=(0.01, 0.02, 0), up=(0.3, 1, 0)),
+        film=rt.Film(width=64, height=64),
+        sampler=rt.Grid(),
+        integrator=rt.Whitted(),
+        shapes=(rt.Rectangle(transform=[{"scale": 0.6}]),),
+        lights=(rt.Directional(direction=(0, 0, -1), irradiance=3),),
+    )
+    ours = render(square).colour
+    blurred = render(square.changed(sampler=rt.Grid(spp=16))).colour
+    edges = np.argwhere((blurred != ours).any(axis=-1))
+    assert len(edges) > 100
+    few = ours.copy()
+    for y, x in edges[:: len(edges) // 3][:3]:
+        few[y, x] = blurred[y, x]
+    vote = vote_of_picture((ours, ours, few), (OURS, MITSUBAS, THEIRS), square)
+    assert (vote.status, vote.numbers["on_edges"]) == ("agree", 3)
+    vote = vote_of_picture((ours, ours, blurred), (OURS, MITSUBAS, THEIRS), square)
+    assert (vote.status, vote.alone) == ("differ", THEIRS)
+    few[32, 32] *= 1.002  # inside
+    vote = vote_of_picture((ours, ours, few), (OURS, MITSUBAS, THEIRS), square)
     assert vote.status == "differ"
+    assert "at x, y = (32, 32)" in vote.reason
