@@ -13,7 +13,7 @@ from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.parse import as_transform
 from comparisons.shapes.reading_meshes import Surface as ReadSurface
 from comparisons.shapes.reading_meshes import finished, is_normal, placed
-from comparisons.shapes.shape import RaysectPart, ShapeType, TableType, always, per_face
+from comparisons.shapes.shape import PovShape, RaysectPart, ShapeType, TableType, always, per_face
 from comparisons.shapes.site import Site, to_world, with_mesh_light
 from comparisons.shapes.soup import Soup
 from comparisons.shapes.surface import Surface
@@ -173,4 +173,5 @@ BOX = ShapeType(
     to_cycles=_to_cycles,
     to_raysect=lambda shape: [RaysectPart("box", (1.0, 1.0, 1.0))],
     is_sampled=True,
+    to_povray=lambda shape, folder: PovShape("box { <-1,-1,-1>, <1,1,1>"),
 )

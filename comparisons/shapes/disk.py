@@ -14,6 +14,7 @@ from comparisons.shapes.flat import as_written, flat, flat_transform, on_plane, 
 from comparisons.shapes.shape import (
     PbrtPart,
     PbrtPlace,
+    PovShape,
     ShapeType,
     TableType,
     Tessellation,
@@ -109,4 +110,5 @@ DISK = ShapeType(
     to_cycles=lambda shape, folder: fan(1.0, 0.0, 1.0),
     to_pbrt=_to_pbrt,
     is_sampled=True,
+    to_povray=lambda shape, folder: PovShape("disc { <0,0,0>, z, 1"),
 )

@@ -7,7 +7,7 @@ from comparisons.geometry.exact.crossings import Crossings, Row, plane_crossing,
 from comparisons.geometry.exact.dyadic import Dyadic
 from comparisons.mitsuba.hits import Extent, Plugin, same_uv
 from comparisons.shapes.flat import flat, unit_lengths
-from comparisons.shapes.shape import RaysectPart, ShapeType, TableType, always, per_face
+from comparisons.shapes.shape import PovShape, RaysectPart, ShapeType, TableType, always, per_face
 from comparisons.shapes.site import Site, with_mesh_light
 from comparisons.shapes.soup import Soup, heights_of
 from comparisons.shapes.surface import Surface
@@ -80,4 +80,5 @@ PLANE = ShapeType(
     triangles=None,
     encloses=always,
     to_raysect=lambda shape: [RaysectPart("half_space", ())],
+    to_povray=lambda shape, folder: PovShape("plane { z, 0"),
 )

@@ -2,6 +2,7 @@
 
 import itertools
 from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,9 +20,18 @@ from comparisons.geometry.exact.crossings import (
 from comparisons.geometry.exact.dyadic import NEVER, Dyadic, roots, tied
 from comparisons.mitsuba.hits import Plugin, same_uv
 from comparisons.mitsuba.plugins.exact_coordinates import of_quadric
+from comparisons.renderers.vocabulary import pov_vector
 from comparisons.shapes.canonical import patches_of
 from comparisons.shapes.meshing import cap_faces, cut_away, heights_over_uv
-from comparisons.shapes.shape import Features, ShapeType, TableType, Tessellation, is_capped
+from comparisons.shapes.shape import (
+    Features,
+    PovShape,
+    ShapeType,
+    TableType,
+    Tessellation,
+    is_capped,
+    pov_size,
+)
 from comparisons.shapes.site import Site, placed, with_mesh_light
 from comparisons.shapes.soup import Soup
 from comparisons.shapes.stand_ins import stand_in, tessellated
@@ -205,6 +215,21 @@ def _triangles(shape: Quadric, m: affine.Affine) -> Tessellation:
     return parts, distance
 
 
+def _to_povray(shape: Quadric, folder: Path) -> PovShape:
+    """POV-Ray's coefficients are of x², y², z²; xy, xz, yz; x, y, z; 1."""
+    size = pov_size([shape.lower, shape.upper])
+    powers = np.repeat([size * size, size, 1.0], [6, 3, 1])
+    a, b, c, d, e, f, *linear = powers * shape.coefficients
+    terms = ",".join(map(pov_vector, ((a, b, c), (d, f, e), linear[:3])))
+    whole = f"quadric {{ {terms}, {float(linear[3])!r}"
+    corners = np.array([shape.lower, shape.upper]) / size
+    box = f"box {{ {', '.join(map(pov_vector, corners))} }}"
+    text = f"{whole} clipped_by {{ {box} }}"
+    if shape.capped:
+        text = f"intersection {{ {whole} }} {box}"
+    return PovShape(text, size * np.eye(3, 4))
+
+
 QUADRIC = ShapeType(
     of=Quadric,
     table=TableType(field="quadrics", crossings=_crossings, features=_features),
@@ -212,4 +237,5 @@ QUADRIC = ShapeType(
     to_mitsuba=_to_mitsuba,
     triangles=_triangles,
     encloses=is_capped,
+    to_povray=_to_povray,
 )

@@ -12,7 +12,7 @@ from comparisons.geometry.exact.dyadic import Dyadic
 from comparisons.mitsuba.hits import Plugin, same_uv
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.shapes.flat import as_written, flat, flat_transform, on_plane, unit_lengths
-from comparisons.shapes.shape import ShapeType, TableType, never, per_face
+from comparisons.shapes.shape import PovShape, ShapeType, TableType, never, per_face
 from comparisons.shapes.site import Site, to_world, with_mesh_light
 from comparisons.shapes.soup import Soup
 from comparisons.shapes.surface import Surface
@@ -79,4 +79,8 @@ RECTANGLE = ShapeType(
     own_plugin=as_written("rectangle"),
     to_cycles=lambda shape, folder: _soup(),
     is_sampled=True,
+    to_povray=lambda shape, folder: PovShape(
+        "polygon { 5, <-1,-1,0>,<1,-1,0>,<1,1,0>,<-1,1,0>,<-1,-1,0>"
+    ),
+    flat_uv=np.array([[2.0, 0.0, 0.0, -1.0], [0.0, 2.0, 0.0, -1.0], [0.0, 0.0, 1.0, 0.0]]),
 )

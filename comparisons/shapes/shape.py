@@ -68,6 +68,26 @@ class RaysectPart(NamedTuple):
     place: Affine = IDENTITY
 
 
+class PovShape(NamedTuple):
+    """An object of POV-Ray's, before its map and texture and the brace that closes it;  place: the
+    map to the shape's own coordinates.  It is about 1 large: POV-Ray's epsilons are absolute."""
+
+    text: str
+    place: Affine = IDENTITY
+
+
+def pov_size(lengths: Any) -> float:
+    """A power of two that is about as large as the largest of some lengths, of either sign."""
+    return float(2.0 ** np.ceil(np.log2(np.abs(lengths).max())))
+
+
+def pov_points(points: FloatArray) -> tuple[FloatArray, Affine]:
+    """Points (n, 3) around 0 and about 1 large, and their place."""
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    size = pov_size(points - middle)
+    return (points - middle) / size, np.column_stack([size * np.eye(3), middle])
+
+
 class PbrtPlace(NamedTuple):
     """place: the map, without its scale where it keeps angles;  size: that scale, else 1;
     mirrored;  textured: whether the material depends on uv."""
@@ -135,5 +155,9 @@ class ShapeType(Generic[AnyShape]):
     """pbrt's own shapes; none where triangles must stand for it."""
     to_raysect: Callable[[AnyShape], list[RaysectPart]] | None = None
     """raysect's primitives whose intersection it is.  Raises NoCounterpartError."""
+    to_povray: Callable[[AnyShape, Path], PovShape] | None = None
+    """Raises NoCounterpartError."""
+    flat_uv: Affine | None = None
+    """Of a flat shape the map from (u, v, 0) to its own coordinates."""
     is_sampled: bool = False
     """Whether `reference_rt` samples points of one that is a lamp."""

@@ -27,6 +27,7 @@ from comparisons.shapes.shape import (
     OwnPlugin,
     PbrtPart,
     PbrtPlace,
+    PovShape,
     RaysectPart,
     ShapeType,
     TableType,
@@ -118,6 +119,11 @@ def _to_raysect(shape: Sphere) -> list[RaysectPart]:
     return [RaysectPart("sphere", (shape.radius,), np.column_stack([np.eye(3), shape.center]))]
 
 
+def _to_povray(shape: Sphere, folder: Path) -> PovShape:
+    place = np.column_stack([shape.radius * np.eye(3), shape.center])
+    return PovShape("sphere { <0,0,0>, 1", place)
+
+
 def _own_plugin(shape: Sphere, linear: FloatArray, textured: bool) -> OwnPlugin | None:
     if not affine.is_similarity(linear) or np.linalg.det(linear) <= 0.0:
         return None
@@ -178,4 +184,5 @@ SPHERE = ShapeType(
     to_pbrt=_to_pbrt,
     to_raysect=_to_raysect,
     is_sampled=True,
+    to_povray=_to_povray,
 )

@@ -18,7 +18,15 @@ from comparisons.geometry.exact.dyadic import (
 from comparisons.mitsuba.hits import Plugin
 from comparisons.mitsuba.plugins.exact_coordinates import Round
 from comparisons.shapes.fine import FINE, fine, widened
-from comparisons.shapes.shape import RaysectPart, ShapeType, TableType, always, per_face
+from comparisons.shapes.shape import (
+    PovShape,
+    RaysectPart,
+    ShapeType,
+    TableType,
+    always,
+    per_face,
+    pov_size,
+)
 from comparisons.shapes.site import Site
 from comparisons.shapes.soup import Soup
 from comparisons.shapes.stand_ins import stand_in, tessellated
@@ -125,6 +133,17 @@ def _to_cycles(shape: Torus, folder: Path) -> Soup:
     return fine(surface_of(shape.model_copy(update=radii)), (4 * FINE, FINE))
 
 
+AROUND_Z = "matrix <1,0,0, 0,0,1, 0,-1,0, 0,0,0>"
+"""POV-Ray's tori are around y."""
+
+
+def _to_povray(shape: Torus, folder: Path) -> PovShape:
+    """By Sturm's method: its other one leaves holes in thin tori."""
+    size = pov_size([shape.major_radius, shape.minor_radius])
+    radii = f"{shape.major_radius / size!r}, {shape.minor_radius / size!r}"
+    return PovShape(f"torus {{ {radii} sturm {AROUND_Z}", size * np.eye(3, 4))
+
+
 TORUS = ShapeType(
     of=Torus,
     table=TableType(
@@ -140,4 +159,5 @@ TORUS = ShapeType(
     encloses=always,
     to_cycles=_to_cycles,
     to_raysect=lambda shape: [RaysectPart("torus", (shape.major_radius, shape.minor_radius))],
+    to_povray=_to_povray,
 )

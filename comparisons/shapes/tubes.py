@@ -10,7 +10,7 @@ from comparisons.mitsuba.hits import Plugin, same_uv
 from comparisons.renderers import NoCounterpartError
 from comparisons.shapes.fine import FINE, fan, fine, on_circle, widened
 from comparisons.shapes.meshing import region
-from comparisons.shapes.shape import RaysectPart, Tessellation
+from comparisons.shapes.shape import PovShape, RaysectPart, Tessellation, pov_size
 from comparisons.shapes.site import Site, to_world, with_mesh_light
 from comparisons.shapes.soup import Soup, heights_of, joined
 from comparisons.shapes.stand_ins import tessellated
@@ -67,6 +67,18 @@ def tube_for_raysect(tube: Tube) -> list[RaysectPart]:
     middle = np.column_stack([np.eye(3), [0.0, 0.0, -0.5 * height]])
     half = (2.0 * bottom, 2.0 * bottom, 1.5 * height)
     return [whole, RaysectPart("box", half, affine.compose(middle, place))]
+
+
+def tube_for_povray(tube: Tube) -> PovShape:
+    """POV-Ray's cylinder or cone, from z = 0 up."""
+    height = tube.high - tube.low
+    size = pov_size([tube.bottom, tube.top, height])
+    bottom, top = tube.bottom / size, tube.top / size
+    text = f"cone {{ <0,0,0>, {bottom!r}, <0,0,{height / size!r}>, {top!r}"
+    if bottom == top:
+        text = f"cylinder {{ <0,0,0>, <0,0,{height / size!r}>, {top!r}"
+    place = np.column_stack([size * np.eye(3), [0.0, 0.0, tube.low]])
+    return PovShape(text if tube.capped else f"{text} open", place)
 
 
 def tube_surface(tube: Tube, textured: bool = False) -> Surface:

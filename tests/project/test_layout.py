@@ -19,8 +19,8 @@ FLOORS = {
     "comparisons": (
         *("results", "geometry", "statistics", "renderers", "mitsuba", "textures", "materials"),
         *("cameras", "lights", "integrators", "shapes", "referee", "translator", "pbrt", "gltf"),
-        *("runs", "raysect", "cycles", "rungs", "report", "compare", "gate", "truth", "suites"),
-        *("experiments", "commands"),
+        *("runs", "raysect", "cycles", "povray", "rungs", "report", "compare", "gate", "truth"),
+        *("suites", "experiments", "commands"),
     ),
 }
 """The folders of each package from the lowest to the highest: a file may import files of its own

@@ -46,6 +46,7 @@ FOLDERS = (
     "referee",
     "translator",
     "cycles",
+    "povray",
 )
 
 OTHER_WAY = {

@@ -10,7 +10,7 @@ import reference_rt as rt
 from comparisons.commands.options import Witness
 from comparisons.cycles.backend import PYTHON
 from comparisons.mitsuba.backend import LLVM, mitsuba
-from comparisons.renderers import PLACES, NoCounterpartError, WitnessName, other
+from comparisons.renderers import PLACES, NoCounterpartError, NoiseFree, WitnessName, other
 from comparisons.translator.native import Native
 
 ALL = {
@@ -21,6 +21,7 @@ ALL = {
         ),
     )
     for name, renderer in [*((n, other(n)) for n in PLACES), ("llvm", Native(LLVM, "multijitter"))]
+    if not isinstance(renderer, NoiseFree)  # see tests/comparisons/povray
 }
 
 RADIANCE = (0.25, 0.5, 1.0)
