@@ -179,6 +179,12 @@ OF_SHADING = (
         {OWN_PHONG: (("self.half_vector = bool(", "self.half_vector = not bool("),)},
     ),
     Mistake(
+        "the half vector's cosine with the light, not with the normal", "blinn_in_light",
+        {PHONG: (("power(min(h.z, 1.0), p)", "power(min(dot(wo, h), 1.0), p)"),)},
+        {OWN_PHONG: (("dr.normalize(wi + wo).z if self.half_vector",
+                      "dr.dot(wi, dr.normalize(wi + wo)) if self.half_vector"),)},
+    ),
+    Mistake(
         "k_s and k_d exchanged", "whitted_lit_mirror",
         {PHONG: (
             ("            palette.colours(self.diffuse, math.inf),\n"

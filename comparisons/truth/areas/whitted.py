@@ -6,7 +6,7 @@ import numpy as np
 
 from comparisons.truth.areas.materials import FRESNEL, HALF, LAMP, SKY
 from comparisons.truth.case import Expected, FloatArray, case
-from comparisons.truth.film import View, pixel_means, seen_from_above
+from comparisons.truth.film import View, drawn_from_above, mix, pixel_means, seen_from_above
 from comparisons.truth.optics import fresnel
 
 FAR = 1e-4
@@ -50,13 +50,14 @@ def whitted_ambient() -> Expected:
 )
 def whitted_lit_mirror() -> Expected:
     """A mirror at 45 degrees turns the view, which is against z, towards -x, where a wall stands in
-    parallel light along (-2, -1, 0).  Nothing depends on the place."""
+    parallel light along (-2, -1, 0): of one radiance.  The mirror is seen 1.2 wide, before a sky."""
     light = np.array([2.0, 1.0, 0.0]) / np.sqrt(5.0)
     n = np.array([1.0, 0.0, 0.0])
     highlight = (2.0 * (n @ light) * n - light)[0] ** 5
     wall = np.array([0.1, 0.05, 0.02]) * 0.5
     wall = wall + 2.0 * (np.array([0.1, 0.3, 0.2]) * light[0] + 0.2 * highlight)
-    return Expected(np.broadcast_to([0.9, 0.7, 0.5] * wall, (32, 32, 3)).copy())
+    mirror = [[-0.6, -1.2], [0.6, -1.2], [0.6, 1.2], [-0.6, 1.2]]
+    return Expected(mix(drawn_from_above(mirror, 2.0, 32), [0.9, 0.7, 0.5] * wall, SKY / 10.0))
 
 
 @case(

@@ -85,7 +85,7 @@ def test_the_page_in_a_browser(run, check_page):
         (["truth", "nothing"], "there is no case 'nothing'; expected all, a pattern"),
         (["truth", "--renderer", "pbrt"], "--renderer: expected ours, mitsuba, both or cycles"),
         (["gate", "--truth", "nothing", "a.npy"], "--truth: there is no case 'nothing'"),
-        (["gate", "--truth", "all", "a.npy"], "is 107 cases; expected one, or --command"),
+        (["gate", "--truth", "all", "a.npy"], "is 108 cases; expected one, or --command"),
         (["gate", "--truth", "slab"], "expected either candidates, --command or --browser"),
         (
             ["gate", "--truth", "slab", "a.npy", "--scene", "x.yaml"],

@@ -74,6 +74,7 @@ FAULTS = (
     ("ggx_in_light", "distribution: ggx", "distribution: beckmann"),
     ("beckmann_in_light", "alpha: 0.4", "alpha: 0.401"),
     ("phong_in_light", "specular: 0.1", "specular: 0.1, half_vector: true"),
+    ("blinn_in_light", "exponent: 40", "exponent: 40.2"),
     ("ggx_furnace", "alpha: 0.3", "alpha: 0.31"),
     ("beckmann_furnace", "distribution: beckmann", "distribution: ggx"),
     ("rough_boundary", "alpha: 0.3", "alpha: 0.32"),
