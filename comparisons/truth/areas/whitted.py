@@ -50,7 +50,7 @@ def whitted_ambient() -> Expected:
 )
 def whitted_lit_mirror() -> Expected:
     """A mirror at 45 degrees turns the view, which is against z, towards -x, where a wall stands in
-    parallel light along (-2, -1, 0): of one radiance.  The mirror is seen 1.2 wide, before a sky."""
+    parallel light along (-2, -1, 0): of one radiance.  The mirror is 1.2 wide, before a sky."""
     light = np.array([2.0, 1.0, 0.0]) / np.sqrt(5.0)
     n = np.array([1.0, 0.0, 0.0])
     highlight = (2.0 * (n @ light) * n - light)[0] ** 5
