@@ -2,9 +2,10 @@
 
 import importlib.util
 from collections.abc import Iterable
+from typing import get_args
 
 from comparisons.mitsuba import backend
-from comparisons.renderers import other
+from comparisons.renderers import WitnessName, other
 from reference_rt.cli.doctor import Check
 from reference_rt.util.errors import ReferenceUnavailableError
 from reference_rt.util.extras import missing
@@ -28,10 +29,11 @@ def checks() -> Iterable[Check]:
         yield Check(
             "raysect", "left out: it is not installed", "pip install 'reference-rt[witness]'"
         )
-    try:
-        yield Check("Cycles", other("cycles").version())
-    except ReferenceUnavailableError as error:
-        yield Check("Cycles", "left out", str(error))
+    for witness in map(other, get_args(WitnessName)):
+        try:
+            yield Check(witness.title, witness.version())
+        except ReferenceUnavailableError as error:
+            yield Check(witness.title, "left out", str(error))
     if lacks := missing("compare"):
         found = f"without {', '.join(lacks)}"
         yield Check("comparisons", found, "pip install 'reference-rt[compare]'", False)

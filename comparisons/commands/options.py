@@ -65,8 +65,8 @@ NumberOfWorkers = Annotated[
 ]
 
 Witness = Annotated[
-    Literal["cycles"] | None,
-    typer.Option(help="A third renderer, whose pictures say who stands alone: cycles."),
+    Literal["cycles", "povray"] | None,
+    typer.Option(help="A third renderer, whose pictures say who stands alone: cycles or povray."),
 ]
 
 TimeLimit = Annotated[

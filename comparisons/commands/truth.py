@@ -31,7 +31,7 @@ def truth(
     ] = None,
     out: Annotated[Path, out_folder("results, the page and the badge", "DIR")] = Path("out/truth"),
     renderer: Annotated[
-        str, typer.Option(metavar="NAME", help="ours, mitsuba, both or cycles.")
+        str, typer.Option(metavar="NAME", help="ours, mitsuba, both, cycles or povray.")
     ] = "both",
     scenes: Annotated[
         Path, typer.Option(metavar="DIR", help="The folder of the scene files.")
@@ -64,7 +64,8 @@ def truth(
     from reference_rt.util.console import ProgressLine
 
     if renderer not in (*RENDERERS, "both"):
-        raise UsageError(f"--renderer: expected ours, mitsuba, both or cycles, got '{renderer}'")
+        expected = "ours, mitsuba, both, cycles or povray"
+        raise UsageError(f"--renderer: expected {expected}, got '{renderer}'")
     picked = _chosen(names or ())
     who = [each for each in RENDERERS if renderer == each or (renderer, each) in BOTH]
     writes = Outputs(out, ("results.json", "report.html"), markdown=(markdown, "truth"))

@@ -71,7 +71,8 @@ def compare_scene(
     witness = None
     if budget.witness is not None:
         scene = budgeted(subject.witness or subject.scene, budget)
-        witness = witness_of(budget.witness, scene, budget.limit, threads, say)
+        seen = budgeted(subject.scene, budget)
+        witness = witness_of(budget.witness, scene, budget.limit, threads, say, seen)
     evidence = gather(subject, budget, say, threads, rungs)
     return judge(replace(evidence, witness=witness), budget.limit)
 

@@ -146,8 +146,11 @@ def judge(evidence: Evidence, limit: float) -> Case:
         if checked.status != "invalid":
             metrics = image_metrics(images)
             rungs.append(_whole(rendered, metrics, tested[0], without))
-            if evidence.witness is not None and rendered.resampled is not None:
-                heard, picture = evidence.witness(rendered.resampled, evidence.sides)
+            pair = rendered.resampled
+            if rendered.replicates is None:
+                pair = images.candidate[np.newaxis], images.reference[np.newaxis]
+            if evidence.witness is not None and pair is not None:
+                heard, picture = evidence.witness(pair, evidence.sides)
                 rungs.append(heard)
                 images = replace(images, witness=picture)
     rest_of = None

@@ -11,12 +11,12 @@ from comparisons.compare.judge import Evidence, Rendered, at_look, judge, of_rep
 from comparisons.compare.looks import Looks, level_of
 from comparisons.gate.copies import Copies
 from comparisons.gate.displayed import as_displayed
-from comparisons.gate.edges import edges_rung
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.question import USUAL, Question
 from comparisons.gate.reference import Reference, check_sizes, size_of, stacked
 from comparisons.gate.rim import question_without_rim, without_rim
 from comparisons.results.case import Case, FloatArray, Images, RungResult, Status, decide
+from comparisons.rungs.edges import edges_rung
 from comparisons.rungs.input import input_rung
 from comparisons.statistics.metrics import image_metrics
 from reference_rt.util.errors import ImageError, UsageError

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from comparisons.compare.darkness import Darkness
 from comparisons.compare.judge import Lights
 from comparisons.compare.path_length import Lengths
-from comparisons.gate.edges import Edges
 from comparisons.results.case import RungResult
+from comparisons.rungs.edges import Edges
 from comparisons.rungs.witness import Witness
 
 LIMIT = 0.005

@@ -9,10 +9,10 @@ import numpy as np
 from comparisons.gate.copies import fingerprint
 from comparisons.gate.pictures_in import Picture, variance_of
 from comparisons.gate.reference_cache import cached, relative_error
+from comparisons.rungs.edges import is_noise_free as is_noise_free
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
-from reference_rt.sampling import Grid
 from reference_rt.util.errors import ImageError, UsageError
 
 REPLICATES = 16
@@ -46,11 +46,6 @@ class Reference:
     name: str = "the reference's"
     notes: tuple[str, ...] = ()
     fingerprints: tuple[str, ...] = ()
-
-
-def is_noise_free(scene: Scene) -> bool:
-    """Whether a correct picture of the scene has no noise, because its samples are fixed."""
-    return scene.integrator.type == "ray_cast" or isinstance(scene.resolved_sampler, Grid)
 
 
 def of_scene(

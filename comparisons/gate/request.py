@@ -17,7 +17,6 @@ from comparisons.compare.path_length import Lengths, path_lengths
 from comparisons.compare.single_lights import single_lights
 from comparisons.gate import baselines, reference
 from comparisons.gate.digest import scene_digest
-from comparisons.gate.edges import DARK, TOLERANCE, Edges, look_at
 from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture, pictures_of
 from comparisons.gate.question import LIMIT, Question
@@ -29,6 +28,7 @@ from comparisons.gate.tone_curves import ESTIMATE, ToneCurve, curve_of
 from comparisons.renderers import WitnessName
 from comparisons.results.case import Case, Cause, FloatArray, RungResult
 from comparisons.results.headline import UP_TO
+from comparisons.rungs.edges import DARK, TOLERANCE, Edges, look_at
 from comparisons.rungs.witness import Witness, witness_of
 from comparisons.statistics import Margins
 from reference_rt.rendering.render import Progress

@@ -33,6 +33,8 @@ class IntegratorType(Generic[I]):
     edges: Callable[[I], int | None] | None
     """The most edges of a path that it takes, None for no end: for renderers that know path tracing
     alone.  Raises NoCounterpartError for what they lack."""
+    to_povray: Callable[[I], str] | None = None
+    """POV-Ray's global settings, where it computes the same."""
 
 
 def hiding(integrator: Any) -> Data:

@@ -13,7 +13,7 @@ from comparisons.lights.light import (
 )
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.plugin_table import EMISSION, PluginTable, Row
-from comparisons.renderers.vocabulary import GltfWriter
+from comparisons.renderers.vocabulary import GltfWriter, pov_vector
 from reference_rt.lights import Ambient, Constant
 
 
@@ -51,6 +51,7 @@ CONSTANT = LightType(
     to_cycles=lambda light: {"type": "BACKGROUND", "colour": list(light.radiance)},
     to_gltf=leave_out_environment,
     to_pbrt=lambda light, writing: ("infinite", {"rgb L": light.radiance}),
+    to_povray=lambda light: f"background {{ rgb {pov_vector(light.radiance)} }}",
     moved=_stays,
     at=None,
     along=None,
@@ -69,6 +70,7 @@ AMBIENT = LightType(
     to_cycles=None,
     to_gltf=_leave_out_ambient,
     to_pbrt=lambda light, writing: None,
+    to_povray=lambda light: "",
     moved=_stays,
     at=None,
     along=None,

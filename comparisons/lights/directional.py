@@ -15,7 +15,7 @@ from comparisons.lights.light import (
 )
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.plugin_table import EMISSION, VECTOR, PluginTable, Row
-from comparisons.renderers.vocabulary import GltfWriter, Params, PbrtWriter
+from comparisons.renderers.vocabulary import GltfWriter, Params, PbrtWriter, pov_vector
 from reference_rt.lights import Directional
 
 TABLE = PluginTable(
@@ -53,6 +53,16 @@ def _to_pbrt(light: Directional, writing: PbrtWriter) -> tuple[str, Params]:
     return "distant", {"rgb L": light.irradiance, **place}
 
 
+FAR = 1e4
+"""Where parallel light begins, beyond all shapes."""
+
+
+def _to_povray(light: Directional) -> str:
+    way = np.array(light.direction) / np.linalg.norm(light.direction)
+    colour = pov_vector(np.array(light.irradiance) / np.pi)
+    return f"light_source {{ {pov_vector(-FAR * way)}, rgb {colour} parallel point_at <0,0,0> }}"
+
+
 def _moved(light: Directional, motion: Motion) -> Directional:
     return light.model_copy(update={"direction": motion.direction(light.direction)})
 
@@ -65,6 +75,7 @@ DIRECTIONAL = LightType(
     to_cycles=_to_cycles,
     to_gltf=_to_gltf,
     to_pbrt=_to_pbrt,
+    to_povray=_to_povray,
     moved=_moved,
     at=None,
     along=lambda light: light.direction,

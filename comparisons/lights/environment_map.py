@@ -90,6 +90,7 @@ ENVIRONMENT_MAP = LightType(
     to_cycles=None,
     to_gltf=leave_out_environment,
     to_pbrt=lambda light, writing: ("infinite", {"string filename": image_of(light, writing)}),
+    to_povray=None,
     moved=_moved,
     at=None,
     along=None,

@@ -74,6 +74,8 @@ class LightType(Generic[L]):
     to_pbrt: Callable[[L, PbrtWriter], tuple[str, Params] | None] | None
     """pbrt's plugin and its parameters; it returns None for what is left out.  Raises
     UnwritableError."""
+    to_povray: Callable[[L], str] | None
+    """A light whose colour is its irradiance over pi; empty for what is said elsewhere."""
     moved: Callable[[L, Motion], L | None]
     """The light of a moved world that lights it as before; None if ours cannot have it."""
     at: Callable[[L], Triple] | None

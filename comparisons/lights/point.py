@@ -16,7 +16,7 @@ from comparisons.lights.light import (
 )
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.plugin_table import EMISSION, VECTOR, PluginTable, Row
-from comparisons.renderers.vocabulary import GltfWriter, Params, PbrtWriter
+from comparisons.renderers.vocabulary import GltfWriter, Params, PbrtWriter, pov_vector
 from reference_rt.lights import Point
 
 TABLE = PluginTable(
@@ -48,6 +48,16 @@ def _to_pbrt(light: Point, writing: PbrtWriter) -> tuple[str, Params]:
     return "point", {"rgb I": light.intensity, "point3 from": light.position}
 
 
+NEAR = 1e-3
+"""Distance at which POV-Ray's attenuation, 2 / (1 + (d / NEAR)²), turns: far below all others."""
+
+
+def _to_povray(light: Point) -> str:
+    colour = np.array(light.intensity) / (2.0 * NEAR * NEAR * math.pi)
+    fades = f"fade_distance {NEAR!r} fade_power 2"
+    return f"light_source {{ {pov_vector(light.position)}, rgb {pov_vector(colour)} {fades} }}"
+
+
 def _moved(light: Point, motion: Motion) -> Point:
     there = {"position": motion.point(light.position)}
     return light.model_copy(update=there | {"intensity": brighter(light.intensity, motion)})
@@ -61,6 +71,7 @@ POINT = LightType(
     to_cycles=_to_cycles,
     to_gltf=_to_gltf,
     to_pbrt=_to_pbrt,
+    to_povray=_to_povray,
     moved=_moved,
     at=lambda light: light.position,
     along=None,

@@ -117,6 +117,7 @@ PROJECTOR = LightType(
     to_cycles=None,
     to_gltf=None,
     to_pbrt=None,
+    to_povray=None,
     moved=_moved,
     at=lambda light: light.origin,
     along=None,

@@ -134,6 +134,7 @@ SPOT = LightType(
     to_cycles=None,
     to_gltf=_to_gltf,
     to_pbrt=_to_pbrt,
+    to_povray=None,
     moved=_moved,
     at=lambda light: light.origin,
     along=None,

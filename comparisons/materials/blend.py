@@ -1,12 +1,21 @@
 """Blends of two materials, of which Mitsuba's is wrong for perfect mirrors."""
 
+from dataclasses import replace
 from typing import Any
 
 from comparisons.materials.material import MaterialType, has_delta, nested
 from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.plugin_table import PluginTable, Row
-from comparisons.renderers.vocabulary import CyclesWriter, Data, Params, PbrtWriter
+from comparisons.renderers import NoCounterpartError
+from comparisons.renderers.vocabulary import (
+    CyclesWriter,
+    Data,
+    Params,
+    PbrtWriter,
+    PovLook,
+    PovWriter,
+)
 from comparisons.textures.kinds import NUMBER_OR_TEXTURE
 from comparisons.textures.texture import Nested
 from reference_rt.materials import Blend
@@ -52,6 +61,21 @@ def _to_pbrt(material: Blend, writing: PbrtWriter, both_sides: bool) -> Params:
     return {"string type": "mix", "string materials": names, **amount}
 
 
+def _to_povray(material: Blend, writing: PovWriter) -> PovLook:
+    """Of a mirror and another material, which is one of POV-Ray's."""
+    if isinstance(material.weight, str):
+        raise NoCounterpartError("a blend whose weight is a texture")
+    shares = (1.0 - material.weight, material.weight)
+    names = (material.first, material.second)
+    looks = [writing.look(name).weighted(w) for name, w in zip(names, shares, strict=True)]
+    looks.sort(key=lambda look: look.is_mirror)
+    dull, mirror = looks
+    if not mirror.is_mirror or dull.index is not None or dull.both_sides != mirror.both_sides:
+        raise NoCounterpartError("a blend of other materials than a mirror and an opaque one")
+    summed = tuple(a + b for a, b in zip(dull.mirror, mirror.mirror, strict=True))
+    return replace(dull, mirror=summed)
+
+
 BLEND = MaterialType(
     description=Blend,
     table=TABLE,
@@ -62,4 +86,5 @@ BLEND = MaterialType(
     to_cycles=_to_cycles,
     to_gltf=None,
     to_pbrt=_to_pbrt,
+    to_povray=_to_povray,
 )

@@ -2,7 +2,16 @@
 
 from comparisons.materials.material import Gltf, MaterialType
 from comparisons.mitsuba.plugin_table import PluginTable, Row
-from comparisons.renderers.vocabulary import CyclesWriter, Data, Params, PbrtWriter, front, matte
+from comparisons.renderers.vocabulary import (
+    CyclesWriter,
+    Data,
+    Params,
+    PbrtWriter,
+    PovLook,
+    PovWriter,
+    front,
+    matte,
+)
 from comparisons.textures.kinds import COLOUR_OR_TEXTURE
 from reference_rt.materials import Diffuse
 
@@ -18,6 +27,10 @@ def _to_pbrt(material: Diffuse, writing: PbrtWriter, both_sides: bool) -> Params
     return {"string type": "diffuse", **colour}
 
 
+def _to_povray(material: Diffuse, writing: PovWriter) -> PovLook:
+    return PovLook(material.reflectance, diffuse=1.0)
+
+
 DIFFUSE = MaterialType(
     description=Diffuse,
     table=TABLE,
@@ -28,4 +41,5 @@ DIFFUSE = MaterialType(
     to_cycles=_to_cycles,
     to_gltf=Gltf(lambda material, name, writing: matte(material.reflectance)),
     to_pbrt=_to_pbrt,
+    to_povray=_to_povray,
 )

@@ -14,6 +14,8 @@ from comparisons.renderers.vocabulary import (
     Look,
     Params,
     PbrtWriter,
+    PovLook,
+    PovWriter,
 )
 from comparisons.textures.texture import Nested
 from reference_rt.materials import Mask, Material, Wrapper
@@ -48,8 +50,8 @@ class MaterialType:
     material (it may be one);  from_mitsuba: a material of an element, by Mitsuba's plugin;  note:
     on a material whose counterpart is not simply Mitsuba's own, empty without one;  errors: None
     for exact materials;  to_cycles: where Cycles computes the same to 0.1 %;  to_pbrt: with whether
-    both sides look alike.  They raise UntranslatableError, SceneError, NoCounterpartError and
-    UnwritableError.
+    both sides look alike;  to_povray: where POV-Ray computes the same to 1e-5.  They raise
+    UntranslatableError, SceneError, NoCounterpartError and UnwritableError.
     """
 
     description: type[Material]
@@ -61,6 +63,7 @@ class MaterialType:
     to_cycles: Callable[[Any, CyclesWriter], Data] | None
     to_gltf: Gltf | None
     to_pbrt: Callable[[Any, PbrtWriter, bool], Params] | None
+    to_povray: Callable[[Any, PovWriter], PovLook] | None = None
 
 
 def has_delta(material: Material, context: TranslationContext) -> bool:

@@ -3,12 +3,15 @@
 from comparisons.materials.material import Gltf, MaterialType
 from comparisons.materials.metal import REFLECTANCE, pbrt_metal
 from comparisons.mitsuba.plugin_table import PluginTable
+from comparisons.renderers import NoCounterpartError
 from comparisons.renderers.vocabulary import (
     CyclesWriter,
     Data,
     Look,
     Params,
     PbrtWriter,
+    PovLook,
+    PovWriter,
     front,
 )
 from reference_rt.materials import Mirror
@@ -31,6 +34,12 @@ def _to_pbrt(material: Mirror, writing: PbrtWriter, both_sides: bool) -> Params:
     return pbrt_metal(index, material, writing)
 
 
+def _to_povray(material: Mirror, writing: PovWriter) -> PovLook:
+    if isinstance(material.reflectance, str):
+        raise NoCounterpartError("a mirror with a texture")
+    return PovLook(mirror=material.reflectance)
+
+
 MIRROR = MaterialType(
     description=Mirror,
     table=TABLE,
@@ -44,4 +53,5 @@ MIRROR = MaterialType(
         nearly="a smooth metal, white at grazing angles",
     ),
     to_pbrt=_to_pbrt,
+    to_povray=_to_povray,
 )

@@ -1,5 +1,6 @@
 """Two-sided materials."""
 
+from dataclasses import replace
 from typing import Any
 
 from comparisons.materials.material import Gltf, MaterialType, has_delta, nested
@@ -7,7 +8,15 @@ from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.files import UnwritableError
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.renderers import NoCounterpartError
-from comparisons.renderers.vocabulary import BLACK, CyclesWriter, Data, GltfWriter, Look
+from comparisons.renderers.vocabulary import (
+    BLACK,
+    CyclesWriter,
+    Data,
+    GltfWriter,
+    Look,
+    PovLook,
+    PovWriter,
+)
 from comparisons.textures.texture import Nested
 from reference_rt.materials import TwoSided
 
@@ -58,6 +67,13 @@ def _look(material: TwoSided, name: str, writing: GltfWriter) -> Look:
     return look
 
 
+def _to_povray(material: TwoSided, writing: PovWriter) -> PovLook:
+    look = writing.look(material.base)
+    if material.back not in (None, material.base) or look.index is not None or any(look.ambient):
+        raise NoCounterpartError("two_sided of two materials, of glass, or with ambient light")
+    return replace(look, both_sides=True)
+
+
 TWO_SIDED = MaterialType(
     description=TwoSided,
     table=None,
@@ -68,4 +84,5 @@ TWO_SIDED = MaterialType(
     to_cycles=_to_cycles,
     to_gltf=Gltf(_look),
     to_pbrt=None,  # both sides of pbrt's materials look alike: `pbrt.surfaces`
+    to_povray=_to_povray,
 )

@@ -9,11 +9,16 @@ name in `WitnessName` and `comparisons.commands.options.Witness` if it may vote.
 import importlib
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import Literal, NamedTuple, Protocol, cast
+from typing import Literal, NamedTuple, Protocol, cast, runtime_checkable
+
+import numpy as np
+import numpy.typing as npt
 
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceRtError
+
+BoolArray = npt.NDArray[np.bool_]
 
 
 class Replicates(NamedTuple):
@@ -60,13 +65,46 @@ class Renderer(Protocol):
         SceneError for a file that cannot be used."""
 
 
-PLACES = {"mitsuba": "comparisons.translator.native", "cycles": "comparisons.cycles.backend"}
+class FirstHits(NamedTuple):
+    """What the pixels' centres show, in scene units.
+
+    shapes: the indices of those that the renderer has, and traced;  p, n (height, width, 3):
+    points, and unit normals of those on a front;  hit, front (height, width): whether there is one,
+    and whether it is on its surface's front;  left_out: of other shapes the reason, and how many;
+    rounding (shapes,): of
+    the coordinates on each;  lower, upper (3,): coordinates beyond cannot be told.
+    """
+
+    shapes: tuple[int, ...]
+    p: FloatArray
+    n: FloatArray
+    hit: BoolArray
+    front: BoolArray
+    left_out: dict[str, int]
+    rounding: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+
+
+@runtime_checkable
+class NoiseFree(Renderer, Protocol):
+    """Another renderer that draws no random numbers, and traces the rays of our grid."""
+
+    def first_hits(self, scene: Scene, threads: int | None = None) -> FirstHits:
+        """Of the scene's camera rays.  Raises NoCounterpartError, ReferenceUnavailableError."""
+
+
+PLACES = {
+    "mitsuba": "comparisons.translator.native",
+    "cycles": "comparisons.cycles.backend",
+    "povray": "comparisons.povray.backend",
+}
 """The modules of the other renderers, by name.  Imported when one is needed."""
 
 ReferenceSampler = Literal["independent", "multijitter"]
 """Mitsuba's samplers of a comparison, see `comparisons.compare.budget`."""
 
-WitnessName = Literal["cycles"]
+WitnessName = Literal["cycles", "povray"]
 """Those that are no party to a comparison, and may be asked who is right."""
 
 

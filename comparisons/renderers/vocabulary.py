@@ -1,12 +1,12 @@
-"""What a type of textures or materials says of itself to other renderers: the words of Cycles, glTF
-and pbrt, and what the writer of a scene does for it.
+"""What a type of textures or materials says of itself to other renderers: the words of Cycles,
+glTF, pbrt and POV-Ray, and what the writer of a scene does for it.
 
 A type's file knows these alone; the writers, which know all types, are `comparisons.cycles`,
-`comparisons.gltf` and `comparisons.pbrt`.
+`comparisons.gltf`, `comparisons.pbrt` and `comparisons.povray`.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -175,3 +175,58 @@ class PbrtWriter(Protocol):
 
     def image(self, stem: str, texels: FloatArray) -> str:
         """The name of an image file of linear values (h, w, 3)."""
+
+
+# ---- POV-Ray -------------------------------------------------------------------------------------
+
+
+def pov_vector(value: Any) -> str:
+    """Numbers as POV-Ray writes them, to the last bit."""
+    return "<" + ",".join(repr(float(x)) for x in value) + ">"
+
+
+@dataclass(frozen=True)
+class PovLook:
+    """A material in POV-Ray's terms, which multiplies `colour` with what is diffuse and ambient.
+
+    colour (3,), or the name of a texture;  diffuse: factor of the cosine, where a light has its
+    irradiance over pi;  ambient (3,): factor of colour and ambient light, also from behind;
+    highlight: POV-Ray's word, strength and exponent;  mirror (3,): of the mirrored direction;
+    index: of glass, which has none of the others;  both_sides: else black from behind.
+    """
+
+    colour: Any = (0.0, 0.0, 0.0)
+    diffuse: float = 0.0
+    ambient: tuple[float, ...] = (0.0, 0.0, 0.0)
+    highlight: tuple[str, float, float] | None = None
+    mirror: tuple[float, ...] = (0.0, 0.0, 0.0)
+    index: float | None = None
+    both_sides: bool = False
+
+    @property
+    def is_mirror(self) -> bool:
+        """Whether it scatters into the mirrored direction alone."""
+        dull = self.highlight is None and self.index is None
+        return self.diffuse == 0.0 and not any(self.ambient) and dull
+
+    def weighted(self, weight: float) -> "PovLook":
+        """A share of it in a blend."""
+        highlight = self.highlight
+        if highlight is not None:
+            highlight = (highlight[0], weight * highlight[1], highlight[2])
+        return replace(
+            self,
+            diffuse=weight * self.diffuse,
+            ambient=tuple(weight * x for x in self.ambient),
+            highlight=highlight,
+            mirror=tuple(weight * x for x in self.mirror),
+        )
+
+
+class PovWriter(Protocol):
+    """Its methods raise NoCounterpartError."""
+
+    scene: Scene
+
+    def look(self, name: str | None) -> PovLook:
+        """The material with this name."""

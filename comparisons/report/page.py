@@ -239,6 +239,7 @@ def _view(case: Case, mapped: bool, walls: Mapping[str, float]) -> dict[str, Any
     from comparisons.report.thumbnails import of_witness
 
     short, seen = in_short(case)
+    whose = next((r.numbers.get("whose", "") for r in case.rungs if r.name == "witness"), "")
     pictures = _thumbnails(case)
     return {
         "case": case,
@@ -255,7 +256,7 @@ def _view(case: Case, mapped: bool, walls: Mapping[str, float]) -> dict[str, Any
         "pictures": pictures,
         "layers": [],
         "figures": _figures(case, pictures, mapped) if pictures else [],
-        "witness": of_witness(case.images, case.sides) if pictures and case.images else [],
+        "witness": of_witness(case.images, case.sides, whose) if pictures and case.images else [],
         "histograms": _histograms(case, pictures) if pictures else [],
         "metrics": _metrics(case.metrics) if case.metrics else None,
         "times": _times(case),

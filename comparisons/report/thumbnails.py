@@ -66,15 +66,15 @@ def thumbnails(images: Images) -> Thumbnails:
     )
 
 
-def of_witness(images: Images, sides: tuple[str, str]) -> list[tuple[Thumbnail, str]]:
+def of_witness(images: Images, sides: tuple[str, str], whose: str) -> list[tuple[Thumbnail, str]]:
     """A third renderer's picture and what each of the two differs from it, with their titles; none
-    where there is no third one."""
+    where there is no third one.  whose: its."""
     if images.witness is None:
         return []
-    found = [(_exposed(images.witness, white_level(images.reference)), "Cycles'")]
+    found = [(_exposed(images.witness, white_level(images.reference)), whose)]
     for picture, side in zip((images.candidate, images.reference), sides, strict=True):
         span, difference = _difference(Images(picture, images.witness))
-        found.append((difference, f"{side} − Cycles', −{span:.2g} to +{span:.2g}"))
+        found.append((difference, f"{side} − {whose}, −{span:.2g} to +{span:.2g}"))
     return found
 
 

@@ -275,7 +275,7 @@ def _decided(
     decides."""
     differ_at = np.minimum(ours.t, theirs.t)
     copies = np.stack([sizes.copy_of(ours), sizes.copy_of(theirs)])[:, wrong]
-    together = _coincide(sizes, rays.rows(wrong), copies, differ_at[wrong], tolerance[wrong])
+    together = coincide(sizes, rays.rows(wrong), copies, differ_at[wrong], tolerance[wrong])
     left = wrong[~together]
     truths = Referee(sizes, TOGETHER).decide(rays.o[left], rays.d[left])
     right = [
@@ -286,7 +286,7 @@ def _decided(
     return np.setdiff1d(left, cleared), cleared, wrong[together]
 
 
-def _coincide(
+def coincide(
     sizes: ShapeSizes, rays: Rays, copies: IntArray, t: FloatArray, tolerance: FloatArray
 ) -> BoolArray:
     """Whether two primitives of `copies` (2, n) have a face at t, within `tolerance`."""

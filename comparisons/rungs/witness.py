@@ -6,8 +6,9 @@ from collections.abc import Callable
 import numpy as np
 
 from comparisons import statistics
-from comparisons.renderers import NoCounterpartError, WitnessName, other
+from comparisons.renderers import NoCounterpartError, NoiseFree, WitnessName, other
 from comparisons.results.case import RungResult, Status
+from comparisons.rungs.noise_free import noise_free_witness
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceUnavailableError
@@ -17,8 +18,8 @@ PAIRS = ((0, 1), (0, 2), (1, 2))
 Witness = Callable[
     [tuple[FloatArray, FloatArray], tuple[str, str]], tuple[RungResult, FloatArray | None]
 ]
-"""Takes the replicates of both sides, and whose they are; returns the rung, and the witness's mean
-picture."""
+"""Takes the replicates of both sides, or their pictures without noise, and whose they are; returns
+the rung, and the witness's mean picture."""
 
 
 def witness_of(
@@ -27,16 +28,23 @@ def witness_of(
     limit: float,
     threads: int | None,
     say: Callable[[str], None],
+    seen: Scene | None = None,
 ) -> Witness:
     """The witness of a scene's pictures.  limit: as in `statistics.compare`;  threads: its own,
-    None for all cores.  Raises ReferenceUnavailableError where it is not installed."""
+    None for all cores;  seen: what we render, None for the same.  Raises
+    ReferenceUnavailableError where it is not installed."""
     witness = other(name)
+    if isinstance(witness, NoiseFree):
+        return noise_free_witness(witness, scene, seen or scene, threads, say)
     version = witness.version()
     whose = witness.title + ("'" if witness.title.endswith("s") else "'s")
 
     def hear(
         replicates: tuple[FloatArray, FloatArray], sides: tuple[str, str]
     ) -> tuple[RungResult, FloatArray | None]:
+        if min(map(len, replicates)) < 2:
+            reason = f"{witness.title} has noise: it does not vote on pictures without"
+            return RungResult("witness", "not-applicable", reason), None
         count = max(2, *(len(side) for side in replicates))
         try:
             with witness.load(scene, threads) as loaded:
@@ -48,7 +56,7 @@ def witness_of(
             return RungResult("witness", "not-comparable", str(error)), None
         say(f"witness: {count} pictures by {witness.title} ({rendered.seconds.sum():.1f} s)")
         rung = vote((*replicates, rendered.pictures), (*sides, whose), limit)
-        rung.numbers["version"] = version
+        rung.numbers.update(version=version, whose=whose)
         rung.numbers["seconds"] = float(np.median(rendered.seconds))
         return rung, rendered.pictures.mean(axis=0)
 

@@ -173,4 +173,5 @@ BOX = ShapeType(
     to_cycles=_to_cycles,
     to_raysect=lambda shape: [RaysectPart("box", (1.0, 1.0, 1.0))],
     is_sampled=True,
+    to_povray=lambda shape, folder: "box { <-1,-1,-1>, <1,1,1>",
 )

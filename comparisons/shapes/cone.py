@@ -10,6 +10,7 @@ from comparisons.shapes.tubes import (
     Tube,
     cap_plugins,
     tube_for_cycles,
+    tube_for_povray,
     tube_for_raysect,
     tube_surface,
     tube_triangles,
@@ -39,4 +40,5 @@ CONE = ShapeType(
     unwrapped=unwrapped,
     to_cycles=lambda shape, folder: tube_for_cycles(_tube(shape)),
     to_raysect=lambda shape: tube_for_raysect(_tube(shape)),
+    to_povray=lambda shape, folder: tube_for_povray(_tube(shape)),
 )

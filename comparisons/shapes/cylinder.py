@@ -25,6 +25,7 @@ from comparisons.shapes.tubes import (
     cap_plugins,
     followed,
     tube_for_cycles,
+    tube_for_povray,
     tube_for_raysect,
     tube_surface,
     tube_triangles,
@@ -153,4 +154,5 @@ CYLINDER = ShapeType(
     to_cycles=lambda shape, folder: tube_for_cycles(_tube(shape)),
     to_raysect=lambda shape: tube_for_raysect(_tube(shape)),
     to_pbrt=_to_pbrt,
+    to_povray=lambda shape, folder: tube_for_povray(_tube(shape)),
 )

@@ -109,4 +109,5 @@ DISK = ShapeType(
     to_cycles=lambda shape, folder: fan(1.0, 0.0, 1.0),
     to_pbrt=_to_pbrt,
     is_sampled=True,
+    to_povray=lambda shape, folder: "disc { <0,0,0>, z, 1",
 )

@@ -14,6 +14,8 @@ from comparisons.geometry.exact.crossings import Crossings, Row, column, ordered
 from comparisons.geometry.exact.dyadic import Dyadic, cross, dot, quotient
 from comparisons.mitsuba.hits import Plugin, same_uv
 from comparisons.mitsuba.second import described
+from comparisons.renderers import NoCounterpartError
+from comparisons.renderers.vocabulary import pov_vector
 from comparisons.shapes.reading_meshes import mesh as read
 from comparisons.shapes.shape import Features, ShapeType, TableType, never
 from comparisons.shapes.site import Site, placed, with_mesh_light
@@ -104,6 +106,22 @@ def _to_cycles(shape: Triangle | Mesh, folder: Path) -> Soup:
     return Soup(mesh.points.reshape(-1, 3), normals, uv)
 
 
+MOST_TRIANGLES = 200_000
+"""Of a mesh for POV-Ray, which reads them as text, some 100,000 a second."""
+
+
+def _to_povray(shape: Triangle | Mesh, folder: Path) -> str:
+    """POV-Ray's front is the side from which corners go round clockwise."""
+    corners = described(shape, folder).points.reshape(-1, 3)
+    if len(corners) > 3 * MOST_TRIANGLES:
+        raise NoCounterpartError(f"a mesh of more than {MOST_TRIANGLES:,} triangles")
+    faces = (f"<{k},{k + 2},{k + 1}>" for k in range(0, len(corners), 3))
+    return (
+        f"mesh2 {{ vertex_vectors {{ {len(corners)}, {', '.join(map(pov_vector, corners))} }} "
+        f"face_indices {{ {len(corners) // 3}, {', '.join(faces)} }} inside_vector <0.1,0.2,1>"
+    )
+
+
 TRIANGLES = TableType(
     field="triangles", crossings=_crossings, features=_features, targets=_targets, near=_near
 )
@@ -117,6 +135,7 @@ MESH = ShapeType(
     encloses=never,
     from_mitsuba={"obj": read, "ply": read, "serialized": read},
     to_cycles=_to_cycles,
+    to_povray=_to_povray,
     is_sampled=True,
 )
 
@@ -128,5 +147,6 @@ TRIANGLE = ShapeType(
     triangles=None,
     encloses=never,
     to_cycles=_to_cycles,
+    to_povray=_to_povray,
     is_sampled=True,
 )

@@ -80,4 +80,5 @@ PLANE = ShapeType(
     triangles=None,
     encloses=always,
     to_raysect=lambda shape: [RaysectPart("half_space", ())],
+    to_povray=lambda shape, folder: "plane { z, 0",
 )

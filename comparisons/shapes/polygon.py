@@ -1,5 +1,6 @@
 """Polygons with holes: triangles by independent code, Clipper2 in manifold3d."""
 
+from pathlib import Path
 from typing import Any
 
 import manifold3d
@@ -9,6 +10,8 @@ from comparisons.geometry import affine
 from comparisons.geometry.exact.crossings import Crossings, Row, plane_crossing, single
 from comparisons.geometry.exact.dyadic import Dyadic
 from comparisons.mitsuba.hits import Plugin, same_uv
+from comparisons.renderers import NoCounterpartError
+from comparisons.renderers.vocabulary import pov_vector
 from comparisons.shapes.flat import on_plane
 from comparisons.shapes.shape import ShapeType, TableType, never, per_face
 from comparisons.shapes.site import Site, with_mesh_light
@@ -106,6 +109,26 @@ def _targets(table: Any) -> FloatArray:
     return np.concatenate([on_plane(table, a), on_plane(table, 0.5 * (a + b))])
 
 
+def _to_povray(shape: Polygon, folder: Path) -> str:
+    """Convex: of others POV-Ray's front may be another one."""
+    if len(shape.rings) > 1:
+        raise NoCounterpartError("a polygon of several rings: POV-Ray's front may be another one")
+    ring = np.array(shape.rings[0])
+    sides = np.roll(ring, -1, axis=0) - ring
+    turns = np.cross(sides, np.roll(sides, -1, axis=0))
+    if not (np.sum(turns * turns.sum(axis=0), axis=1) >= 0.0).all() or _windings(sides) != 1:
+        raise NoCounterpartError("a polygon that is not convex: POV-Ray's front may be another one")
+    points = [*shape.rings[0], shape.rings[0][0]]
+    return f"polygon {{ {len(points)}, {', '.join(map(pov_vector, points))}"
+
+
+def _windings(sides: FloatArray) -> int:
+    """How often a ring whose turns are all to one side goes round."""
+    following = np.roll(sides, -1, axis=0)
+    turned = np.linalg.norm(np.cross(sides, following), axis=1)
+    return round(float(np.arctan2(turned, np.sum(sides * following, axis=1)).sum()) / (2.0 * np.pi))
+
+
 POLYGON = ShapeType(
     of=Polygon,
     table=TableType(
@@ -118,4 +141,5 @@ POLYGON = ShapeType(
     to_mitsuba=_to_mitsuba,
     triangles=lambda shape, m: ([polygon_soup(shape)], 0.0),
     encloses=never,
+    to_povray=_to_povray,
 )

@@ -2,6 +2,7 @@
 
 import itertools
 from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from comparisons.geometry.exact.crossings import (
 from comparisons.geometry.exact.dyadic import NEVER, Dyadic, roots, tied
 from comparisons.mitsuba.hits import Plugin, same_uv
 from comparisons.mitsuba.plugins.exact_coordinates import of_quadric
+from comparisons.renderers.vocabulary import pov_vector
 from comparisons.shapes.canonical import patches_of
 from comparisons.shapes.meshing import cap_faces, cut_away, heights_over_uv
 from comparisons.shapes.shape import Features, ShapeType, TableType, Tessellation, is_capped
@@ -205,6 +207,17 @@ def _triangles(shape: Quadric, m: affine.Affine) -> Tessellation:
     return parts, distance
 
 
+def _to_povray(shape: Quadric, folder: Path) -> str:
+    """POV-Ray's coefficients are of x², y², z²; xy, xz, yz; x, y, z; 1."""
+    a, b, c, d, e, f, *linear = shape.coefficients
+    terms = ",".join(map(pov_vector, ((a, b, c), (d, f, e), linear[:3])))
+    whole = f"quadric {{ {terms}, {linear[3]!r}"
+    box = f"box {{ {pov_vector(shape.lower)}, {pov_vector(shape.upper)} }}"
+    if shape.capped:
+        return f"intersection {{ {whole} }} {box}"
+    return f"{whole} clipped_by {{ {box} }}"
+
+
 QUADRIC = ShapeType(
     of=Quadric,
     table=TableType(field="quadrics", crossings=_crossings, features=_features),
@@ -212,4 +225,5 @@ QUADRIC = ShapeType(
     to_mitsuba=_to_mitsuba,
     triangles=_triangles,
     encloses=is_capped,
+    to_povray=_to_povray,
 )

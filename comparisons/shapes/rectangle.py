@@ -79,4 +79,6 @@ RECTANGLE = ShapeType(
     own_plugin=as_written("rectangle"),
     to_cycles=lambda shape, folder: _soup(),
     is_sampled=True,
+    to_povray=lambda shape, folder: "polygon { 5, <-1,-1,0>,<1,-1,0>,<1,1,0>,<-1,1,0>,<-1,-1,0>",
+    flat_uv=np.array([[2.0, 0.0, 0.0, -1.0], [0.0, 2.0, 0.0, -1.0], [0.0, 0.0, 1.0, 0.0]]),
 )

@@ -135,5 +135,10 @@ class ShapeType(Generic[AnyShape]):
     """pbrt's own shapes; none where triangles must stand for it."""
     to_raysect: Callable[[AnyShape], list[RaysectPart]] | None = None
     """raysect's primitives whose intersection it is.  Raises NoCounterpartError."""
+    to_povray: Callable[[AnyShape, Path], str] | None = None
+    """POV-Ray's object before its transform and texture, which follow, with the brace that closes
+    it.  Raises NoCounterpartError."""
+    flat_uv: Affine | None = None
+    """Of a flat shape the map from (u, v, 0) to its own coordinates."""
     is_sampled: bool = False
     """Whether `reference_rt` samples points of one that is a lamp."""

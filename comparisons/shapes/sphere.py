@@ -15,6 +15,7 @@ from comparisons.mitsuba.hits import CURVED, Plugin, same_uv
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.parse import as_transform
 from comparisons.mitsuba.plugins.exact_coordinates import Round
+from comparisons.renderers.vocabulary import pov_vector
 from comparisons.shapes.fine import FINE, fine, on_circle, widened
 from comparisons.shapes.reading_maps import (
     TOLERANCE,
@@ -118,6 +119,10 @@ def _to_raysect(shape: Sphere) -> list[RaysectPart]:
     return [RaysectPart("sphere", (shape.radius,), np.column_stack([np.eye(3), shape.center]))]
 
 
+def _to_povray(shape: Sphere, folder: Path) -> str:
+    return f"sphere {{ {pov_vector(shape.center)}, {float(shape.radius)!r}"
+
+
 def _own_plugin(shape: Sphere, linear: FloatArray, textured: bool) -> OwnPlugin | None:
     if not affine.is_similarity(linear) or np.linalg.det(linear) <= 0.0:
         return None
@@ -178,4 +183,5 @@ SPHERE = ShapeType(
     to_pbrt=_to_pbrt,
     to_raysect=_to_raysect,
     is_sampled=True,
+    to_povray=_to_povray,
 )

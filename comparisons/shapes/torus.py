@@ -125,6 +125,15 @@ def _to_cycles(shape: Torus, folder: Path) -> Soup:
     return fine(surface_of(shape.model_copy(update=radii)), (4 * FINE, FINE))
 
 
+AROUND_Z = "matrix <1,0,0, 0,0,1, 0,-1,0, 0,0,0>"
+"""POV-Ray's tori are around y."""
+
+
+def _to_povray(shape: Torus, folder: Path) -> str:
+    """By Sturm's method: its other one leaves holes in thin tori."""
+    return f"torus {{ {shape.major_radius!r}, {shape.minor_radius!r} sturm {AROUND_Z}"
+
+
 TORUS = ShapeType(
     of=Torus,
     table=TableType(
@@ -140,4 +149,5 @@ TORUS = ShapeType(
     encloses=always,
     to_cycles=_to_cycles,
     to_raysect=lambda shape: [RaysectPart("torus", (shape.major_radius, shape.minor_radius))],
+    to_povray=_to_povray,
 )

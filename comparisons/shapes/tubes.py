@@ -69,6 +69,15 @@ def tube_for_raysect(tube: Tube) -> list[RaysectPart]:
     return [whole, RaysectPart("box", half, affine.compose(middle, place))]
 
 
+def tube_for_povray(tube: Tube) -> str:
+    """POV-Ray's cylinder or cone."""
+    kind, radii = "cone", [f"{float(r)!r}, " for r in (tube.bottom, tube.top)]
+    if tube.bottom == tube.top:
+        kind, radii = "cylinder", ["", radii[1]]
+    ends = (f"<0,0,{float(z)!r}>, {r}" for z, r in zip((tube.low, tube.high), radii, strict=True))
+    return f"{kind} {{ {''.join(ends)[:-2]}{'' if tube.capped else ' open'}"
+
+
 def tube_surface(tube: Tube, textured: bool = False) -> Surface:
     """The side, and its ends.  textured: in rings, where it narrows little, so that uv are almost
     linear."""

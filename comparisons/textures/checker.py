@@ -9,6 +9,7 @@ from comparisons.mitsuba.colours import SPECTRA, colour
 from comparisons.mitsuba.colours import luminance as luminance_of
 from comparisons.mitsuba.context import TranslationContext, rgb
 from comparisons.mitsuba.node import Node, Reading
+from comparisons.renderers import NoCounterpartError
 from comparisons.renderers.vocabulary import (
     NEAREST,
     WRAPS,
@@ -20,6 +21,7 @@ from comparisons.renderers.vocabulary import (
     Params,
     PbrtWriter,
     plain_rgb,
+    pov_vector,
 )
 from comparisons.textures.bitmap import in_memory_or_file, lookup, pbrt_uv
 from comparisons.textures.texture import TextureType, Use, to_uv, uv_of
@@ -100,6 +102,16 @@ def _to_pbrt(texture: Checker, name: str, kind: str, writing: PbrtWriter) -> tup
     return "checkerboard", {**pbrt_uv(texture, 2.0), **colours}
 
 
+def _to_povray(texture: Checker) -> str:
+    """POV-Ray's fields have side 1, ours 1/2; the plane z = 0 is in the middle of a layer."""
+    if abs(np.linalg.det(affine.of_uv(texture.uv))) == 0.0:
+        raise NoCounterpartError("a texture that is one line")
+    first, second = (f"rgb {pov_vector(c)}" for c in (texture.first, texture.second))
+    (a, b, c), (d, e, f), _ = np.linalg.inv(affine.of_uv(texture.uv))
+    m = pov_vector([a, d, 0, b, e, 0, 0, 0, 1, c, f, 0])
+    return f"checker {first}, {second} translate <0,0,-0.5> scale <0.5,0.5,1> matrix {m}"
+
+
 CHECKER = TextureType(
     description=Checker,
     to_mitsuba=_to_mitsuba,
@@ -107,4 +119,5 @@ CHECKER = TextureType(
     to_cycles=_to_cycles,
     to_gltf=_to_gltf,
     to_pbrt=_to_pbrt,
+    to_povray=_to_povray,
 )

@@ -54,7 +54,8 @@ class TextureType:
 
     to_mitsuba: the dictionary of a texture with a name;  from_mitsuba: a texture of an element, by
     Mitsuba's plugin, but for what our own cannot be read from;  to_cycles;  to_gltf: its image;
-    to_pbrt: plugin and parameters of a texture with a name, as "rgb" or "float".
+    to_pbrt: plugin and parameters of a texture with a name, as "rgb" or "float";  to_povray: a
+    pigment where x, y are u, v and z is 0.
     """
 
     description: type[Texture]
@@ -63,6 +64,7 @@ class TextureType:
     to_cycles: Callable[[Any, CyclesWriter], Data] | None
     to_gltf: Callable[[Any, str, GltfWriter], GltfImage] | None
     to_pbrt: Callable[[Any, str, str, PbrtWriter], tuple[str, Params]] | None
+    to_povray: Callable[[Any], str] | None = None
 
 
 def grey(texels: FloatArray) -> FloatArray:

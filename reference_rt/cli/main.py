@@ -222,7 +222,9 @@ def explain(
     allow_missing: AllowMissing = False,
     witness: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Whether a third renderer may vote on it: cycles."),
+        typer.Option(
+            metavar="NAME", help="Whether a third renderer may vote on it: cycles or povray."
+        ),
     ] = None,
 ) -> None:
     """Print what a scene uses, how near to float64's limits it is, and its kernels."""

@@ -6,14 +6,14 @@ grid.  It shares nothing with a renderer."""
 import numpy as np
 import pytest
 
-from comparisons.gate import edges
-from comparisons.gate.edges import RULES, Edges, Look, edges_rung, look_at
 from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.question import Question
 from comparisons.gate.reference import of_scene
 from comparisons.report.biases import biases_of
 from comparisons.results.case import RungResult
+from comparisons.rungs import edges
+from comparisons.rungs.edges import RULES, Edges, Look, edges_rung, look_at
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.image import srgb
 from reference_rt.rendering.render import render

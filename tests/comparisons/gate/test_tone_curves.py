@@ -10,10 +10,10 @@ from gate_checks import run
 from PIL import Image
 from test_edges import HEIGHT, OTHERS, RULES, SCENE, WIDTH, Triangles
 
-from comparisons.gate.edges import DARK, TOLERANCE, Edges, edges_rung
 from comparisons.gate.shown_curve import estimated
 from comparisons.gate.tone_curves import CURVES, ToneCurve, curve_of
 from comparisons.results.case import RungResult
+from comparisons.rungs.edges import DARK, TOLERANCE, Edges, edges_rung
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.image import srgb
 from reference_rt.rendering.render import render

@@ -83,7 +83,10 @@ def test_the_page_in_a_browser(run, check_page):
     ("arguments", "words"),
     [
         (["truth", "nothing"], "there is no case 'nothing'; expected all, a pattern"),
-        (["truth", "--renderer", "pbrt"], "--renderer: expected ours, mitsuba, both or cycles"),
+        (
+            ["truth", "--renderer", "pbrt"],
+            "--renderer: expected ours, mitsuba, both, cycles or povray",
+        ),
         (["gate", "--truth", "nothing", "a.npy"], "--truth: there is no case 'nothing'"),
         (["gate", "--truth", "all", "a.npy"], "is 108 cases; expected one, or --command"),
         (["gate", "--truth", "slab"], "expected either candidates, --command or --browser"),

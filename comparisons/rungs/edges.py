@@ -36,13 +36,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from comparisons.gate.reference import is_noise_free
 from comparisons.results.case import FloatArray, RungResult
 from comparisons.statistics.cells import CHANNELS
 from reference_rt.cameras.film import BoxFilter
 from reference_rt.integrators import Direct, RayCast
 from reference_rt.rendering.image import srgb
 from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import Grid
 from reference_rt.textures.image_file import linear
 
 BoolArray = npt.NDArray[np.bool_]
@@ -126,6 +126,11 @@ Curve = Callable[[FloatArray], FloatArray]
 
 Look = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """The radiance (..., 3) at points of the film, and the distance (...) of what is seen there."""
+
+
+def is_noise_free(scene: Scene) -> bool:
+    """Whether a correct picture of the scene has no noise, because its samples are fixed."""
+    return scene.integrator.type == "ray_cast" or isinstance(scene.resolved_sampler, Grid)
 
 
 def look_at(scene: Scene, threads: int | None = None) -> Look | None:
@@ -288,6 +293,27 @@ def edges_rung(
     faults = _faults(numbers, at)
     reason = "; ".join([*faults[:1], _words(numbers), *faults[1:]])
     return RungResult("statistics", "differ" if faults else "agree", reason, numbers)
+
+
+MOST_STRAYS = 1 << 10
+"""Pixels of a picture of the same samples that are looked at: more are no matter of edges."""
+
+
+def strays(
+    candidate: FloatArray, reference: FloatArray, edges: Edges
+) -> tuple[BoolArray, BoolArray]:
+    """Of a picture whose samples are at the reference's places: which pixels (height, width)
+    differ, and in which of these an edge explains it, on which a sample falls to either side."""
+    floor = DARK * np.abs(reference.mean(axis=(0, 1))) if edges.floor is None else edges.floor
+    law = _Law(edges.tolerance, floor, False, None)
+    differs = np.any(law.beyond(candidate, reference, reference), axis=-1)
+    explained = np.zeros_like(differs)
+    row, column = np.nonzero(differs)
+    if 0 < len(row) <= MOST_STRAYS:
+        values = candidate[row, column]
+        seen = _seen(edges.look, law, row, column, values)
+        explained[row, column] = seen.step & ~law.beyond(values, *seen.edge).any(axis=-1)
+    return differs, explained
 
 
 def _crossed(look: Look, law: _Law, shape: tuple[int, ...]) -> BoolArray:
