@@ -58,21 +58,25 @@ def plant(planted: Planted) -> None:
 
 def answer(task: Mapping[str, Any]) -> dict[str, Any]:
     """What the rungs say, what truth says, and our picture."""
-    from comparisons.compare.compare import Subject, gather
-    from comparisons.compare.judge import judge
+    from comparisons import rungs as ladder
+    from comparisons.compare.compare import Subject, compare_scene
     from comparisons.experiments.selftest.mirrored import BUDGET
+    from comparisons.results.rungs import COMPARED
     from comparisons.truth.case import cases
-    from comparisons.truth.judge import judge as judge_truth
+    from comparisons.truth.judge import judge
     from comparisons.truth.renderers import load, ours
 
     scene = load(Path(task["scenes"]) / f"{task['case']}.yaml")
     pictures = ours(scene, threads=task["threads"])
-    truth = judge_truth(cases()[task["case"]].compute(), pictures)
+    truth = judge(cases()[task["case"]].compute(), pictures)
     budget = BUDGET.model_copy(update={"witness": task["witness"]})
-    evidence = gather(Subject(scene), budget, lambda step: None, task["threads"])
-    case = judge(evidence, budget.limit)
+    # These are asked apart: above a rung that differs the two sides are not compared.
+    apart = ("files", "solids")
+    rest = tuple(name for name in COMPARED if name not in apart)
+    case = compare_scene(Subject(scene), budget, lambda step: None, task["threads"], rest)
+    rungs = (ladder.files(scene), ladder.solids(scene, budget.pixels), *case.rungs)
     return {
-        "rungs": [(rung.name, rung.status, rung.reason) for rung in case.rungs],
+        "rungs": [(rung.name, rung.status, rung.reason) for rung in rungs],
         "verdict": case.verdict,
         "truth": truth.verdict,
         "percent": truth.percent,

@@ -29,14 +29,17 @@ CSG, WALK = "shapes/csg.py", "accel/csg.py"
 SORTED, LIT = "mitsuba/csg.py", "mitsuba/lit_scene.py"
 TAKEN = '            first = first & (value if tree.operation == "intersection" else value ^ True)'
 
+AS_OPERANDS = {
+    SORTED: (("            normal[turned] *= -1.0", "            pass"),),
+    LIT: (("        turned = met & (", "        turned = met & False & ("),),
+}
+"""Hits with the operands' own normals."""
+
 OF_SOLIDS = (
     Mistake(
         "normals of what is subtracted not turned", "bitten_box",
         {CSG: (("material, turned != takes_away)", "material, turned)"),)},
-        {
-            SORTED: (("            normal[turned] *= -1.0", "            pass"),),
-            LIT: (("        turned = met & (", "        turned = met & False & ("),),
-        },
+        AS_OPERANDS,
     ),
     Mistake(
         "operands of a difference exchanged", "drilled_box",
@@ -75,7 +78,13 @@ OF_SOLIDS = (
         {WALK: (("        if was != 0 and now != 0:\n            return False\n"
                  "        on = now != 0\n",
                  "        on = now & 1 == 1\n"),)},
-        {SORTED: (("            first = first | value", "            first = first ^ value"),)},
+        {
+            **AS_OPERANDS,
+            SORTED: (
+                ("            first = first | value", "            first = first ^ value"),
+                *AS_OPERANDS[SORTED],
+            ),
+        },
     ),
 )  # fmt: skip
 

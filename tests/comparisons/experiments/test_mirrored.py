@@ -28,8 +28,11 @@ BY_NAME = {mistake.name: mistake for mistake in MISTAKES}
 COUNTERPARTS = ("mitsuba/", "materials/", "integrators/", "shapes/")
 """Folders of code that stands on Mitsuba's side."""
 
-JUDGES = ("_crossings", "torus_quartic", "_along", "tube_for_raysect", "to_raysect", "_features")
-"""Functions in these folders by which exact arithmetic and raysect decide."""
+JUDGES = (
+    *("_crossings", "torus_quartic", "_along", "_features"),
+    *("tube_for_raysect", "to_raysect", "tube_for_povray", "_to_povray"),
+)
+"""Functions in these folders by which exact arithmetic, raysect and POV-Ray decide."""
 
 
 def test_there_are_enough_of_each_kind() -> None:
