@@ -5,7 +5,7 @@ agree.  A rung with a second source of its own may see it, as may a witness; and
 must, whose formula shares nothing with either.
 
 Each mistake is planted in a process of its own, in the sources as they are imported.  A mistake in
-a kernel compiles the kernels of the scene.
+a kernel compiles kernels of the scene.
 """
 
 import ast
@@ -20,6 +20,7 @@ import numpy as np
 import comparisons
 from comparisons.compare.budget import Budget
 from comparisons.experiments.selftest.fault import CAUGHT, PACKAGE, run_worker
+from comparisons.experiments.selftest.kept_kernels import link_kept
 from comparisons.experiments.selftest.of_mirrored import Changes, Mistake
 from comparisons.experiments.selftest.sensitivity import MOST_SECONDS
 from comparisons.renderers import WitnessName
@@ -96,7 +97,10 @@ def seen(mistake: Mistake, scenes: Path, witness: WitnessName | None, threads: i
     }
     worker = str(Path(__file__).with_name("mirrored_worker.py"))
     with temporary_folder() as folder:
-        own = {"REFERENCE_RT_CACHE": str(folder)} if changes_kernels(mistake.ours) else {}
+        own = {}
+        if changes_kernels(mistake.ours):
+            link_kept(mistake.ours, folder)
+            own["REFERENCE_RT_CACHE"] = str(folder)
         found = run_worker(worker, task, own, MOST_SECONDS)
     change = np.abs(np.reshape(found["picture"], right.shape) - right).max() / right.mean()
     statuses = {name: status for name, status, _ in found["rungs"]}

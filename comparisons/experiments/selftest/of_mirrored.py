@@ -216,7 +216,9 @@ OF_SHADING = (
     ),
     Mistake(
         "k_d over pi", "whitted_quadric",
-        {PHONG: ((VALUE, VALUE.replace("k_d * wi.z", "k_d * (wi.z * INV_PI)")),)},
+        {PHONG: (("            palette.colours(self.diffuse, math.inf),\n",
+                  "            palette.colours(tuple(k * INV_PI for k in self.diffuse), math.inf),"
+                  "\n"),)},
         {OWN_PHONG: (("diffuse = self.colour(\"diffuse\", si, active) * wo.z",
                       "diffuse = self.colour(\"diffuse\", si, active) * wo.z / math.pi"),)},
     ),
@@ -269,8 +271,7 @@ OF_SHAPES = (
     ),
     Mistake(
         "a quadric's front where f < 0", "whitted_quadric",
-        {QUADRICS: (("    return normalize(g * (1.0 / size))",
-                     "    return -normalize(g * (1.0 / size))"),)},
+        {QUADRIC: ((FORM, FORM.replace("Fraction(x)", "-Fraction(x)")),)},
         {OWN_QUADRIC: ((OWN_GRADIENT, OWN_GRADIENT.replace("(2.0 *",
                         "(-2.0 *").replace("+ l", "- l")),)},
     ),
@@ -301,8 +302,7 @@ OF_SHAPES = (
 
 
 PLASTIC, COAT = "materials/bsdfs/plastic.py", "mitsuba/plugins/exact_coat.py"
-NESTED = "materials/nested/flattened.py"
-OPAQUE = "weight *= w if code == WEIGHT else 1.0 - w"
+NESTED = "materials/nested/paths.py"
 PATH, OF_PATHS = "integrators/path.py", "mitsuba/plugins/path_of_solids.py"
 WEIGHED = "weight = _mis_weight(setup, BSDF_SAMPLING, state.bsdf_pdf, light_pdf)\n    return "
 
@@ -326,7 +326,10 @@ OF_MATERIALS = (
     ),
     Mistake(
         "opaque and clear parts of masks exchanged", "mask_furnace",
-        {NESTED: ((OPAQUE, "weight *= 1.0 - w if code == WEIGHT else w"),)},
+        {NESTED: (
+            ("Step(ONE_MINUS_WEIGHT, material.opacity)", "Step(WEIGHT, 1.0 * material.opacity)"),
+            ("Step(WEIGHT, material.opacity)", "Step(ONE_MINUS_WEIGHT, material.opacity)"),
+        )},
         {"materials/mask.py": (
             ("values | {\"type\": \"mixture_mask\"}",
              "values | {\"type\": \"mixture_mask\", \"opacity\": 1.0 - values[\"opacity\"]}"),
@@ -334,7 +337,10 @@ OF_MATERIALS = (
     ),
     Mistake(
         "shares of a blend exchanged", "blend_furnace",
-        {NESTED: ((OPAQUE, "weight *= 1.0 - w if code == WEIGHT else w"),)},
+        {NESTED: (
+            ("found = [*below(material.first, rest), *below(material.second, take)]",
+             "found = [*below(material.first, take), *below(material.second, rest)]"),
+        )},
         {OWN_PHONG: (("            return 1.0 - weight, weight",
                       "            return weight, 1.0 - weight"),)},
     ),
