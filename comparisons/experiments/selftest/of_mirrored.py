@@ -322,7 +322,8 @@ OF_MATERIALS = (
     Mistake(
         "the base's colour at the first bounce below a coat alone", "plastic_furnace",
         {PLASTIC: (("np.array([int(self.nonlinear)])", "np.array([0])"),)},
-        {COAT: (("self.nonlinear = properties[\"nonlinear\"]", "self.nonlinear = False"),)},
+        {COAT: (("self.nonlinear = properties[\"nonlinear\"]",
+                 "self.nonlinear = properties[\"nonlinear\"] and False"),)},
     ),
     Mistake(
         "opaque and clear parts of masks exchanged", "mask_furnace",

@@ -62,24 +62,25 @@ def whitted_lit_mirror() -> Expected:
 
 
 @case(
-    r"$(F + (1 - F) \eta^2) L$, $F = 1$ beyond the critical angle",
+    r"$(F + (1 - F) \tau \eta^2) L$, $F = 1$ beyond the critical angle",
     "radiance inside glass, by recursive ray tracing",
     FRESNEL,
 )
 def whitted_in_glass() -> Expected:
-    """Seen from glass, the sky above it is within the critical angle, and eta^2 = 2.56 as bright;
-    outside of it the boundary mirrors the sky below, all of it."""
+    """Seen from glass, the sky above it is within the critical angle, and eta^2 = 2.56 as bright
+    (times tau, the glass's colour); outside of it the boundary mirrors the sky below, all of it."""
     eta = 1.6
     critical = np.sqrt(1.0 - 1.0 / eta**2)
 
     def radiance(c: FloatArray) -> FloatArray:
         f = fresnel(c, 1.0 / eta)
         close = (c > critical - 0.03) & (c < critical + 0.06)
-        return np.asarray(np.where(close, np.nan, f + (1.0 - f) * eta**2))
+        colour = f[..., None] + ((1.0 - f) * eta**2)[..., None] * [0.9, 0.8, 0.7]
+        return np.asarray(np.where(close[..., None], np.nan, colour))
 
     view = View((0, 0, -1), (0, 1.0, 0), (0, 0, 1), (HALF, HALF), (32, 32))
     seen = pixel_means(lambda x, y: radiance(np.abs(view.rays(x, y)[..., 2])), 32, 32, 8)
-    return Expected(seen[..., None] * SKY, 1e-8)
+    return Expected(seen * SKY, 1e-8)
 
 
 @case(
