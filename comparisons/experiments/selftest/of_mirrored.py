@@ -151,17 +151,6 @@ OF_TREES = (
         {GLASS: (("t = passing / (refraction.eta * refraction.eta)", "t = passing"),)},
         {PLUGIN: ((SAMPLED, "            weight = weight * value * dr.square(sample.eta)\n"),)},
     ),
-    Mistake(
-        "total reflection lost", "whitted_in_glass",
-        {TREE: (("            if max_component(mirrored) > whitted.min_contribution:",
-                 "            if branch.eta != 1.0 and branch.passing == 0.0:\n"
-                 "                continue\n"
-                 "            if max_component(mirrored) > whitted.min_contribution:"),)},
-        {PLUGIN: ((SAMPLED,
-                   "            if component == 0 and bsdf.component_count() == 2:\n"
-                   "                value = dr.select(dr.min(value) == 1.0, 0.0, value)\n"
-                   + SAMPLED),)},
-    ),
 )  # fmt: skip
 
 # ---- the lectures' local shading -----------------------------------------------------------------
@@ -186,12 +175,6 @@ OF_SHADING = (
         "Blinn's half vector for Phong's mirrored direction", "phong_in_light",
         {PHONG: (("np.array([int(self.half_vector)])", "np.array([int(not self.half_vector)])"),)},
         {OWN_PHONG: (("self.half_vector = bool(", "self.half_vector = not bool("),)},
-    ),
-    Mistake(
-        "the half vector's cosine with the light, not with the normal", "blinn_in_light",
-        {PHONG: (("power(min(h.z, 1.0), p)", "power(min(dot(wo, h), 1.0), p)"),)},
-        {OWN_PHONG: (("dr.normalize(wi + wo).z if self.half_vector",
-                      "dr.dot(wi, dr.normalize(wi + wo)) if self.half_vector"),)},
     ),
     Mistake(
         "k_s and k_d exchanged", "whitted_lit_mirror",
@@ -227,12 +210,11 @@ OF_SHADING = (
 # ---- shapes that Mitsuba lacks -------------------------------------------------------------------
 
 
-QUADRIC, QUADRICS = "shapes/curved/quadric.py", "shapes/curved/quadrics.py"
+QUADRIC = "shapes/curved/quadric.py"
 TORUS, POLYGON = "shapes/curved/torus.py", "shapes/flat/polygon.py"
 OWN_QUADRIC, OWN_TORUS = "shapes/quadric.py", "shapes/torus.py"
 OWN_TUBE, OWN_POLYGON = "shapes/tubes.py", "shapes/polygon.py"
 FORM = "form = tuple(Fraction(x) for x in self.coefficients)"
-GRADIENT = "    g = gradient(quadrics.coefficients[i], q)\n    size"
 OWN_GRADIENT = "lambda p: np.asarray(2.0 * p @ matrix + linear)"
 FACTOR = "form = tuple(Fraction(x) * w for x, w in zip(self.coefficients, {}))"
 
@@ -276,15 +258,6 @@ OF_SHAPES = (
                         "(-2.0 *").replace("+ l", "- l")),)},
     ),
     Mistake(
-        "a quadric's normal without the mixed terms", "whitted_quadric",
-        {QUADRICS: ((GRADIENT, GRADIENT.replace(
-            "gradient(quadrics.coefficients[i], q)",
-            "gradient(quadrics.coefficients[i], q)\n    c = quadrics.coefficients[i]\n"
-            "    g = Vec3(g.x - c[3] * q.y - c[5] * q.z, g.y - c[3] * q.x - c[4] * q.z, "
-            "g.z - c[5] * q.x - c[4] * q.y)")),)},
-        {OWN_QUADRIC: ((OWN_GRADIENT, OWN_GRADIENT.replace("@ matrix", "* np.diag(matrix)")),)},
-    ),
-    Mistake(
         "nonzero polygons filled as even-odd", "star_nonzero",
         {POLYGON: (("\"nonzero\": -1}", "\"nonzero\": 1}"),)},
         {OWN_POLYGON: (("\"nonzero\": manifold3d.FillRule.NonZero",
@@ -304,7 +277,6 @@ OF_SHAPES = (
 PLASTIC, COAT = "materials/bsdfs/plastic.py", "mitsuba/plugins/exact_coat.py"
 NESTED = "materials/nested/paths.py"
 PATH, OF_PATHS = "integrators/path.py", "mitsuba/plugins/path_of_solids.py"
-WEIGHED = "weight = _mis_weight(setup, BSDF_SAMPLING, state.bsdf_pdf, light_pdf)\n    return "
 
 OF_MATERIALS = (
     Mistake(
@@ -312,12 +284,6 @@ OF_MATERIALS = (
         {PLASTIC: (("hemispherical_fresnel(1.0 / eta)])", "hemispherical_fresnel(eta)])"),)},
         {COAT: (("self.r = smooth_reflectance(self.eta)",
                  "self.r = smooth_reflectance(1.0 / self.eta)"),)},
-    ),
-    Mistake(
-        "1/eta² of a coat forgotten", "plastic_furnace",
-        {PLASTIC: (("t_i * shares.t_o / (eta * eta) *", "t_i * shares.t_o *"),)},
-        {COAT: (("wo.z / (math.pi * self.eta * self.eta)\n            lit",
-                 "wo.z / math.pi\n            lit"),)},
     ),
     Mistake(
         "the base's colour at the first bounce below a coat alone", "plastic_furnace",
@@ -360,12 +326,6 @@ OF_PATHS_IN_SOLIDS = (
         {PATH: (("        throughput = throughput * (1.0 / survival)\n", ""),)},
         {OF_PATHS: (("throughput *= dr.select(active, 1.0 / survival, 0.0)",
                      "throughput *= dr.select(active, 1.0, 0.0)"),)},
-    ),
-    Mistake(
-        "lamps count twice: by light and by material", "lamp_on_solid",
-        {PATH: ((WEIGHED + "state.throughput * any_light.emitted(",
-                 "weight = 1.0\n    return state.throughput * any_light.emitted("),)},
-        {OF_PATHS: (("dr.select(bsdf_pdf > 0.0, weight(bsdf_pdf, light_pdf), 1.0)", "1.0"),)},
     ),
 )  # fmt: skip
 
