@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-import comparisons
 from comparisons.compare.budget import Budget
 from comparisons.experiments.selftest.fault import CAUGHT, PACKAGE, run_worker
 from comparisons.experiments.selftest.kept_kernels import link_kept
@@ -135,7 +134,7 @@ def _by_module(package: str, changes: Changes) -> dict[str, Any]:
 # ---- sources -------------------------------------------------------------------------------------
 
 
-FOLDERS = {"ours": PACKAGE, "theirs": Path(comparisons.__path__[0])}
+FOLDERS = {"ours": PACKAGE, "theirs": Path(__file__).parents[2]}
 
 
 def texts(folder: Path, changes: Changes) -> Iterator[tuple[str, str, str]]:
