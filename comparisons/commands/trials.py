@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,6 +21,7 @@ from comparisons.commands.options import (
     Plots,
     Scenes,
     Scheduler,
+    Witness,
     compare_extra,
     out_folder,
     some_of,
@@ -30,6 +31,9 @@ from reference_rt.cli.guarded import guarded, say
 from reference_rt.cli.options import duration
 from reference_rt.util.errors import UsageError
 from reference_rt.util.workers import Workers
+
+if TYPE_CHECKING:
+    from comparisons.renderers import WitnessName
 
 
 @guarded
@@ -47,6 +51,14 @@ def selftest(
         typer.Option(min=0, help="In place of all that: so many random changes of the kernels."),
     ] = 0,
     seed: Annotated[int, typer.Option(min=0, help="Of the random changes.")] = 0,
+    mirrored: Annotated[
+        bool,
+        typer.Option(
+            "--mirrored",
+            help="In place of all that: mistakes that are also in our code on Mitsuba's side.",
+        ),
+    ] = False,
+    witness: Witness = None,
     scenes: Scenes = Path("scenes"),
     workers: NumberOfWorkers = None,
     scheduler: Scheduler = None,
@@ -64,11 +76,16 @@ def selftest(
     if mutants:
         _mutate(mutants, seed, scenes, out, opened)
         return
+    patterns = only or ["*"]
+    if mirrored:
+        _mirror(patterns, scenes / "truth", witness, out, opened)
+        return
+    if witness is not None:
+        raise UsageError("--witness: expected --mirrored with it")
     from comparisons.commands.outputs import Outputs
     from comparisons.experiments.selftest import FAULTS
     from comparisons.experiments.selftest.run import SUITES, run
 
-    patterns = only or ["*"]
     faults = [f for f in FAULTS if any(fnmatchcase(f.name, pattern) for pattern in patterns)]
     if not faults:
         raise UsageError(f"--only: no fault matches {', '.join(patterns)}")
@@ -108,6 +125,38 @@ def _mutate(count: int, seed: int, scenes: Path, out: Path, opened: Callable[[],
     for line in summary(fates).splitlines():
         tell(line)
     writes.finish()
+
+
+def _mirror(
+    patterns: list[str],
+    scenes: Path,
+    witness: "WitnessName | None",
+    out: Path,
+    opened: Callable[[], Workers],
+) -> None:
+    """Mistakes on both sides; writes what is known after each."""
+    from comparisons.commands.outputs import Outputs
+    from comparisons.experiments.selftest.mirrored import FILES, mirrored, summary, write
+    from comparisons.experiments.selftest.of_mirrored import MISTAKES
+    from comparisons.renderers import witness_facts
+
+    some = [m for m in MISTAKES if any(fnmatchcase(m.name, pattern) for pattern in patterns)]
+    if not some:
+        raise UsageError(f"--only: no mistake matches {', '.join(patterns)}")
+    witness_facts(witness)  # that it is there
+    writes = Outputs(out, FILES)
+    writes.check()
+    tell = partial(say, err=True)
+    found = []
+    with closing(opened()) as workers:
+        for one in mirrored(some, scenes, witness, workers):
+            found.append(one)
+            by = ", ".join([*one.by, *([f"truth {one.case}"] if one.truth == "off" else [])])
+            tell(f"{one.mistake}: {one.alike} between both sides; seen by {by or 'nobody'}")
+            write(found, out)
+    tell(summary(found))
+    writes.finish()
+    raise typer.Exit(0 if all(one.holds for one in found) else 1)
 
 
 @guarded

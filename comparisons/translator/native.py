@@ -13,6 +13,7 @@ from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.mitsuba.backend import SCALAR, backend, mitsuba, switch
 from comparisons.renderers import NoCounterpartError, Replicates
 from comparisons.translator import MOST_INSTANCES, to_mitsuba
+from reference_rt.integrators import Whitted
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceUnavailableError
 
@@ -44,6 +45,8 @@ class Native:
             )
         if any(member.tree is not None for copy in copies_of(scene) for member in copy.members):
             raise NoCounterpartError("Mitsuba has no set operations")
+        if isinstance(scene.integrator, Whitted):
+            raise NoCounterpartError("Mitsuba has no recursive ray tracing")
         before = mitsuba().variant()
         try:
             switch(self.variant)

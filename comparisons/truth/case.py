@@ -17,6 +17,7 @@ AREAS = {
     "materials": "materials",
     "visibility": "visibility",
     "transport": "transport",
+    "whitted": "recursive ray tracing",
     "solids": "solids, instances, meshes",
     "signal": "signal",
 }

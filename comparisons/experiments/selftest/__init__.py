@@ -8,6 +8,9 @@ bias that a verdict states as detectable is detected.  `mutation`: random change
 (`mutants`), and what the rungs say to them.  `specificity`: right renderers of twelve kinds
 (`right`) are judged with many seeds, and false alarms are counted.
 
+`mirrored`: mistakes in our renderer and in our code on Mitsuba's side at once (`of_mirrored`):
+which other sources and cases of truth see them.
+
 `of_limits`: gross faults in stress scenes, of which no limit may excuse any (slow tests).
 
 To add a fault of pictures: a function with `planted`, or a row of `FAULTS`, in `of_pictures`.  Of

@@ -187,11 +187,12 @@ def patched(file: str, text: str) -> Iterator[dict[str, str]]:
 def run_worker(
     worker: str, task: Mapping[str, Any], environment: Mapping[str, str], seconds: float | None
 ) -> Any:
-    """What the module answers to `task`, with these variables besides the present ones.  Raises as
-    `run_patched`."""
+    """What a module, or a file with a program, answers to `task`, with these variables besides the
+    present ones.  Raises as `run_patched`."""
+    program = [worker] if worker.endswith(".py") else ["-m", worker]
     run = subprocess.run(
         # -P: do not import from the current folder, which may have a reference_rt.
-        [sys.executable, "-P", "-m", worker],
+        [sys.executable, "-P", *program],
         input=json.dumps(task),
         env={**os.environ, **environment},
         capture_output=True,

@@ -246,6 +246,19 @@ def phong_in_light() -> Expected:
     return _lit_ball(shading)
 
 
+@case(r"$(k_d (n \cdot l) + k_s (h \cdot n)^p) E$", "the form by the half vector", "Blinn 1977")
+def blinn_in_light() -> Expected:
+    """As `phong_in_light`: the highlight's cosine is that of the normal and the half vector."""
+
+    def shading(wi: FloatArray, wo: FloatArray, k: int) -> FloatArray:
+        h = wi + wo
+        cosine = h[..., 2] / np.linalg.norm(h, axis=-1)
+        lit = wi[..., 2] > 0.0
+        return np.asarray(np.where(lit, RHO[k] / 4 * wi[..., 2] + 0.1 * cosine**40, 0.0))
+
+    return _lit_ball(shading)
+
+
 def _rough_ball(name: str) -> Expected:
     def albedo(c: FloatArray) -> FloatArray:
         by_channel = [

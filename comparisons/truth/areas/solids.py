@@ -4,7 +4,7 @@ import numpy as np
 
 from comparisons.truth.case import Expected, FloatArray, case
 from comparisons.truth.film import coverage, drawn_from_above, mix, seen_from_above, turn
-from comparisons.truth.optics import fresnel
+from comparisons.truth.optics import floor_irradiance, fresnel
 
 WARM, COLD = np.array([1.0, 0.5, 0.2]), np.array([0.05, 0.1, 0.2])
 RHO = np.array([0.8, 0.5, 0.2])
@@ -190,3 +190,20 @@ def checker_map() -> Expected:
                     [[u[0], v[0]], [u[1], v[0]], [u[1], v[1]], [u[0], v[1]]], 1.9, 32
                 )
     return Expected(mix(share, WARM, COLD))
+
+
+@case(r"$L (1 + \rho + \rho^2 + \rho^3)$", "paths within a solid, by their length; roulette")
+def solid_room() -> Expected:
+    """The hollow of a box that a ball has left, whose walls shine and scatter, is a closed room of
+    the solid's outside: paths of 4 edges, of which roulette may end all."""
+    total = sum(RHO**k for k in range(4))
+    return Expected(np.broadcast_to([0.3, 0.5, 1.0] * total, (32, 32, 3)).copy())
+
+
+@case(r"$\frac{\rho L}{\pi} F_{lamp}$", "the light of a lamp on a solid", "Lambert 1760")
+def lamp_on_solid() -> Expected:
+    """The top of a box with a hollow beside the view, below a level lamp: light and material may
+    both be sampled, and count once."""
+    lamp = np.array([[-0.9, -0.7, 1.0], [0.7, -0.7, 1.0], [0.7, 0.9, 1.0], [-0.9, 0.9, 1.0]])
+    share = seen_from_above(lambda x, y: floor_irradiance(lamp, x, y), 2.0, 32)
+    return Expected(share[..., None] * RHO * WARM / np.pi)
