@@ -3,20 +3,16 @@ gradients that Mitsuba does not resolve.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 import scipy
 
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
-from comparisons.mitsuba.counterpart import Counterpart
-from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays.arbiter import NEIGHBOURS, RADII, BoolArray, directions
 from comparisons.rungs.rays.rays import Rays
+from comparisons.rungs.rays.tree_error import TreeContext
 from reference_rt.core.arrays import FloatArray
-from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering import query
-from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
 
 MOST_OUTLIERS = (200, 32)
@@ -31,25 +27,18 @@ Radiance = Callable[..., FloatArray]
 """(origins, unit directions) -> radiance, all (n, 3).  Ours also takes the tables of a scene."""
 
 
-class NeighbourContext(NamedTuple):
-    """A scene whose ray trees are compared; depth: most surfaces that bend a ray."""
-
-    scene: Scene
-    tables: SceneTables
-    counterpart: Counterpart
-    sizes: ShapeSizes
-    depth: int
-
-
-def rounding_of(tables: SceneTables, sizes: ShapeSizes, rays: Rays) -> FloatArray:
-    """(m,): float32's error of the hits of rays and of all later hits of their ray trees."""
-    p = query.intersect(tables, rays.o, rays.d).p
+def reach_of_trees(context: TreeContext, rays: Rays) -> FloatArray:
+    """(m,): float32's error of the hits of rays and of all later hits of their trees, and how far
+    off a surface our plugin for Mitsuba starts a ray (`plugins.whitted.clearance`), which at
+    grazing angles moves it by as much."""
+    sizes = context.sizes
+    p = query.intersect(context.tables, rays.o, rays.d).p
     reach = np.full(len(p), sizes.reach.max(initial=0.0))  # later hits of the tree are anywhere
-    return sizes.frame.delta(rays.o, p, reach)
+    return sizes.frame.delta(rays.o, p, reach) + ROUNDINGS * UNIT_ROUNDOFF * reach
 
 
 def explained_by_neighbours(
-    context: NeighbourContext,
+    context: TreeContext,
     rays: Rays,
     sides: tuple[tuple[FloatArray, Radiance], tuple[FloatArray, Radiance]],
     bound: FloatArray,
@@ -59,15 +48,19 @@ def explained_by_neighbours(
 
     `sides` are ours and Mitsuba's: the value along each ray, and the function that computes it.
     Where Mitsuba's own value changes that much within its rounding, it is not resolved.  Rays are
-    moved by float32's bound, by Mitsuba's ray epsilon, once and at each surface, and, next to
-    meshes that stand in for shapes, by their errors.
+    moved by float32's bound, once and at each surface; in scenes with cylinders, which rays leave
+    so, by Mitsuba's ray epsilon; and next to meshes that stand in for shapes by their errors.
     """
     settled = np.zeros(len(bound), bool)
     if len(bound) == 0:
         return settled
     angle = ROUNDINGS * UNIT_ROUNDOFF
-    rounding = rounding_of(context.tables, context.sizes, rays)
-    epsilon = context.sizes.frame.epsilon(query.intersect(context.tables, rays.o, rays.d).p)
+    rounding = reach_of_trees(context, rays)
+    depth = context.integrator.max_depth
+    radii = [rounding, depth * rounding]
+    if context.counterpart.lit.cylinders():
+        epsilon = context.sizes.frame.epsilon(query.intersect(context.tables, rays.o, rays.d).p)
+        radii += [epsilon, depth * epsilon]
 
     def search(radius: FloatArray, angle: float, only: BoolArray | None = None) -> None:
         for k in (0, 1):
@@ -81,7 +74,7 @@ def explained_by_neighbours(
                 is_mixture(*row) for row in zip(wanted[rows], values, bound[rows], strict=True)
             ]
 
-    for radius in (rounding, epsilon, context.depth * epsilon):
+    for radius in radii:
         search(radius, angle)
     stand_ins = context.counterpart.stand_ins()
     if stand_ins and not settled.all():
@@ -100,7 +93,7 @@ def explained_by_neighbours(
 
 
 def _near(
-    context: NeighbourContext,
+    context: TreeContext,
     shapes: set[int],
     rays: Rays,
     radius: FloatArray,
