@@ -12,12 +12,12 @@ from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.coincidence import on_two_surfaces
 from comparisons.rungs.rays.lamp_images import changes_of_lamps
 from comparisons.rungs.rays.light_context import LightContext
-from comparisons.rungs.rays.light_error import cut_off, of_direct_light
+from comparisons.rungs.rays.light_error import cut_off
 from comparisons.rungs.rays.neighbours import explained_by_neighbours
 from comparisons.rungs.rays.plugin_trees import PluginTrees
 from comparisons.rungs.rays.rays import Rays, described, pixel_rays
 from comparisons.rungs.rays.resolution import NOT_BEYOND, elsewhere, too_many_elsewhere
-from comparisons.rungs.rays.tree_error import FACTORS, TreeContext, tree_error
+from comparisons.rungs.rays.tree_error import FACTORS, TreeContext, magnified, roundings
 from comparisons.translator.accuracy import accuracy
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators import Whitted
@@ -32,9 +32,9 @@ PIXELS = 128 * 128
 MOST_LIGHTS = 256
 """Most lights: each needs a shadow ray at every surface, and more would take minutes."""
 
-AT_LEAST = 64.0 * UNIT_ROUNDOFF
-"""Relative error of a ray's throughput: the product of some eight factors of each of eight levels.
-Rays with less than a least contribution are not followed."""
+MOST_MAGNIFIED = 2048
+"""Most pixels of which it is measured how mirrors magnify float32's errors; if more differ, this is
+not why."""
 
 
 def whitted(
@@ -62,7 +62,7 @@ def whitted(
     ours, theirs, error, bound, outliers = compared
     settled, of_lamps = trees.explained(rays, compared)
     unexplained = outliers[~settled]
-    other = trees.others(rays, compared)
+    other, in_words = trees.others(rays, compared)
     right, lit = error <= bound, ours.any(axis=1) | theirs.any(axis=1)
     told = lit & right & arbiter.tells(bound, ours, theirs)
     ratio = np.divide(error, bound, out=np.zeros_like(error), where=bound > 0.0)[right]
@@ -73,6 +73,7 @@ def whitted(
         "max_error_over_bound": float(ratio.max(initial=0.0)),
         "explained": int(np.count_nonzero(settled)),
         "unexplained": len(unexplained),
+        "of_another_tree": other,
         "lit": int(np.count_nonzero(lit)),
         "lit_right": int(np.count_nonzero(told)),
     }
@@ -88,9 +89,10 @@ def whitted(
             f"largest error, of {described(scene.film, pixels, rays, k)}: "
             f"ours {ours[k]}, Mitsuba's {theirs[k]} W/sr/m²"
         )
+        reason += f"; {in_words}" if other else ""
         return RungResult("whitted", "differ", reason, numbers)
-    if other is not None:
-        return RungResult("whitted", "differ", other, numbers)
+    if other:
+        return RungResult("whitted", "differ", in_words, numbers)
     edges = (
         f"{numbers['explained']} of {len(rays.o)} pixels lie at edges that Mitsuba does not "
         "resolve (float32, its ray epsilon)"
@@ -148,11 +150,16 @@ class Trees:
         over = np.flatnonzero(~(error <= bound))
         if len(over):
             some = rays.rows(over)
-            bound[over] += tree_error(self._context, self._theirs_at.nodes(some), len(over))
+            nodes = self._theirs_at.nodes(some)
+            bound[over] += roundings(self._context, nodes, len(over))
+            rest = np.flatnonzero(~(error[over] <= bound[over]))
+            rest = rest[:: -(-len(rest) // MOST_MAGNIFIED) or 1]
+            bound[over[rest]] += magnified(self._context, nodes.of(rest), len(rest))
         return Compared(ours, theirs, error, bound, np.flatnonzero(~(error <= bound)))
 
-    def others(self, rays: Rays, compared: Compared) -> str | None:
-        """That Mitsuba's values are those of another tree of ours, in words; None if they are not.
+    def others(self, rays: Rays, compared: Compared) -> tuple[int, str]:
+        """In how many pixels Mitsuba's values are those of another tree of ours, and that in words;
+        0 if they are ours.
 
         The pixels that tell are those that the other tree changes by more than twice what float32
         may: they have its value, or ours.  A vote, since one that passes an edge may have any.
@@ -170,11 +177,11 @@ class Trees:
             like = tells & ~right & (np.abs(there - theirs).max(axis=1) <= bound)
             count, rest = int(np.count_nonzero(like)), int(np.count_nonzero(tells & right))
             if count > max(rest, 1):
-                return (
-                    f"Mitsuba's values are those of {name} in {count} pixels, ours in {rest}, of "
-                    f"{int(np.count_nonzero(tells))} which that changes"
+                return count, (
+                    f"Mitsuba's values are those of {name} in {count} pixels, and ours in {rest}, "
+                    f"of {int(np.count_nonzero(tells))} pixels which that changes"
                 )
-        return None
+        return 0, ""
 
     def explained(
         self, rays: Rays, compared: Compared
@@ -191,7 +198,8 @@ class Trees:
             ((ours[outliers], self._ours_along), (theirs[outliers], self._theirs_along)),
             bound[outliers],
         )
-        for factor in (1.0 - AT_LEAST, 1.0 + AT_LEAST):  # a ray with just the least contribution
+        off = FACTORS * UNIT_ROUNDOFF * (integrator.max_depth + 1)
+        for factor in (1.0 - off, 1.0 + off):  # a ray with just the least contribution
             least = factor * integrator.min_contribution
             other = integrator.model_copy(update={"min_contribution": least}).setup()
             again = query.radiance_without_noise(tables, other, some.o, some.d)
@@ -199,10 +207,9 @@ class Trees:
         hits = query.intersect(tables, *some), trace(self._counterpart, *some)
         context = LightContext(self._scene, tables, self._counterpart, some, *hits, self._sizes)
         low, high = changes_of_lamps(context, setup)
-        off = theirs[outliers] - ours[outliers]
-        allowed = (bound[outliers] + of_direct_light(context))[:, None]
-        within = ((off >= low - allowed) & (off <= high + allowed)).all(axis=1)
-        return settled | within, np.asarray(within & (np.abs(off) > allowed).any(axis=1))
+        apart, allowed = theirs[outliers] - ours[outliers], bound[outliers][:, None]
+        within = ((apart >= low - allowed) & (apart <= high + allowed)).all(axis=1)
+        return settled | within, np.asarray(within & (np.abs(apart) > allowed).any(axis=1))
 
     def _ours_along(
         self, o: FloatArray, d: FloatArray, tables: SceneTables | None = None

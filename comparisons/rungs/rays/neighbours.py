@@ -56,7 +56,7 @@ def explained_by_neighbours(
         return settled
     angle = ROUNDINGS * UNIT_ROUNDOFF
     rounding = reach_of_trees(context, rays)
-    depth = context.integrator.max_depth
+    depth = max(context.integrator.max_depth, 1)
     radii = [rounding, depth * rounding]
     if context.counterpart.lit.cylinders():
         epsilon = context.sizes.frame.epsilon(query.intersect(context.tables, rays.o, rays.d).p)

@@ -51,9 +51,15 @@ class Nodes(NamedTuple):
     weight: FloatArray
     rays: Rays
 
-    def of(self, some: IntArray) -> "Nodes":
+    def some(self, which: IntArray) -> "Nodes":
         """Some of the nodes."""
-        return Nodes(self.row[some], self.depth[some], self.weight[some], self.rays.rows(some))
+        return Nodes(self.row[which], self.depth[which], self.weight[which], self.rays.rows(which))
+
+    def of(self, rows: IntArray) -> "Nodes":
+        """The nodes of some rows, sorted, which are counted anew."""
+        found = np.searchsorted(rows, self.row)
+        at = np.append(rows, -1)[found] == self.row
+        return self._replace(row=found).some(np.flatnonzero(at))
 
 
 class TreeContext(NamedTuple):
@@ -72,13 +78,8 @@ class TreeContext(NamedTuple):
         return query.radiance_without_noise(self.tables, setup, o, d)
 
 
-def tree_error(context: TreeContext, nodes: Nodes, n: int) -> FloatArray:
-    """(n,): how far float32 may move the trees of n rays, which have these nodes."""
-    return _roundings(context, nodes, n) + _amplified(context, nodes, n)
-
-
-def _roundings(context: TreeContext, nodes: Nodes, n: int) -> FloatArray:
-    """(n,): the first two terms."""
+def roundings(context: TreeContext, nodes: Nodes, n: int) -> FloatArray:
+    """(n,): the first two terms of the bound, of the trees of n rays that have these nodes."""
     rays, weight = nodes.rays, nodes.weight
     setup = context.integrator.setup()._replace(max_depth=0)
     light = query.radiance_without_noise(context.tables, setup, *rays)
@@ -92,13 +93,13 @@ def _roundings(context: TreeContext, nodes: Nodes, n: int) -> FloatArray:
     return np.bincount(nodes.row, error, n)
 
 
-def _amplified(context: TreeContext, nodes: Nodes, n: int) -> FloatArray:
-    """(n,): the third term."""
+def magnified(context: TreeContext, nodes: Nodes, n: int) -> FloatArray:
+    """(n,): the third term, which most pixels do not need."""
     total = np.zeros(n)
     for depth in np.unique(nodes.depth).tolist():
         at = np.flatnonzero(nodes.depth == depth)
         for begin in range(0, len(at), AT_ONCE):
-            some = nodes.of(at[begin : begin + AT_ONCE])
+            some = nodes.some(at[begin : begin + AT_ONCE])
             slope = some.weight.max(axis=1) * _slopes(context, some.rays, depth)
             total += np.bincount(some.row, slope, n)
     return total
