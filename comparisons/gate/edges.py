@@ -17,7 +17,8 @@ with NODES x NODES rays. Their spacing is SNAP: a surface may be a node away fro
   moved, counts among CHOICES.
 
 These intervals are widened by the tolerance, relative to the value, and for pictures of 8 bits by
-half a code.
+half a code.  A picture that takes the reference's own samples needs no such forgiveness, and has
+none: see `own_samples`.
 
 Pictures that went through a tone curve are judged as displayed, so is what footprints see.
 Renderers average samples before the curve, after it, or as the codes that are stored: each is a
@@ -36,6 +37,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+from comparisons.gate.own_samples import SNAP as OWN_SNAP
+from comparisons.gate.own_samples import permitted, strays
 from comparisons.gate.reference import is_noise_free
 from comparisons.results.case import FloatArray, RungResult
 from comparisons.statistics.cells import CHANNELS
@@ -151,12 +154,14 @@ def look_at(scene: Scene, threads: int | None = None) -> Look | None:
 
 class Edges(NamedTuple):
     """What a gate knows of the footprints of pixels;  tolerance: relative error of a value, after
-    the tone curve;  floor (3,): the values to which it is relative at least, where there is one."""
+    the tone curve;  floor (3,): the values to which it is relative at least, where there is one;
+    samples (k, 2): the places of the reference's in a pixel, where they are known."""
 
     look: Look
     tolerance: float = TOLERANCE
     curve: Curve | None = None
     floor: FloatArray | None = None
+    samples: FloatArray | None = None
 
     def without_rim(self, pixels: int) -> "Edges":
         return self._replace(look=lambda points: self.look(points + pixels))
@@ -276,6 +281,7 @@ def edges_rung(
         "edge": int(seen.step.sum()),
         "edge_wrong": int((wrong & seen.step).sum()),
         **_of_all(seen, len(tips)),
+        "strays": 0,
     }
     at = None
     if wrong.any():
@@ -285,6 +291,11 @@ def edges_rung(
             f"the worst, at x, y = ({column[k]}, {row[k]}): {CHANNELS[channel]} "
             f"{values[k, channel]:.4g}, where {bounds[0]:.4g} to {bounds[1]:.4g} is seen"
         )
+    if edges.samples is not None and law.curve is None and differs.any():
+        found = strays(edges.look, law.beyond, edges.samples, (candidate, reference), differs)
+        if found is not None and len(found[0]) > permitted(differs.size):
+            numbers["strays"] = len(found[0])
+            numbers["stray"] = (int(found[1][0]), int(found[0][0]))
     faults = _faults(numbers, at)
     reason = "; ".join([*faults[:1], _words(numbers), *faults[1:]])
     return RungResult("statistics", "differ" if faults else "agree", reason, numbers)
@@ -436,6 +447,12 @@ def _faults(numbers: dict[str, Any], at: str | None) -> list[str]:
             found.append(f"{numbers[f'{kind}_wrong']:,} of {numbers[kind]:,} pixels {where}")
     if found and at is not None:
         found[-1] += f"; {at}"
+    if numbers["strays"]:
+        found.append(
+            f"{numbers['strays']:,} pixels, such as {numbers['stray']}, differ though the picture "
+            "takes the reference's samples: they show what none of these sees within "
+            f"{OWN_SNAP:g} of a pixel"
+        )
     if numbers["choices"] > max(1, CHOICES * numbers["edge"]):
         found.append(
             f"{numbers['choices']:,} of {numbers['edge']:,} pixels on edges show another surface "
