@@ -292,7 +292,9 @@ def edges_rung(
             f"{values[k, channel]:.4g}, where {bounds[0]:.4g} to {bounds[1]:.4g} is seen"
         )
     if edges.samples is not None and law.curve is None and differs.any():
-        found = strays(edges.look, law.beyond, edges.samples, (candidate, reference), differs)
+        step = np.zeros_like(differs)
+        step[row, column] = seen.step
+        found = strays(edges.look, law.beyond, edges.samples, (candidate, reference), differs, step)
         if found is not None and len(found[0]) > permitted(differs.size):
             numbers["strays"] = len(found[0])
             numbers["stray"] = (int(found[1][0]), int(found[0][0]))

@@ -28,6 +28,10 @@ Mitsuba's pictures none has a stray even for 1/1024."""
 FEWEST = 32
 """Fewest pixels that must tell."""
 
+AT_EDGES = 0.2
+"""Largest share of pixels on edges that may differ.  Two samples in place of one at the centre
+change some 40 % of them."""
+
 ASKED = 1 << 13
 """Most pixels of which it is asked whether they tell, and most of which whether they are strays,
 evenly chosen."""
@@ -57,15 +61,19 @@ def strays(
     samples: FloatArray,
     pictures: tuple[FloatArray, FloatArray],
     differs: BoolArray,
+    step: BoolArray,
 ) -> tuple[IntArray, IntArray] | None:
     """Rows and columns of strays; None if the candidate does not take the reference's samples, or
     too few pixels tell.
 
     look, beyond: as of `edges`;  samples: see `samples_of`;  pictures: the candidate and the
-    reference, (height, width, 3);  differs (height, width): pixels beyond the tolerance.
+    reference, (height, width, 3);  differs, step (height, width): pixels beyond the tolerance, and
+    those on edges.
     """
     candidate, reference = pictures
     height, width = differs.shape
+    if np.count_nonzero(differs & step) > AT_EDGES * np.count_nonzero(step):
+        return None
     asked = np.divmod(_evenly(np.arange(height * width)), width)
     known = reference[asked]
     low, high = _around(look, samples, *asked)

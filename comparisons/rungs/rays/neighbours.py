@@ -27,14 +27,27 @@ Radiance = Callable[..., FloatArray]
 """(origins, unit directions) -> radiance, all (n, 3).  Ours also takes the tables of a scene."""
 
 
-def reach_of_trees(context: TreeContext, rays: Rays) -> FloatArray:
-    """(m,): float32's error of the hits of rays and of all later hits of their trees, and how far
-    off a surface our plugin for Mitsuba starts a ray (`plugins.whitted.clearance`), which at
-    grazing angles moves it by as much."""
-    sizes = context.sizes
+HEIGHTS = 10.0
+"""How far along themselves our plugin for Mitsuba lets rays start at grazing angles, in heights off
+the surface: what is nearer does not shadow it (`plugins.whitted.leave`)."""
+
+
+def _radii(context: TreeContext, rays: Rays) -> list[FloatArray]:
+    """By how much rays are moved, (m,) each: by float32's error of their hits and of all later ones
+    of their trees, once and at each surface; and by what they skip where they start, at the height
+    `plugins.whitted.clearance`: on cylinders Mitsuba's ray epsilon, elsewhere float32's error of
+    the scene's size, which counts the meshes that stand in for infinite planes."""
+    sizes, depth = context.sizes, max(context.integrator.max_depth, 1)
+    frame, lit = sizes.frame, context.counterpart.lit
     p = query.intersect(context.tables, rays.o, rays.d).p
     reach = np.full(len(p), sizes.reach.max(initial=0.0))  # later hits of the tree are anywhere
-    return sizes.frame.delta(rays.o, p, reach) + ROUNDINGS * UNIT_ROUNDOFF * reach
+    rounding = frame.delta(rays.o, p, reach)
+    epsilon = frame.epsilon(p)
+    height = np.minimum(epsilon, ROUNDINGS * UNIT_ROUNDOFF * lit.reach() / frame.scale)
+    radii = [rounding, depth * rounding, rounding + HEIGHTS * height]
+    if lit.cylinders():
+        radii += [epsilon, depth * epsilon]
+    return radii
 
 
 def explained_by_neighbours(
@@ -48,19 +61,13 @@ def explained_by_neighbours(
 
     `sides` are ours and Mitsuba's: the value along each ray, and the function that computes it.
     Where Mitsuba's own value changes that much within its rounding, it is not resolved.  Rays are
-    moved by float32's bound, once and at each surface; in scenes with cylinders, which rays leave
-    so, by Mitsuba's ray epsilon; and next to meshes that stand in for shapes by their errors.
+    moved as `_radii` says, and next to meshes that stand in for shapes by their errors.
     """
     settled = np.zeros(len(bound), bool)
     if len(bound) == 0:
         return settled
     angle = ROUNDINGS * UNIT_ROUNDOFF
-    rounding = reach_of_trees(context, rays)
-    depth = max(context.integrator.max_depth, 1)
-    radii = [rounding, depth * rounding]
-    if context.counterpart.lit.cylinders():
-        epsilon = context.sizes.frame.epsilon(query.intersect(context.tables, rays.o, rays.d).p)
-        radii += [epsilon, depth * epsilon]
+    radii = _radii(context, rays)
 
     def search(radius: FloatArray, angle: float, only: BoolArray | None = None) -> None:
         for k in (0, 1):
@@ -82,7 +89,7 @@ def explained_by_neighbours(
         sag, turn = (max(getattr(error, name) for error in errors) for name in ("sag", "turn"))
         if context.tables.materials.oriented is not None:
             turn += max(error.twist for error in errors)
-        radius, angle = rounding + sag, angle + BENT * turn
+        radius, angle = radii[0] + sag, angle + BENT * turn
         rows = np.flatnonzero(~settled)[: MOST_OUTLIERS[0]]
         near = np.zeros(len(bound), bool)
         near[rows] = _near(

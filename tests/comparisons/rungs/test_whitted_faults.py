@@ -157,7 +157,14 @@ def _changes(values: FloatArray, known: FloatArray) -> bool:
 @pytest.fixture(scope="module")
 def spheres() -> Iterator[Planted]:
     with scalar():
-        yield Planted(Scene.load(SCENES / "spheres_whitted.yaml"), 700)
+        yield Planted(Scene.load(SCENES / "spheres_whitted.yaml"), 600)
+
+
+@pytest.fixture(scope="module")
+def few(spheres: Planted) -> Iterator[Planted]:
+    """The same with fewer pixels, for mistakes that change many."""
+    with scalar():
+        yield Planted(spheres.scene, 120)
 
 
 def test_right_trees_agree(spheres: Planted) -> None:
@@ -165,17 +172,24 @@ def test_right_trees_agree(spheres: Planted) -> None:
         assert spheres.status() == "agree"
 
 
-@pytest.mark.parametrize("name", OURS)
-def test_mistakes_of_ours(spheres: Planted, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("name", list(OURS)[:2])
+def test_trees_of_another_depth(
+    spheres: Planted, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with scalar():
-        seen = spheres.sees_in_ours(name, monkeypatch)
-    assert seen is (None if name == "ambient light once only" else True)
+        assert spheres.sees_in_ours(name, monkeypatch)
 
 
-@pytest.mark.parametrize(("mirrored", "level"), BRANCHES)
-def test_lost_branches(spheres: Planted, mirrored: bool, level: int) -> None:
+@pytest.mark.parametrize("name", list(OURS)[2:-1])
+def test_mistakes_of_ours(few: Planted, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     with scalar():
-        assert spheres.sees_lost(mirrored, level)
+        assert few.sees_in_ours(name, monkeypatch)
+
+
+@pytest.mark.parametrize(("mirrored", "level"), [(True, 1), (False, 2)])
+def test_lost_branches(few: Planted, mirrored: bool, level: int) -> None:
+    with scalar():
+        assert few.sees_lost(mirrored, level)
 
 
 @pytest.mark.slow
@@ -199,14 +213,14 @@ def test_a_pixel_may_be_off_by_its_own_tree_alone() -> None:
     """A mirror's pixel by as much whether a lamp is next to it in the picture or not."""
     text = """
 camera: {type: perspective, eye: [0, -4, 1], target: [0, 0, 0.5], up: [0, 0, 1]}
-film: {width: 16, height: 12}
+film: {width: 28, height: 21}
 integrator: {type: whitted}
 materials: {mirror: {type: mirror}, lamp: {type: emissive, radiance: %s}}
 shapes:
   - {type: rectangle, material: mirror, transform: [{scale: 3}]}
   - {type: sphere, transform: [{scale: 0.4}, {translate: [0, 0, 0.7]}]}
   - {type: rectangle, material: lamp, transform: [{scale: 0.1}, {rotate: {axis: [1, 0, 0],
-     degrees: 90}}, {translate: [1.2, 0, 1.2]}]}
+     degrees: 90}}, {translate: [0.5, -1.5, 1.1]}]}
 lights: [{type: point, position: [1, -3, 4], intensity: 3}]
 """
     bounds, values = [], []
@@ -216,7 +230,7 @@ lights: [{type: point, position: [1, -3, 4], intensity: 3}]
             counterpart = load(scene)
             sizes = ShapeSizes(scene, counterpart.frame)
             context = TreeContext(scene, scene.tables, counterpart, sizes, Whitted())
-            rays = pixel_rays(scene, counterpart.frame, 192)
+            rays = pixel_rays(scene, counterpart.frame, 588)
             nodes = PluginTrees(scene, scene.tables, counterpart, Whitted()).nodes(rays)
             n = len(rays.o)
             bounds.append(roundings(context, nodes, n) + magnified(context, nodes, n))
