@@ -9,9 +9,12 @@ import scipy
 
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.rungs.rays.arbiter import NEIGHBOURS, RADII, BoolArray, directions
+from comparisons.rungs.rays.light_context import DISTANT
+from comparisons.rungs.rays.light_error import MIDDLE
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.rays.tree_error import TreeContext
 from reference_rt.core.arrays import FloatArray
+from reference_rt.lights import ENVIRONMENT
 from reference_rt.rendering import query
 from reference_rt.scene.build import build_tables
 
@@ -27,27 +30,38 @@ Radiance = Callable[..., FloatArray]
 """(origins, unit directions) -> radiance, all (n, 3).  Ours also takes the tables of a scene."""
 
 
-HEIGHTS = 10.0
-"""How far along themselves our plugin for Mitsuba lets rays start at grazing angles, in heights off
-the surface: what is nearer does not shadow it (`plugins.whitted.leave`)."""
-
-
 def _radii(context: TreeContext, rays: Rays) -> list[FloatArray]:
     """By how much rays are moved, (m,) each: by float32's error of their hits and of all later ones
     of their trees, once and at each surface; and by what they skip where they start, at the height
     `plugins.whitted.clearance`: on cylinders Mitsuba's ray epsilon, elsewhere float32's error of
-    the scene's size, which counts the meshes that stand in for infinite planes."""
+    the scene's size.  It moves the shadows of a lamp by as much over the lamp's cosine."""
     sizes, depth = context.sizes, max(context.integrator.max_depth, 1)
     frame, lit = sizes.frame, context.counterpart.lit
-    p = query.intersect(context.tables, rays.o, rays.d).p
-    reach = np.full(len(p), sizes.reach.max(initial=0.0))  # later hits of the tree are anywhere
-    rounding = frame.delta(rays.o, p, reach)
-    epsilon = frame.epsilon(p)
+    hits = query.intersect(context.tables, rays.o, rays.d)
+    reach = np.full(len(hits.t), sizes.reach.max(initial=0.0))  # later hits are anywhere
+    rounding = frame.delta(rays.o, hits.p, reach)
+    epsilon = frame.epsilon(hits.p)
     height = np.minimum(epsilon, ROUNDINGS * UNIT_ROUNDOFF * lit.reach() / frame.scale)
-    radii = [rounding, depth * rounding, rounding + HEIGHTS * height]
+    shadows = np.minimum(height / _least_cosine(context, rays, hits), depth * epsilon)
+    radii = [rounding, depth * rounding, rounding + shadows]
     if lit.cylinders():
         radii += [epsilon, depth * epsilon]
     return radii
+
+
+def _least_cosine(context: TreeContext, rays: Rays, hits: query.Intersections) -> FloatArray:
+    """(m,): the least cosine of any lamp at the first hits, 1 for none."""
+    least, choice = np.ones(len(hits.t)), context.tables.lights.choice
+    if choice is None:
+        return least
+    for light in np.flatnonzero((choice.kind != ENVIRONMENT) & (choice.probability > 0.0)).tolist():
+        ours = query.direct_light(context.tables, rays.o, rays.d, light, MIDDLE)
+        some = np.flatnonzero(ours.pdf > 0.0)
+        distant = choice.kind[light] in DISTANT
+        w = ours.target[some] - (0.0 if distant else hits.p[some])
+        cosine = np.abs(np.sum(w * hits.n[some], axis=1)) / np.linalg.norm(w, axis=1)
+        least[some] = np.minimum(least[some], np.maximum(cosine, np.finfo(float).tiny))
+    return least
 
 
 def explained_by_neighbours(
