@@ -38,7 +38,7 @@ import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from comparisons.gate.own_samples import SNAP as OWN_SNAP
-from comparisons.gate.own_samples import permitted, strays
+from comparisons.gate.own_samples import WIDENED, permitted, strays
 from comparisons.gate.reference import is_noise_free
 from comparisons.results.case import FloatArray, RungResult
 from comparisons.statistics.cells import CHANNELS
@@ -155,13 +155,15 @@ def look_at(scene: Scene, threads: int | None = None) -> Look | None:
 class Edges(NamedTuple):
     """What a gate knows of the footprints of pixels;  tolerance: relative error of a value, after
     the tone curve;  floor (3,): the values to which it is relative at least, where there is one;
-    samples (k, 2): the places of the reference's in a pixel, where they are known."""
+    samples (k, 2): the places of the reference's in a pixel, where they are known;  others:
+    pictures of mistaken trees, by name, which are rendered if they are needed."""
 
     look: Look
     tolerance: float = TOLERANCE
     curve: Curve | None = None
     floor: FloatArray | None = None
     samples: FloatArray | None = None
+    others: Callable[[], list[tuple[str, FloatArray]]] | None = None
 
     def without_rim(self, pixels: int) -> "Edges":
         return self._replace(look=lambda points: self.look(points + pixels))
@@ -294,11 +296,20 @@ def edges_rung(
     if edges.samples is not None and law.curve is None and differs.any():
         step = np.zeros_like(differs)
         step[row, column] = seen.step
-        found = strays(edges.look, law.beyond, edges.samples, (candidate, reference), differs, step)
+        widely = law._replace(tolerance=WIDENED * law.tolerance).beyond
+        both = candidate, reference
+        found = strays(edges.look, law.beyond, widely, edges.samples, both, differs, step)
         if found is not None and len(found[0]) > permitted(differs.size):
             numbers["strays"] = len(found[0])
             numbers["stray"] = (int(found[1][0]), int(found[0][0]))
     faults = _faults(numbers, at)
+    if edges.others is not None and np.count_nonzero(differs) > permitted(differs.size):
+        for name, other in edges.others():
+            like = differs & ~np.any(law.beyond(candidate, other, other), axis=-1)
+            count, total = int(like.sum()), int(differs.sum())
+            if 2 * count > total:
+                faults.append(f"{count:,} of {total:,} pixels that differ are those of {name}")
+                break
     reason = "; ".join([*faults[:1], _words(numbers), *faults[1:]])
     return RungResult("statistics", "differ" if faults else "agree", reason, numbers)
 

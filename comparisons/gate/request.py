@@ -19,7 +19,7 @@ from comparisons.gate import baselines, reference
 from comparisons.gate.digest import scene_digest
 from comparisons.gate.edges import DARK, TOLERANCE, Edges, look_at
 from comparisons.gate.gate import gate_pictures
-from comparisons.gate.own_samples import samples_of
+from comparisons.gate.own_samples import other_trees, samples_of
 from comparisons.gate.pictures_in import Picture, pictures_of
 from comparisons.gate.question import LIMIT, Question
 from comparisons.gate.reference import Reference, check_sizes, size_of
@@ -232,8 +232,9 @@ class Judge:
         known = scene if diagnosed else None
         edges = None
         look = look_at(scene, request.threads) if scene and self.linear.noise_free else None
-        if look is not None and curve is None:
-            edges = Edges(look, request.tolerance, samples=samples_of(scene))
+        if look is not None and scene is not None and curve is None:
+            others = partial(other_trees, scene, request.threads) if not request.rim else None
+            edges = Edges(look, request.tolerance, samples=samples_of(scene), others=others)
         elif look is not None and curve is not None:
             steep, floor = curve.errors(self.linear.pictures[0], DARK)
             edges = Edges(look, request.tolerance * steep, curve, floor)
