@@ -90,7 +90,7 @@ def roundings(context: TreeContext, nodes: Nodes, n: int) -> FloatArray:
         context.scene, context.tables, context.counterpart, rays, *hits, context.sizes
     )
     error += weight.max(axis=1) * of_direct_light(lit)
-    return np.bincount(nodes.row, error, n)
+    return np.asarray(np.bincount(nodes.row, error, n), np.float64)
 
 
 def magnified(context: TreeContext, nodes: Nodes, n: int) -> FloatArray:

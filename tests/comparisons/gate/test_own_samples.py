@@ -120,7 +120,7 @@ def of_triangles(scene: Triangles, found: FloatArray) -> tuple[np.ndarray, np.nd
 
     differs = beyond(found, right, right).any(axis=-1)
     corners = np.stack([np.roll(right, k, axis=axis) for k in (-1, 1) for axis in (0, 1)])
-    step = (np.ptp(corners, axis=0) > 0.05).any(axis=-1)
+    step = np.asarray((np.ptp(corners, axis=0) > 0.05).any(axis=-1), np.bool_)
     return strays(scene.look, beyond, beyond, np.array([[0.5, 0.5]]), (found, right), differs, step)
 
 
