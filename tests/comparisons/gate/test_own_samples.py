@@ -118,7 +118,7 @@ def of_triangles(scene: Triangles, found: FloatArray) -> tuple[np.ndarray, np.nd
     def beyond(values: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
         return np.asarray(values - np.clip(values, low - 1e-6 * low, high + 1e-6 * high))
 
-    differs = beyond(found, right, right).any(axis=-1)
+    differs = np.asarray(beyond(found, right, right).any(axis=-1), np.bool_)
     corners = np.stack([np.roll(right, k, axis=axis) for k in (-1, 1) for axis in (0, 1)])
     step = np.asarray((np.ptp(corners, axis=0) > 0.05).any(axis=-1), np.bool_)
     return strays(scene.look, beyond, beyond, np.array([[0.5, 0.5]]), (found, right), differs, step)
