@@ -14,8 +14,8 @@ from comparisons.referee.sizes import ShapeSizes
 from comparisons.results.case import Images
 from comparisons.rungs.layers.seen import Seen
 from comparisons.rungs.rays.camera import camera_rays, ends
+from comparisons.rungs.rays.plugin_trees import PluginTrees
 from comparisons.rungs.rays.rays import Rays
-from comparisons.rungs.whitted import plugin_radiance
 from comparisons.statistics import replicates_asked
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import Whitted
@@ -97,7 +97,7 @@ def mitsuba_whitted(scene: Scene, tables: SceneTables, counterpart: Counterpart)
     y, x = np.mgrid[0 : height * n, 0 : width * n]
     rays = Rays(*camera_rays(scene, (x.ravel() + 0.5) / n, (y.ravel() + 0.5) / n))
     # Few large pieces: Dr.Jit traces the plugin anew for each.
-    radiance = plugin_radiance(scene, tables, counterpart, scene.integrator)
+    radiance = PluginTrees(scene, tables, counterpart, scene.integrator)
     t_max, pieces = ends(scene, rays.d), []
     for k in range(0, len(rays.o), AT_ONCE):
         piece = slice(k, k + AT_ONCE)

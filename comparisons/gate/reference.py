@@ -9,7 +9,7 @@ import numpy as np
 from comparisons.gate.copies import fingerprint
 from comparisons.gate.pictures_in import Picture, variance_of
 from comparisons.gate.reference_cache import cached, relative_error
-from comparisons.rungs.edges import is_noise_free as is_noise_free
+from comparisons.rungs.footprints import is_noise_free as is_noise_free
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene

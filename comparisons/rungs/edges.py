@@ -17,7 +17,8 @@ with NODES x NODES rays. Their spacing is SNAP: a surface may be a node away fro
   moved, counts among CHOICES.
 
 These intervals are widened by the tolerance, relative to the value, and for pictures of 8 bits by
-half a code.
+half a code.  A picture that takes the reference's own samples needs no such forgiveness, and has
+none: see `own_samples`.
 
 Pictures that went through a tone curve are judged as displayed, so is what footprints see.
 Renderers average samples before the curve, after it, or as the codes that are stored: each is a
@@ -37,12 +38,11 @@ import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from comparisons.results.case import FloatArray, RungResult
+from comparisons.rungs.footprints import Look
+from comparisons.rungs.own_samples import SNAP as OWN_SNAP
+from comparisons.rungs.own_samples import WIDENED, permitted, strays
 from comparisons.statistics.cells import CHANNELS
-from reference_rt.cameras.film import BoxFilter
-from reference_rt.integrators import Direct, RayCast
 from reference_rt.rendering.image import srgb
-from reference_rt.rendering.scene import Scene
-from reference_rt.sampling import Grid
 from reference_rt.textures.image_file import linear
 
 BoolArray = npt.NDArray[np.bool_]
@@ -124,44 +124,19 @@ height."""
 
 Curve = Callable[[FloatArray], FloatArray]
 
-Look = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-"""The radiance (..., 3) at points of the film, and the distance (...) of what is seen there."""
-
-
-def is_noise_free(scene: Scene) -> bool:
-    """Whether a correct picture of the scene has no noise, because its samples are fixed."""
-    return scene.integrator.type == "ray_cast" or isinstance(scene.resolved_sampler, Grid)
-
-
-def look_at(scene: Scene, threads: int | None = None) -> Look | None:
-    """None for a scene whose radiance along a ray is random, whose pixels are more than their
-    footprint, or whose picture shows something else."""
-    integrator = scene.integrator
-    shows = not isinstance(integrator, RayCast) or integrator.show == "colour"
-    if not (is_noise_free(scene) and shows and isinstance(scene.film.filter, BoxFilter)):
-        return None
-    # A ray draws one of several lights at random, where it is no pixel of a grid.
-    alone = [scene.changed(lights=[light]) for light in scene.lights]
-    parts = alone if isinstance(integrator, Direct) and alone else [scene]
-
-    def look(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        rays = scene.camera_rays(points - 0.5, threads=threads)
-        return (
-            np.sum([part.radiance(*rays, spp=1, threads=threads).mean for part in parts], axis=0),
-            scene.first_hits(*rays, threads=threads).t,
-        )
-
-    return look
-
 
 class Edges(NamedTuple):
     """What a gate knows of the footprints of pixels;  tolerance: relative error of a value, after
-    the tone curve;  floor (3,): the values to which it is relative at least, where there is one."""
+    the tone curve;  floor (3,): the values to which it is relative at least, where there is one;
+    samples (k, 2): the places of the reference's in a pixel, where they are known;  others:
+    pictures of mistaken trees, by name, which are rendered if they are needed."""
 
     look: Look
     tolerance: float = TOLERANCE
     curve: Curve | None = None
     floor: FloatArray | None = None
+    samples: FloatArray | None = None
+    others: Callable[[], list[tuple[str, FloatArray]]] | None = None
 
     def without_rim(self, pixels: int) -> "Edges":
         return self._replace(look=lambda points: self.look(points + pixels))
@@ -281,6 +256,7 @@ def edges_rung(
         "edge": int(seen.step.sum()),
         "edge_wrong": int((wrong & seen.step).sum()),
         **_of_all(seen, len(tips)),
+        "strays": 0,
     }
     at = None
     if wrong.any():
@@ -290,7 +266,23 @@ def edges_rung(
             f"the worst, at x, y = ({column[k]}, {row[k]}): {CHANNELS[channel]} "
             f"{values[k, channel]:.4g}, where {bounds[0]:.4g} to {bounds[1]:.4g} is seen"
         )
+    if edges.samples is not None and law.curve is None and differs.any():
+        step = np.zeros_like(differs)
+        step[row, column] = seen.step
+        widely = law._replace(tolerance=WIDENED * law.tolerance).beyond
+        both = candidate, reference
+        found = strays(edges.look, law.beyond, widely, edges.samples, both, differs, step)
+        if found is not None and len(found[0]) > permitted(differs.size):
+            numbers["strays"] = len(found[0])
+            numbers["stray"] = (int(found[1][0]), int(found[0][0]))
     faults = _faults(numbers, at)
+    if edges.others is not None and np.count_nonzero(differs) > permitted(differs.size):
+        for name, other in edges.others():
+            like = differs & ~np.any(law.beyond(candidate, other, other), axis=-1)
+            count, total = int(like.sum()), int(differs.sum())
+            if 2 * count > total:
+                faults.append(f"{count:,} of {total:,} pixels that differ are those of {name}")
+                break
     reason = "; ".join([*faults[:1], _words(numbers), *faults[1:]])
     return RungResult("statistics", "differ" if faults else "agree", reason, numbers)
 
@@ -299,7 +291,7 @@ MOST_STRAYS = 1 << 10
 """Pixels of a picture of the same samples that are looked at: more are no matter of edges."""
 
 
-def strays(
+def explained_by_edges(
     candidate: FloatArray, reference: FloatArray, edges: Edges
 ) -> tuple[BoolArray, BoolArray]:
     """Of a picture whose samples are at the reference's places: which pixels (height, width)
@@ -462,6 +454,12 @@ def _faults(numbers: dict[str, Any], at: str | None) -> list[str]:
             found.append(f"{numbers[f'{kind}_wrong']:,} of {numbers[kind]:,} pixels {where}")
     if found and at is not None:
         found[-1] += f"; {at}"
+    if numbers["strays"]:
+        found.append(
+            f"{numbers['strays']:,} pixels, such as {numbers['stray']}, differ though the picture "
+            "takes the reference's samples: they show what none of these sees within "
+            f"{OWN_SNAP:g} of a pixel"
+        )
     if numbers["choices"] > max(1, CHOICES * numbers["edge"]):
         found.append(
             f"{numbers['choices']:,} of {numbers['edge']:,} pixels on edges show another surface "

@@ -96,7 +96,7 @@ def _of_rays(result: RungResult) -> Rest:
     """What is left of the values of single rays."""
     numbers = result.numbers
     others = numbers.get("elsewhere", numbers["unexplained"])
-    others += numbers.get("explained_elsewhere", 0)
+    others += numbers.get("explained_elsewhere", 0) + numbers.get("of_another_tree", 0)
     if others:
         return Rest("differ", f"{others} of them are not beyond Mitsuba's precision")
     return Rest("agree", "each of these rays is beyond it")

@@ -23,7 +23,8 @@ from comparisons.renderers import (
     NoiseFree,
 )
 from comparisons.results.case import RungResult, Status
-from comparisons.rungs.edges import DARK, TOLERANCE, Edges, is_noise_free, look_at, strays
+from comparisons.rungs.edges import DARK, TOLERANCE, Edges, explained_by_edges
+from comparisons.rungs.footprints import is_noise_free, look_at
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.solids import coincide
@@ -238,7 +239,7 @@ def vote_of_picture(
     floor = np.maximum(
         DARK * np.abs(ours.mean(axis=(0, 1))), CUTS * least / TOLERANCE * ours.max(axis=(0, 1))
     )
-    differs, explained = strays(theirs, ours, Edges(look, floor=floor))
+    differs, explained = explained_by_edges(theirs, ours, Edges(look, floor=floor))
     wrong = differs & ~explained
     beside = _beyond(other, ours, floor), _beyond(other, theirs, floor)
     numbers = {

@@ -13,7 +13,7 @@ scene's coordinates, which moves its hit by as much or more: a hundred times flo
 and enough to hide a wrong direction.  Here the offset is float32's error."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -257,7 +257,10 @@ def register(mi: Any) -> None:
         throughput below which a ray is not followed; components, at least as many as any BSDF has;
         unlit, the ids, separated by spaces, of emissive shapes that do not count as lights;
         boxes, those of boxes and rectangles;
-        ambient_r, ambient_g, ambient_b, the ambient light's radiance."""
+        ambient_r, ambient_g, ambient_b, the ambient light's radiance.
+
+        met: called with each ray of the tree that is traced, its weight, the mask of the rays that
+        have it, and the number of surfaces before it."""
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
@@ -275,6 +278,7 @@ def register(mi: Any) -> None:
             self.perfect: list[int] = []
             self.reach = 0.0
             self.scalar = not base.is_wide(mi)
+            self.met: Callable[..., None] | None = None
 
         def render(self, scene: Any, *args: Any, **kwargs: Any) -> Any:
             """Mitsuba's own; the scene, which has the integrator, is forgotten at the end."""
@@ -312,6 +316,8 @@ def register(mi: Any) -> None:
                 # Opaque: otherwise the constant weight of the first level makes another kernel, and
                 # every level compiles again.
                 dr.make_opaque(ray, weight, active)
+                if self.met is not None:
+                    self.met(ray, weight, active, depth)
                 si = scene.ray_intersect(ray, active)
                 total += weight * scene.emitted(si, active)
                 active &= si.is_valid()

@@ -70,7 +70,7 @@ def bounds(
         ours_full = np.nan_to_num(value.max(axis=1) / np.abs(cosine))
         theirs_full = np.nan_to_num(theirs.max(axis=1) / np.abs(their_cosine))
     turn = 2.0 * e / _feature(context) + context.off_by("turn")
-    relative = turn + 4.0 * (e + _along(context)) / distance + 16.0 * UNIT_ROUNDOFF
+    relative = turn + 4.0 * (e + along_mesh(context)) / distance + 16.0 * UNIT_ROUNDOFF
     relative += _of_leaves(context, accuracy)
     full = np.maximum(ours_full, theirs_full)
     # The cosine to a mapped normal is not that to the shading normal, and may be near 0.
@@ -185,7 +185,7 @@ def slopes_of(
             angle += context.off_by("twist")
         radius = context.sizes.frame.delta(rays.o, hits.p, context.sizes.reach_of(hits.shape))
         angle += np.where(np.isfinite(context.theirs.height), radius / _feature(context), 0.0)
-        apart = context.off_by("sag") + context.off_by("shift") + _along(context)
+        apart = context.off_by("sag") + context.off_by("shift") + along_mesh(context)
         others = [partial(value_of, other) for other in moved(rays, radius + apart)]
         if angle.any():
             for other in turned(rays, hits.p, TURNS * angle):
@@ -196,7 +196,7 @@ def slopes_of(
     return bent + slopes(value, others, float(value.max(initial=0.0)))
 
 
-def _along(context: LightContext) -> FloatArray:
+def along_mesh(context: LightContext) -> FloatArray:
     """(n,): how far float32 moves a point along a mesh that stands in for a shape; 0 on other
     shapes, whose slivers `ShapeSizes` knows."""
     rays, hits, sizes = context.rays, context.hits, context.sizes

@@ -3,20 +3,19 @@ gradients that Mitsuba does not resolve.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 import scipy
 
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
-from comparisons.mitsuba.counterpart import Counterpart
-from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays.arbiter import NEIGHBOURS, RADII, BoolArray, directions
+from comparisons.rungs.rays.light_context import DISTANT
+from comparisons.rungs.rays.light_error import MIDDLE
 from comparisons.rungs.rays.rays import Rays
+from comparisons.rungs.rays.tree_error import TreeContext
 from reference_rt.core.arrays import FloatArray
-from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.lights import ENVIRONMENT
 from reference_rt.rendering import query
-from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
 
 MOST_OUTLIERS = (200, 32)
@@ -31,25 +30,42 @@ Radiance = Callable[..., FloatArray]
 """(origins, unit directions) -> radiance, all (n, 3).  Ours also takes the tables of a scene."""
 
 
-class NeighbourContext(NamedTuple):
-    """A scene whose ray trees are compared; depth: most surfaces that bend a ray."""
+def _radii(context: TreeContext, rays: Rays) -> list[FloatArray]:
+    """By how much rays are moved, (m,) each: by float32's error of their hits and of all later ones
+    of their trees, once and at each surface; and by what they skip where they start, at the height
+    `plugins.whitted.clearance`: on cylinders Mitsuba's ray epsilon, elsewhere float32's error of
+    the scene's size.  It moves the shadows of a lamp by as much over the lamp's cosine."""
+    sizes, depth = context.sizes, max(context.integrator.max_depth, 1)
+    frame, lit = sizes.frame, context.counterpart.lit
+    hits = query.intersect(context.tables, rays.o, rays.d)
+    reach = np.full(len(hits.t), sizes.reach.max(initial=0.0))  # later hits are anywhere
+    rounding = frame.delta(rays.o, hits.p, reach)
+    epsilon = frame.epsilon(hits.p)
+    height = np.minimum(epsilon, ROUNDINGS * UNIT_ROUNDOFF * lit.reach() / frame.scale)
+    shadows = np.minimum(height / _least_cosine(context, rays, hits), depth * epsilon)
+    radii = [rounding, depth * rounding, rounding + shadows]
+    if lit.cylinders():
+        radii += [epsilon, depth * epsilon]
+    return radii
 
-    scene: Scene
-    tables: SceneTables
-    counterpart: Counterpart
-    sizes: ShapeSizes
-    depth: int
 
-
-def rounding_of(tables: SceneTables, sizes: ShapeSizes, rays: Rays) -> FloatArray:
-    """(m,): float32's error of the hits of rays and of all later hits of their ray trees."""
-    p = query.intersect(tables, rays.o, rays.d).p
-    reach = np.full(len(p), sizes.reach.max(initial=0.0))  # later hits of the tree are anywhere
-    return sizes.frame.delta(rays.o, p, reach)
+def _least_cosine(context: TreeContext, rays: Rays, hits: query.Intersections) -> FloatArray:
+    """(m,): the least cosine of any lamp at the first hits, 1 for none."""
+    least, choice = np.ones(len(hits.t)), context.tables.lights.choice
+    if choice is None:
+        return least
+    for light in np.flatnonzero((choice.kind != ENVIRONMENT) & (choice.probability > 0.0)).tolist():
+        ours = query.direct_light(context.tables, rays.o, rays.d, light, MIDDLE)
+        some = np.flatnonzero(ours.pdf > 0.0)
+        distant = choice.kind[light] in DISTANT
+        w = ours.target[some] - (0.0 if distant else hits.p[some])
+        cosine = np.abs(np.sum(w * hits.n[some], axis=1)) / np.linalg.norm(w, axis=1)
+        least[some] = np.minimum(least[some], np.maximum(cosine, np.finfo(float).tiny))
+    return least
 
 
 def explained_by_neighbours(
-    context: NeighbourContext,
+    context: TreeContext,
     rays: Rays,
     sides: tuple[tuple[FloatArray, Radiance], tuple[FloatArray, Radiance]],
     bound: FloatArray,
@@ -59,15 +75,13 @@ def explained_by_neighbours(
 
     `sides` are ours and Mitsuba's: the value along each ray, and the function that computes it.
     Where Mitsuba's own value changes that much within its rounding, it is not resolved.  Rays are
-    moved by float32's bound, by Mitsuba's ray epsilon, once and at each surface, and, next to
-    meshes that stand in for shapes, by their errors.
+    moved as `_radii` says, and next to meshes that stand in for shapes by their errors.
     """
     settled = np.zeros(len(bound), bool)
     if len(bound) == 0:
         return settled
     angle = ROUNDINGS * UNIT_ROUNDOFF
-    rounding = rounding_of(context.tables, context.sizes, rays)
-    epsilon = context.sizes.frame.epsilon(query.intersect(context.tables, rays.o, rays.d).p)
+    radii = _radii(context, rays)
 
     def search(radius: FloatArray, angle: float, only: BoolArray | None = None) -> None:
         for k in (0, 1):
@@ -81,7 +95,7 @@ def explained_by_neighbours(
                 is_mixture(*row) for row in zip(wanted[rows], values, bound[rows], strict=True)
             ]
 
-    for radius in (rounding, epsilon, context.depth * epsilon):
+    for radius in radii:
         search(radius, angle)
     stand_ins = context.counterpart.stand_ins()
     if stand_ins and not settled.all():
@@ -89,7 +103,7 @@ def explained_by_neighbours(
         sag, turn = (max(getattr(error, name) for error in errors) for name in ("sag", "turn"))
         if context.tables.materials.oriented is not None:
             turn += max(error.twist for error in errors)
-        radius, angle = rounding + sag, angle + BENT * turn
+        radius, angle = radii[0] + sag, angle + BENT * turn
         rows = np.flatnonzero(~settled)[: MOST_OUTLIERS[0]]
         near = np.zeros(len(bound), bool)
         near[rows] = _near(
@@ -100,7 +114,7 @@ def explained_by_neighbours(
 
 
 def _near(
-    context: NeighbourContext,
+    context: TreeContext,
     shapes: set[int],
     rays: Rays,
     radius: FloatArray,

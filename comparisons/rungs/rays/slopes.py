@@ -76,7 +76,7 @@ def turned(rays: Rays, p: FloatArray, angle: FloatArray) -> list[Rays]:
 
 
 def slopes(
-    value: FloatArray, others: Sequence[Callable[[], FloatArray]], brightest: float
+    value: FloatArray, others: Sequence[Callable[[], FloatArray]], brightest: FloatArray | float
 ) -> FloatArray:
     """(n,): how far `value` (n, 3) may change, from the values `others` of moved rays.
 

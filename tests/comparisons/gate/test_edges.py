@@ -13,7 +13,8 @@ from comparisons.gate.reference import of_scene
 from comparisons.report.biases import biases_of
 from comparisons.results.case import RungResult
 from comparisons.rungs import edges
-from comparisons.rungs.edges import RULES, Edges, Look, edges_rung, look_at
+from comparisons.rungs.edges import RULES, Edges, edges_rung
+from comparisons.rungs.footprints import Look, look_at
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.image import srgb
 from reference_rt.rendering.render import render

@@ -12,8 +12,8 @@ from comparisons.geometry.frame import UNIT_ROUNDOFF, delta, round32
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.mitsuba.scene import for_rays
+from comparisons.rungs.rays.plugin_trees import PluginTrees
 from comparisons.rungs.rays.rays import Rays
-from comparisons.rungs.whitted import plugin_radiance
 from reference_rt import Direct, Scene, Whitted
 from reference_rt import Path as PathTracing
 from reference_rt.core.arrays import FloatArray
@@ -251,7 +251,7 @@ def test_whitted_radiance_is_that_of_the_plugin(scene: Scene, counterpart: Count
 
     o, d = chords(300, 10)
     ours = scene.radiance(o, d, integrator=Whitted())
-    theirs = plugin_radiance(scene, scene.tables, counterpart, Whitted())(Rays(o, d))
+    theirs = PluginTrees(scene, scene.tables, counterpart, Whitted())(Rays(o, d))
     off = np.abs(ours.mean - theirs).max(axis=1)
     # Outlines, and the checks' edges, within float32.
     assert (off <= 1e-4 * np.abs(theirs).max(axis=1) + 1e-6).mean() > 0.98
