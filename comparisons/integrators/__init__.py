@@ -8,13 +8,16 @@ from typing import Any
 
 from comparisons.integrators.direct import DIRECT
 from comparisons.integrators.integrator import Data, IntegratorType
-from comparisons.integrators.light import LIGHT, by_particles
+from comparisons.integrators.light import LIGHT, as_path, by_particles
 from comparisons.integrators.path import PATH
 from comparisons.integrators.ray_cast import LAYER_OF, RAY_CAST, SHOWN
 from comparisons.integrators.whitted import WHITTED
+from comparisons.lights import type_of as type_of_light
 from comparisons.mitsuba.context import UntranslatableError
 from comparisons.mitsuba.node import Node, Reading
+from comparisons.renderers import NoCounterpartError
 from reference_rt.integrators import AnyIntegrator, Direct, Light, Path, RayCast
+from reference_rt.scene.model import SceneModel
 
 INTEGRATORS: tuple[IntegratorType[Any], ...] = (PATH, LIGHT, DIRECT, WHITTED, RAY_CAST)
 """All integrators."""
@@ -45,6 +48,17 @@ def translate_integrator(integrator: Any) -> Data | None:
 def particles_of(integrator: Any) -> Light:
     """Light tracing with an integrator's expected picture.  Raises NoCounterpartError."""
     return by_particles(integrator, type_of(integrator).edges)
+
+
+def from_other_end(scene: SceneModel) -> Light | Path:
+    """The integrator with the expected picture of a scene's, whose paths begin at their other end.
+    Raises NoCounterpartError."""
+    integrator = scene.integrator
+    if not isinstance(integrator, Light):
+        return particles_of(integrator)
+    if integrator.caustics_of_points and any(type_of_light(x).has_no_extent for x in scene.lights):
+        raise NoCounterpartError("caustics of lamps without extent, which no path finds")
+    return as_path(integrator)
 
 
 def read_integrator(reading: Reading, node: Node | None) -> tuple[AnyIntegrator, tuple[str, ...]]:

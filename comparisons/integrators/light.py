@@ -31,8 +31,7 @@ def as_path(integrator: Light) -> Path:
 
 
 def by_particles(integrator: Any, edges: Callable[[Any], int | None] | None) -> Light:
-    """Light tracing with an integrator's expected picture.  edges: see `IntegratorType`.  Raises
-    NoCounterpartError."""
+    """See `particles_of`;  edges: see `IntegratorType`."""
     name = f"'{integrator.type}'"
     if edges is None:
         raise NoCounterpartError(f"{name} does not follow light from surface to surface")

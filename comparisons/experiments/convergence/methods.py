@@ -19,7 +19,7 @@ from comparisons.experiments.convergence.store import (
     size_within,
     weights,
 )
-from comparisons.integrators import particles_of
+from comparisons.integrators import from_other_end
 from comparisons.mitsuba.backend import LLVM, SCALAR
 from comparisons.renderers import NoCounterpartError, other
 from comparisons.renderers import Renderer as Other
@@ -56,14 +56,14 @@ BEST = "best"
 @dataclass(frozen=True)
 class Method:
     """name: for files and options;  title: for people;  sampler: its name, or BEST;  side: "ours",
-    CYCLES, or the Mitsuba variant, methods of which share what is loaded;  by_particles: from the
-    lamps, in place of the scene's integrator."""
+    CYCLES, or the Mitsuba variant, methods of which share what is loaded;  from_other_end:
+    by particles from the lamps, and where the scene has these by paths from the camera."""
 
     name: str
     title: str
     sampler: str
     side: str
-    by_particles: bool = False
+    from_other_end: bool = False
 
     @property
     def is_independent(self) -> bool:
@@ -96,7 +96,7 @@ METHODS = (
     Method("mitsuba_scalar", "Mitsuba scalar, independent (default)", "independent", SCALAR),
     Method("mitsuba_scalar_best", "Mitsuba scalar, its best sampler", BEST, SCALAR),
     Method("cycles", "Cycles, Sobol' (default)", "sobol", CYCLES),
-    Method("ours_light", "ours, particles from the lamps", "sobol", "ours", by_particles=True),
+    Method("ours_other_end", "ours, from the other end", "sobol", "ours", from_other_end=True),
 )
 
 NAMES = tuple(method.name for method in METHODS)
@@ -150,9 +150,9 @@ class Stable:
 
     def ready(self, method: Method, progress: Progress | None = None) -> Renderer:
         """Load and compile.  Raises SceneError, AbsentError."""
-        if method.by_particles:
+        if method.from_other_end:
             with _absent():
-                return self._by_particles(method, progress)
+                return self._from_other_end(method, progress)
         if method.side == "ours":
             return self._ours(self._scene, method, progress)
         renderer: Other = (
@@ -169,11 +169,11 @@ class Stable:
 
         return shot
 
-    def _by_particles(self, method: Method, progress: Progress | None) -> Renderer:
+    def _from_other_end(self, method: Method, progress: Progress | None) -> Renderer:
         scene = self._scene
-        light = scene.changed(integrator=particles_of(scene.integrator))
         try:
-            return self._ours(light, method, progress)
+            other = scene.changed(integrator=from_other_end(scene))
+            return self._ours(other, method, progress)
         except SceneError as error:
             raise AbsentError(error.message) from None
 
