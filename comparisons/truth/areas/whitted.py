@@ -24,7 +24,7 @@ def _in_turn(
     return Expected(pixels)
 
 
-@case(r"$\sum_{k=0}^{n} \rho^k L_k$, of both sides in turn", "the depth of the tree of rays")
+@case(r"$L_0 + \rho L_1 + \rho^2 L_2 + ...$, of both sides in turn", "the depth of the tree of rays")
 def whitted_depth() -> Expected:
     """Two mirrors that shine by themselves, with a and b: a + rho b + rho^2 a + ..., up to the
     mirrored ray number n = 12, the last one that may be traced."""
@@ -33,7 +33,7 @@ def whitted_depth() -> Expected:
 
 
 @case(
-    r"$I_a \sum_{k=0}^{n} k_r^k k_{a,k}$, of both sides in turn",
+    r"$I_a (k_0 + k_r k_1 + k_r^2 k_2 + ...)$, of both sides in turn",
     "ambient light after mirrorings",
     "Whitted 1980",
 )

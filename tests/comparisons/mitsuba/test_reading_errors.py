@@ -119,7 +119,7 @@ REFUSED = {
     sensor("") + 2 * '<emitter type="constant"/>': "more than one environment",
     '<emitter type="constant"><spectrum name="radiance" type="blackbody">'
     '<float name="temperature" value="3000"/></spectrum></emitter>': "rgb variants cannot use it",
-    '<integrator type="ptracer"/>': "integrator 'ptracer': is not supported",
+    '<integrator type="stokes"/>': "integrator 'stokes': is not supported",
     '<integrator type="path"/><integrator type="path"/>': "second integrator",
     '<integrator type="path"><integer name="max_depth" value="-2"/></integrator>': "-1 (no end)",
     '<integrator type="volpath"/>' + shape('<bsdf type="null"/>'): "shadow rays",

@@ -50,8 +50,8 @@ MISSING = {
         "emitter 'directionalarea': is not supported, and left out on both sides",
     ),
     "integrator": (
-        f'{SPHERE}<integrator type="ptracer"/>',
-        "integrator 'ptracer': is not supported, and replaced by 'path' on both sides",
+        f'{SPHERE}<integrator type="stokes"/>',
+        "integrator 'stokes': is not supported, and replaced by 'path' on both sides",
     ),
     "element of a fork": (
         f'<denoiser type="oidn"><integer name="n" value="3"/>\n</denoiser>{SPHERE}<denoiser/>',

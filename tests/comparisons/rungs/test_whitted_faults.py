@@ -180,6 +180,13 @@ def test_trees_of_another_depth(
         assert spheres.sees_in_ours(name, monkeypatch)
 
 
+@pytest.mark.parametrize("name", list(OURS)[:2])
+def test_the_last_of_many_reflections(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of eight, where it adds 0.004 W/sr/m² at most: some ten pixels of 4,000."""
+    planted = Planted(Scene.load(SCENES / "whitted_classic.yaml"), 4000)
+    assert planted.sees_in_ours(name, monkeypatch)
+
+
 @pytest.mark.parametrize("name", list(OURS)[2:-1])
 def test_mistakes_of_ours(few: Planted, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     with scalar():
