@@ -64,7 +64,10 @@ def whitted(
     unexplained = outliers[~settled]
     other, in_words = trees.others(rays, compared)
     right, lit = error <= bound, ours.any(axis=1) | theirs.any(axis=1)
-    told = lit & right & arbiter.tells(bound, ours, theirs)
+    tells = arbiter.tells(bound, ours, theirs)
+    told = lit & right & tells
+    size = np.maximum(np.abs(ours), np.abs(theirs)).max(axis=1)
+    differs = error > FACTORS * UNIT_ROUNDOFF * size
     ratio = np.divide(error, bound, out=np.zeros_like(error), where=bound > 0.0)[right]
     numbers: dict[str, Any] = {
         "pixels": len(rays.o),
@@ -76,6 +79,7 @@ def whitted(
         "of_another_tree": other,
         "lit": int(np.count_nonzero(lit)),
         "lit_right": int(np.count_nonzero(told)),
+        "beyond_telling": int(np.count_nonzero(right & differs & ~tells)),
     }
     numbers["tells"] = arbiter.is_enough(numbers["lit_right"], numbers["lit"])
     numbers["explained_elsewhere"] = too_many_elsewhere(
@@ -101,7 +105,12 @@ def whitted(
         edges += f"; only {numbers['lit_right']} of {numbers['lit']} lit pixels say anything"
     if numbers["explained_elsewhere"]:
         return RungResult("whitted", "differ", f"{edges}, but {NOT_BEYOND}", numbers)
-    if arbiter.too_many(numbers["explained"], len(rays.o)):
+    if numbers["beyond_telling"]:
+        edges += (
+            f"; {numbers['beyond_telling']} differ by less than float32's bound, which is more "
+            "than half of their light"
+        )
+    if arbiter.too_many(numbers["explained"] + numbers["beyond_telling"], len(rays.o)):
         return RungResult("whitted", "reference-limited", edges, numbers)
     reason = f"pixels agree within {numbers['max_error']:.2g} W/sr/m²; {edges}"
     return RungResult("whitted", "agree", reason, numbers)

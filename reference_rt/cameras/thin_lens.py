@@ -83,6 +83,13 @@ class ThinLensView(NamedTuple):
 
 
 @kernel
+def _on_lens(view: ThinLensView, lens: tuple[float, float]) -> Vec3:
+    """A point of the lens from its centre, over its radius."""
+    a, b = concentric_disk(lens[0], lens[1])
+    return view.u * a + view.v * b
+
+
+@kernel
 def camera_ray(view: ThinLensView, x: float, y: float, lens: tuple[float, float]) -> Ray:
     """The ray from a lens point q to the point where the ray through the lens's centre meets the
     plane of focus.
@@ -90,8 +97,7 @@ def camera_ray(view: ThinLensView, x: float, y: float, lens: tuple[float, float]
     With s of length 1 along the axis, that point is e + f s and the direction f s - q.  Divided by
     f, s - q / f, it needs no sum with the eye, and does not overflow however far the focus is.
     """
-    a, b = concentric_disk(lens[0], lens[1])
-    q = view.u * a + view.v * b
+    q = _on_lens(view, lens)
     s = view.corner + view.right * x + view.down * y
     return clipped_ray(view.clip, view.eye + q * view.radius, s - q * view.slope)
 
@@ -100,8 +106,7 @@ def camera_ray(view: ThinLensView, x: float, y: float, lens: tuple[float, float]
 def see(view: ThinLensView, p: Vec3, lens: tuple[float, float]) -> Seen:
     """The point `p` as the lens point for `lens` sees it.  Lens points are uniform, and a pixel is
     the mean over the lens, or what the film's exposure shows of it."""
-    a, b = concentric_disk(lens[0], lens[1])
-    q = view.u * a + view.v * b
+    q = _on_lens(view, lens)
     o, shift = view.eye + q * view.radius, q * view.slope
     seen = seen_through(view.clip, o, view.corner, view.right, view.down, shift, p)
     if view.exposure == 0.0:

@@ -89,7 +89,10 @@ class Light(Description):
     particle finds the camera so.
     """
 
-    EXAMPLES: ClassVar[Examples] = ({}, {"max_depth": 3, "rr_depth": 2})
+    EXAMPLES: ClassVar[Examples] = (
+        {},
+        {"max_depth": 3, "rr_depth": 2, "caustics_of_points": False},
+    )
     deterministic: ClassVar[bool] = False
     follows_scattered: ClassVar[bool] = False
     type: Literal["light"] = "light"

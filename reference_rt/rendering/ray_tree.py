@@ -171,7 +171,7 @@ def _watch(run: Callable[[], object], handlers: Mapping[Any, Callable[[_Return],
 
 
 _WHITTED, _DIRECT = _code(whitted.radiance), _code(direct.radiances)
-_OF_SCATTERED, _PATHS = _code(direct._trace), _code(path.radiances)
+_OF_SCATTERED, _PATHS = _code(direct._trace), _code(path.meet)
 _OF_PATHS = _code(path.next_edges)
 _WHOLE = Vec3(1.0, 1.0, 1.0)
 

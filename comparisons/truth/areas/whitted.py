@@ -24,7 +24,9 @@ def _in_turn(
     return Expected(pixels)
 
 
-@case(r"$L_0 + \rho L_1 + \rho^2 L_2 + ...$, of both sides in turn", "the depth of the tree of rays")
+@case(
+    r"$L_0 + \rho L_1 + \rho^2 L_2 + ...$, of both sides in turn", "the depth of the tree of rays"
+)
 def whitted_depth() -> Expected:
     """Two mirrors that shine by themselves, with a and b: a + rho b + rho^2 a + ..., up to the
     mirrored ray number n = 12, the last one that may be traced."""

@@ -42,7 +42,8 @@ def test_formulas_can_be_typeset_and_read_without():
 
 def test_formulas_share_nothing_with_renderers():
     own = ("comparisons.truth.case", "comparisons.truth.film", "comparisons.truth.optics")
-    allowed = (*own, "comparisons.truth.areas", "numpy", "scipy", "collections", "typing", "itertools", "dataclasses",
+    allowed = (*own, "comparisons.truth.areas", "numpy", "scipy", "collections", "typing",
+               "itertools", "dataclasses",
                "functools", "fnmatch", "importlib")  # fmt: skip
     files = [*Path(areas[0]).glob("*.py"), *(Path(areas[0]).parent / f"{n.rpartition('.')[2]}.py"
              for n in own)]  # fmt: skip
