@@ -43,8 +43,9 @@ SAMPLES = 1 << 13
 REPLICATES = 32
 
 AGAIN = 8
-"""Times as many samples, with other seeds, with which a difference must be seen again: light that
-few samples find looks like one, and is then another."""
+"""Times as many samples, with other seeds, with which a difference must be seen again, and noise be
+less by their fourth root at least (their root is expected).  Light that few samples find may look
+like a difference, but then more samples meet more of it, so that its noise hardly falls."""
 
 EXACT = Margins(image=0.0, tile=0.0, pixel=0.0, stored=0.0, constant=1e-9)
 """Both sides compute in float64, and leave surfaces by some 1e-15 of the scene: the rays that this
@@ -54,8 +55,8 @@ FIRST_SEED = 7 << 40
 """Far from the seeds of users and of other experiments."""
 
 WORST = 0.5
-"""The largest bias that may be overlooked, of the image mean and of half of the tiles, for which
-agreement still says something."""
+"""The largest bias that may be overlooked, of the image mean or of half of the tiles, for which a
+result says something."""
 
 
 def transport(scene: Scene, tables: SceneTables, threads: int | None = None) -> RungResult:
@@ -75,9 +76,11 @@ def transport(scene: Scene, tables: SceneTables, threads: int | None = None) -> 
     sides = paths, paths.changed(integrator=light)
     try:
         found, reached = _look(sides, tables, SAMPLES, FIRST_SEED, threads)
-        if found.status == "differ":
-            more = AGAIN * SAMPLES
+        if found.status == "differ" and _told(found):
+            first, more = found, AGAIN * SAMPLES
             found, reached = _look(sides, tables, more, FIRST_SEED + 2 * REPLICATES, threads)
+            if found.status == "differ" and not _noise_falls(first, found):
+                return _told_too_little(reached, _kept(found, reached))
     except SceneError as error:
         return RungResult("transport", "not-applicable", f"no particles: {error.message}")
     return _judged(found, reached)
@@ -130,29 +133,46 @@ def _look(
 
 def _judged(found: RungResult, reached: float) -> RungResult:
     """The result in the rung's words."""
-    numbers: dict[str, Any] = {"lit_pixels_reached": reached}
+    numbers = _kept(found, reached)
     if "image" not in found.numbers:
         return RungResult("transport", found.status, found.reason, numbers)
-    for scale in ("image", "tiles", "pixels"):
-        numbers[scale] = found.numbers.get(scale)
+    told = _told(found)
+    if not told and found.status != "invalid":
+        return _told_too_little(reached, numbers)
     if found.status in ("differ", "invalid"):
         reason = f"paths from the camera against particles from the lamps: {found.reason}"
         return RungResult("transport", found.status, reason, numbers)
-    of_image = _largest(found.numbers["detectable_bias"])
-    of_tiles = _largest(numbers["tiles"] and numbers["tiles"]["median_detectable_bias"])
-    if not min(of_image, of_tiles) <= WORST:
-        reason = f"particles tell too little: they reach {reached:.0%} of the lit pixels"
-        return RungResult("transport", "not-applicable", f"{reason}, and are noisy there", numbers)
-    told = [
-        f"{bias:.2g} of {what}"
-        for bias, what in ((of_image, "the image mean"), (of_tiles, "half of the tiles"))
-        if bias <= WORST
-    ]
     reason = (
         f"particles from the lamps agree with paths from the camera; seen would be a bias of "
         f"{' or '.join(told)}; they reach {reached:.0%} of the lit pixels"
     )
     return RungResult("transport", "agree", reason, numbers)
+
+
+def _kept(found: RungResult, reached: float) -> dict[str, Any]:
+    scales = {name: found.numbers.get(name) for name in ("image", "tiles", "pixels")}
+    return {"lit_pixels_reached": reached, **scales}
+
+
+def _told_too_little(reached: float, numbers: dict[str, Any]) -> RungResult:
+    reason = f"particles tell too little: they reach {reached:.0%} of the lit pixels"
+    return RungResult("transport", "not-applicable", f"{reason}, and are noisy there", numbers)
+
+
+def _noise_falls(few: RungResult, many: RungResult) -> bool:
+    """Whether it does in each channel of the image mean, as that of finite variance."""
+    one, two = (look.numbers["standard_error_of_bias"] for look in (few, many))
+    return all(two[channel] * AGAIN**0.25 <= one[channel] for channel in one)
+
+
+def _told(found: RungResult) -> list[str]:
+    """What biases up to WORST would be seen, in words."""
+    of_tiles = found.numbers["tiles"]
+    biases = (
+        (_largest(found.numbers["detectable_bias"]), "the image mean"),
+        (_largest(of_tiles and of_tiles["median_detectable_bias"]), "half of the tiles"),
+    )
+    return [f"{bias:.2g} of {what}" for bias, what in biases if bias <= WORST]
 
 
 def _largest(values: Any) -> float:

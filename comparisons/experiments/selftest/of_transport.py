@@ -18,7 +18,7 @@ FAULTS = (
         "    return state.throughput * any_light.emitted", "transport",
     ),
     SourceFault(
-        "a found sky counts whole beside light samples", "environment", _PATH,
+        "a found sky counts whole beside light samples", "index_matched", _PATH,
         "        weight = _mis_weight(setup, BSDF_SAMPLING, state.bsdf_pdf, light_pdf)\n"
         "    return state.throughput * background",
         "    return state.throughput * background", "transport",

@@ -124,6 +124,23 @@ def test_a_difference_that_other_samples_do_not_show_is_none(
     assert again == [RUNG.AGAIN * RUNG.SAMPLES // 108] * (2 * RUNG.REPLICATES)
 
 
+def test_a_difference_whose_noise_does_not_fall_is_not_believed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As that of light which few samples find, of which more samples find more."""
+
+    def noisy(scene: Any, **settings: Any) -> Any:
+        picture = rt.render(scene, **settings)
+        if isinstance(scene.integrator, rt.Path):
+            picture.colour[:] *= 1.3 + 0.05 * np.random.default_rng(scene.sampler.seed).normal()
+        return picture
+
+    monkeypatch.setattr(RUNG, "render", noisy)
+    result = found(room())
+    assert result.status == "not-applicable"
+    assert "tell too little" in result.reason
+
+
 # ---- all scenes, and faults of the source --------------------------------------------------------
 
 
