@@ -15,6 +15,7 @@ import math
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
 from comparisons.integrators import particles_of
 from comparisons.integrators.light import as_path
@@ -44,8 +45,11 @@ REPLICATES = 32
 
 AGAIN = 8
 """Times as many samples, with other seeds, with which a difference must be seen again, and noise be
-less by their fourth root at least (their root is expected).  Light that few samples find may look
-like a difference, but then more samples meet more of it, so that its noise hardly falls."""
+less, as that of finite variance is.  Light that few samples find may look like a difference, but
+then more samples meet more of it, so that its noise hardly falls."""
+
+SELDOM = 1e-4
+"""How seldom normal noise that falls as it must seems not to."""
 
 EXACT = Margins(image=0.0, tile=0.0, pixel=0.0, stored=0.0, constant=1e-9)
 """Both sides compute in float64, and leave surfaces by some 1e-15 of the scene: the rays that this
@@ -160,9 +164,11 @@ def _told_too_little(reached: float, numbers: dict[str, Any]) -> RungResult:
 
 
 def _noise_falls(few: RungResult, many: RungResult) -> bool:
-    """Whether it does in each channel of the image mean, as that of finite variance."""
+    """Whether it does in each channel of the image mean, as the root of the samples, but for what
+    variances of replicates scatter (F-test)."""
     one, two = (look.numbers["standard_error_of_bias"] for look in (few, many))
-    return all(two[channel] * AGAIN**0.25 <= one[channel] for channel in one)
+    scatter = float(stats.f.isf(SELDOM, REPLICATES - 1, REPLICATES - 1))
+    return all(AGAIN * two[channel] ** 2 <= scatter * one[channel] ** 2 for channel in one)
 
 
 def _told(found: RungResult) -> list[str]:
