@@ -114,7 +114,7 @@ def _limit(result: RungResult) -> Limit | None:
     if result.status == "agree" or count is None:
         return None
     total = result.numbers[count] - result.numbers.get("aimed_rays", 0)
-    explained = result.numbers["explained"] + result.numbers.get("beyond_telling", 0)
+    explained = result.numbers["explained"]
     if arbiter.too_many(explained, total):
         share = arbiter.most_of(explained, total)
         return Limit(f"{result.name}: {result.reason}", share)
