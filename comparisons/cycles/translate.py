@@ -9,8 +9,6 @@ are read by `mitsuba.second`.
 import json
 import math
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -27,7 +25,7 @@ from comparisons.geometry.frame import SHARE, round32
 from comparisons.integrators import type_of as type_of_integrator
 from comparisons.lights import type_of as type_of_light
 from comparisons.materials import type_of as type_of_material
-from comparisons.renderers import NoCounterpartError
+from comparisons.renderers import NoCounterpartError, Reasons
 from comparisons.renderers.vocabulary import Data, plain_rgb
 from comparisons.shapes.soup import Soup
 from comparisons.textures import type_of as type_of_texture
@@ -58,19 +56,10 @@ class Writing:
     folder: Path
     files: int = 0
     named: dict[str, Data] = field(default_factory=dict)
-    reasons: list[str] = field(default_factory=list)
+    reasons: Reasons = field(default_factory=Reasons)
     glass: list[FloatArray] = field(default_factory=list)
     lamps: list[FloatArray] = field(default_factory=list)
     reach: float = 0.0
-
-    @contextmanager
-    def collected(self) -> Iterator[None]:
-        """Collects the reason of an NoCounterpartError, so that all of a scene are known."""
-        try:
-            yield
-        except NoCounterpartError as error:
-            if str(error) not in self.reasons:
-                self.reasons.append(str(error))
 
     def colour(self, value: Any) -> Any:
         """A colour, or the texture of this name.  Raises NoCounterpartError."""
@@ -114,16 +103,16 @@ def write(scene: Scene, folder: Path, threads: int | None = None) -> None:
     scene = writing.scene
     found: Data = {"threads": threads or 0, "lights": [], "materials": writing.named}
     background = np.zeros(3)
-    with writing.collected():
+    with writing.reasons.collected():
         found["bounces"] = bounces_of(scene.integrator)
         if found["bounces"] > MOST_MIRRORINGS and any(
             isinstance(m, rt.Mirror | rt.Conductor) for m in scene.materials.values()
         ):
             raise NoCounterpartError(f"mirrors along paths of more than {MOST_MIRRORINGS} edges")
-    with writing.collected():
+    with writing.reasons.collected():
         found["camera"] = camera_of(scene.camera, scene.film)
     for light in scene.lights:
-        with writing.collected():
+        with writing.reasons.collected():
             to_cycles = type_of_light(light).to_cycles
             if to_cycles is None:
                 raise NoCounterpartError(f"the light {light.type}")
@@ -134,10 +123,9 @@ def write(scene: Scene, folder: Path, threads: int | None = None) -> None:
                 found["lights"].append(data)
     found["background"] = background.tolist()
     found["meshes"] = _meshes(writing)
-    with writing.collected():
+    with writing.reasons.collected():
         _check_places(writing)
-    if writing.reasons:
-        raise NoCounterpartError("; ".join(writing.reasons))
+    writing.reasons.check()
     (folder / "scene.json").write_text(json.dumps(found), encoding="utf-8")
 
 
@@ -212,7 +200,7 @@ def _meshes(writing: Writing) -> list[Data]:
     for copy in copies_of(scene):
         for member in copy.members:
             for leaf in member.leaves:
-                with writing.collected():
+                with writing.reasons.collected():
                     if member.tree is not None:
                         raise NoCounterpartError("solids (CSG)")
                     key, kind = id(leaf.shape), type_name(leaf.shape)

@@ -7,8 +7,7 @@ map, and the texture of a surface's back is its `interior_texture`.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -26,7 +25,7 @@ from comparisons.lights.constant import ambient_of
 from comparisons.materials import type_of as type_of_material
 from comparisons.povray.inside import region_at, region_of
 from comparisons.referee.sizes import ShapeSizes
-from comparisons.renderers import NoCounterpartError
+from comparisons.renderers import NoCounterpartError, Reasons
 from comparisons.renderers.vocabulary import PovLook, pov_vector
 from comparisons.textures import type_of as type_of_texture
 from comparisons.translator.moved import moved
@@ -74,16 +73,7 @@ class Writing:
     """A scene being written, in POV-Ray's coordinates.  reasons: why POV-Ray is not eligible."""
 
     scene: Scene
-    reasons: list[str] = field(default_factory=list)
-
-    @contextmanager
-    def collected(self) -> Iterator[None]:
-        """Collects the reason of a NoCounterpartError, so that all of a scene are known."""
-        try:
-            yield
-        except NoCounterpartError as error:
-            if str(error) not in self.reasons:
-                self.reasons.append(str(error))
+    reasons: Reasons = field(default_factory=Reasons)
 
     def look(self, name: str | None) -> PovLook:
         """A material.  Raises NoCounterpartError."""
@@ -138,14 +128,14 @@ def picture(scene: Scene) -> str:
     writing = Writing(moved(scene, frame_of(scene)))
     scene, settings = writing.scene, ""
     lines: list[str] = []
-    with writing.collected():
+    with writing.reasons.collected():
         if (to_povray := type_of_integrator(scene.integrator).to_povray) is None:
             raise NoCounterpartError(f"the integrator {scene.integrator.type}")
         settings = to_povray(scene.integrator)
-    with writing.collected():
+    with writing.reasons.collected():
         lines.append(camera(scene))
     for light in scene.lights:
-        with writing.collected():
+        with writing.reasons.collected():
             known = type_of_light(light)
             if known.to_povray is None:
                 raise NoCounterpartError(f"the light {light.type}")
@@ -153,7 +143,7 @@ def picture(scene: Scene) -> str:
     glass: list[int] = []
     members = [(copy, member) for copy in copies_of(scene) for member in copy.members]
     for k, (copy, member) in enumerate(members):
-        with writing.collected():
+        with writing.reasons.collected():
             index = _index_of(member, writing)
             text = _of_member(member, copy, scene, writing.texture)
             if index is not None:
@@ -162,10 +152,9 @@ def picture(scene: Scene) -> str:
                 opaque = _of_member(member, copy, scene, lambda leaf, m: _BLACK)
                 lines.append(f"{opaque.removesuffix('}')} no_image no_reflection }}")
             lines.append(text)
-    with writing.collected():
+    with writing.reasons.collected():
         _check_glass(scene, members, glass)
-    if writing.reasons:
-        raise NoCounterpartError("; ".join(writing.reasons))
+    writing.reasons.check()
     return _text(f"{settings} ambient_light rgb 1", lines)
 
 

@@ -7,8 +7,8 @@ name in `WitnessName` and `comparisons.commands.options.Witness` if it may vote.
 """
 
 import importlib
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from typing import Literal, NamedTuple, Protocol, cast, runtime_checkable
 
 import numpy as np
@@ -35,6 +35,24 @@ class NoCounterpartError(ReferenceRtError):
     `not-comparable`.  The exit code is the same as if that renderer could not run."""
 
     exit_code = 4
+
+
+class Reasons(list[str]):
+    """Why another renderer is not eligible for a scene: all reasons, each once."""
+
+    @contextmanager
+    def collected(self) -> Iterator[None]:
+        """Keeps the reason of a NoCounterpartError, so that the others are found, too."""
+        try:
+            yield
+        except NoCounterpartError as error:
+            if str(error) not in self:
+                self.append(str(error))
+
+    def check(self) -> None:
+        """Raises NoCounterpartError with all reasons, if there are any."""
+        if self:
+            raise NoCounterpartError("; ".join(self))
 
 
 class Loaded(Protocol):

@@ -29,6 +29,10 @@ from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
 
+BY_EXACT_ARITHMETIC = "by our fault (exact arithmetic decides)"
+"""In the reason: where float32 decides otherwise than we do, the arbiter may find that ours is
+wrong."""
+
 PIXELS = 16_700
 """Most camera rays, evenly strided.  Random and secondary rays make them 50,000; 50,000 more are
 aimed at edges: see `mixed_rays` and `aimed_rays`."""
@@ -162,7 +166,7 @@ def _outcome(
     if len(ours) and (len(verdict.ours) or not _is_rest(traced, verdict, is_aimed)):
         text = f"{numbers['mismatches']} of {total} rays differ"
         if len(verdict.ours):
-            text += f", {len(verdict.ours)} by our fault (exact arithmetic decides)"
+            text += f", {len(verdict.ours)} {BY_EXACT_ARITHMETIC}"
         first = int((verdict.ours if len(verdict.ours) else ours)[0])
         return "differ", f"{text}; the first: {say(first)}"
     if arbiter.too_many(unaimed, count, FEW):

@@ -23,6 +23,7 @@ from comparisons.renderers import NoCounterpartError
 from comparisons.results.case import RungResult
 from comparisons.statistics.cells import Margins
 from comparisons.statistics.decide import compare
+from comparisons.statistics.wording import percent
 from reference_rt.cameras.film import BoxFilter
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import Direct, Light, Path
@@ -147,8 +148,8 @@ def _judged(found: RungResult, reached: float) -> RungResult:
         reason = f"paths from the camera against particles from the lamps: {found.reason}"
         return RungResult("transport", found.status, reason, numbers)
     reason = (
-        f"particles from the lamps agree with paths from the camera; seen would be a bias of "
-        f"{' or '.join(told)}; they reach {reached:.0%} of the lit pixels"
+        f"particles from the lamps agree with paths from the camera; a bias of {' or '.join(told)} "
+        f"would be seen; particles reach {reached:.0%} of the lit pixels"
     )
     return RungResult("transport", "agree", reason, numbers)
 
@@ -159,8 +160,11 @@ def _kept(found: RungResult, reached: float) -> dict[str, Any]:
 
 
 def _told_too_little(reached: float, numbers: dict[str, Any]) -> RungResult:
-    reason = f"particles tell too little: they reach {reached:.0%} of the lit pixels"
-    return RungResult("transport", "not-applicable", f"{reason}, and are noisy there", numbers)
+    reason = (
+        "particles from the lamps are too noisy to judge paths by; they reach "
+        f"{reached:.0%} of the lit pixels"
+    )
+    return RungResult("transport", "not-applicable", reason, numbers)
 
 
 def _noise_falls(few: RungResult, many: RungResult) -> bool:
@@ -178,7 +182,7 @@ def _told(found: RungResult) -> list[str]:
         (_largest(found.numbers["detectable_bias"]), "the image mean"),
         (_largest(of_tiles and of_tiles["median_detectable_bias"]), "half of the tiles"),
     )
-    return [f"{bias:.2g} of {what}" for bias, what in biases if bias <= WORST]
+    return [f"{percent(bias)} of {what}" for bias, what in biases if bias <= WORST]
 
 
 def _largest(values: Any) -> float:

@@ -25,6 +25,7 @@ from comparisons.experiments.selftest.sensitivity import MOST_SECONDS
 from comparisons.renderers import WitnessName
 from comparisons.report.table import Column, Table
 from comparisons.results.files import write_json
+from comparisons.rungs.geometry import BY_EXACT_ARITHMETIC
 from comparisons.runs.elsewhere import run_elsewhere
 from comparisons.runs.provenance import provenance
 from comparisons.truth.renderers import load, ours
@@ -38,10 +39,6 @@ BUDGET = Budget(spp=32, replicates=8, pixels=1024, light_pixels=256)
 
 WITNESSES = ("files", "solids", "sampling", "exact arithmetic", "witness")
 """Rungs that ask somebody else than our renderer and Mitsuba's side."""
-
-EXACT = "by our fault (exact arithmetic decides)"
-"""In the reason of a rung of rays: at an edge float32 may decide otherwise on Mitsuba's side, and
-the arbiter then finds that ours is wrong."""
 
 REAL = 1e-3
 """Least change of a pixel, over the picture's mean, that a mistake must make."""
@@ -107,7 +104,7 @@ def seen(mistake: Mistake, scenes: Path, witness: WitnessName | None, threads: i
         found = run_worker(worker, task, own, MOST_SECONDS)
     change = np.abs(np.reshape(found["picture"], right.shape) - right).max() / right.mean()
     statuses = {
-        "exact arithmetic" if EXACT in reason else name: status
+        "exact arithmetic" if BY_EXACT_ARITHMETIC in reason else name: status
         for name, status, reason in found["rungs"]
     }
     told = [status for name, status in statuses.items() if name not in WITNESSES]

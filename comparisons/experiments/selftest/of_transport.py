@@ -1,6 +1,7 @@
 """Faults of densities, weights and picks in the path tracer, such as two path tracers written from
 one book may share: particles from the lamps must see each (the rung `transport`)."""
 
+from comparisons.experiments.selftest import of_sources
 from comparisons.experiments.selftest.fault import SourceFault
 
 _PATH, _LAMPS, _BOX = "integrators/path.py", "tilted_lamps", "colour_bleeding"
@@ -10,12 +11,6 @@ FAULTS = (
         "light samples count whole beside found lamps", _LAMPS, _PATH,
         "        weight = _mis_weight(setup, LIGHT_SAMPLING, pdf, scattered.density)\n",
         "        weight = 1.0\n", "transport",
-    ),
-    SourceFault(
-        "found lamps count whole beside light samples", _BOX, _PATH,
-        "        weight = _mis_weight(setup, BSDF_SAMPLING, state.bsdf_pdf, light_pdf)\n"
-        "    return state.throughput * any_light.emitted",
-        "    return state.throughput * any_light.emitted", "transport",
     ),
     SourceFault(
         "a found sky counts whole beside light samples", "index_matched", _PATH,
@@ -43,13 +38,6 @@ FAULTS = (
         "transport",
     ),
     SourceFault(
-        "all lights picked as if alike", "many_lights", _PATH,
-        "            light, picked = light_of(scratch.lit, j), picked_in(scratch.lit, j)\n",
-        "            light, picked = light_of(scratch.lit, j), picked_in(scratch.lit, j)\n"
-        "            picked = Pick(picked.light, 1.0 / any_light.count(scene.lights))\n",
-        "transport",
-    ),
-    SourceFault(
         "mirrors and glass weighted as if lights could be sampled", "caustic_glass", _PATH,
         "bsdf_pdf = 0.0 if drawn.is_delta else drawn.pdf", "bsdf_pdf = drawn.pdf", "transport",
     ),
@@ -59,18 +47,22 @@ FAULTS = (
         "        if scratch.lit.codes[j] >= 0 and depth == 0:\n            light,", "transport",
     ),
     SourceFault(
-        "survivors of roulette not raised", _BOX, _PATH,
-        "        throughput = throughput * (1.0 / survival)\n", "", "transport",
-    ),
-    SourceFault(
-        "survivors of roulette raised too little", _BOX, _PATH,
-        "        throughput = throughput * (1.0 / survival)\n",
-        "        throughput = throughput * (1.0 / max(survival, 0.8))\n", "transport",
-    ),
-    SourceFault(
         "drawn directions weighted as if uniform on the hemisphere", _BOX, _PATH,
         "    throughput, eta = state.throughput * drawn.weight, state.eta * drawn.eta\n",
         "    value = drawn.weight * (2.0 * 3.141592653589793 * drawn.pdf)\n"
         "    throughput, eta = state.throughput * value, state.eta * drawn.eta\n", "transport",
     ),
 )  # fmt: skip
+
+_ALSO = (
+    "direct light counted twice",
+    "probability of a light forgotten",
+    "roulette without compensation",
+    "roulette that compensates too little",
+)
+
+SEEN = (
+    *FAULTS,
+    *(one for one in (*of_sources.FAULTS, *of_sources.OF_KERNELS) if one.name in _ALSO),
+)
+"""These, and those of `of_sources` that are of the same sort."""

@@ -88,7 +88,7 @@ def test_particles_that_seldom_arrive_tell_nothing() -> None:
     far = rt.Rectangle(material="lamp", transform=away)
     result = found(room(shapes=(wide, far)))
     assert result.status == "not-applicable"
-    assert "particles tell too little" in result.reason
+    assert "too noisy to judge paths by" in result.reason
     assert result.numbers["lit_pixels_reached"] < 0.9
 
 
@@ -138,7 +138,7 @@ def test_a_difference_whose_noise_does_not_fall_is_not_believed(
     monkeypatch.setattr(RUNG, "render", noisy)
     result = found(room())
     assert result.status == "not-applicable"
-    assert "tell too little" in result.reason
+    assert "too noisy to judge paths by" in result.reason
 
 
 # ---- all scenes, and faults of the source --------------------------------------------------------
@@ -156,7 +156,7 @@ def test_every_scene(name: str, seed: int, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("fault", of_transport.FAULTS, ids=lambda fault: fault.name)
+@pytest.mark.parametrize("fault", of_transport.SEEN, ids=lambda fault: fault.name)
 def test_faults_of_the_path_tracer_are_seen(fault: SourceFault) -> None:
     """By this rung alone, without Mitsuba's pictures: it is the same if Mitsuba has the fault."""
     text = (PACKAGE / fault.file).read_text(encoding="utf-8")
@@ -166,7 +166,7 @@ def test_faults_of_the_path_tracer_are_seen(fault: SourceFault) -> None:
         "scenes": str(SCENES),
         "budgets": {"smoke": {}},
         "threads": None,
-        "rungs": [fault.rung],
+        "rungs": ["transport"],
     }
     worker = "comparisons.experiments.selftest.source_worker"
     patched = text.replace(fault.old, fault.new)
