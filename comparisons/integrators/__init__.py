@@ -8,7 +8,7 @@ from typing import Any
 
 from comparisons.integrators.direct import DIRECT
 from comparisons.integrators.integrator import Data, IntegratorType
-from comparisons.integrators.light import LIGHT, as_path, by_particles
+from comparisons.integrators.light import LIGHT, as_path
 from comparisons.integrators.path import PATH
 from comparisons.integrators.ray_cast import LAYER_OF, RAY_CAST, SHOWN
 from comparisons.integrators.whitted import WHITTED
@@ -47,7 +47,13 @@ def translate_integrator(integrator: Any) -> Data | None:
 
 def particles_of(integrator: Any) -> Light:
     """Light tracing with an integrator's expected picture.  Raises NoCounterpartError."""
-    return by_particles(integrator, type_of(integrator).edges)
+    edges = type_of(integrator).edges
+    if edges is None:
+        raise NoCounterpartError(f"'{integrator.type}' does not follow light between surfaces")
+    if getattr(integrator, "hide_emitters", False):
+        raise NoCounterpartError("particles do not hide lamps")
+    roulette = getattr(integrator, "rr_depth", Light().rr_depth)
+    return Light(max_depth=edges(integrator), rr_depth=roulette, caustics_of_points=False)
 
 
 def from_other_end(scene: SceneModel) -> Light | Path:

@@ -1,12 +1,8 @@
 """Light tracing: Mitsuba's `ptracer`, which has the caustics of points."""
 
-from collections.abc import Callable
-from typing import Any
-
 from comparisons.integrators.integrator import Data, IntegratorType
 from comparisons.integrators.path import PATH, translate_path
 from comparisons.mitsuba.node import Node, Reading
-from comparisons.renderers import NoCounterpartError
 from reference_rt.integrators import Light, Path
 
 
@@ -28,17 +24,6 @@ def _from_mitsuba(reading: Reading, node: Node) -> Light:
 def as_path(integrator: Light) -> Path:
     """The integrator with the same expected picture."""
     return Path(max_depth=integrator.max_depth, rr_depth=integrator.rr_depth)
-
-
-def by_particles(integrator: Any, edges: Callable[[Any], int | None] | None) -> Light:
-    """See `particles_of`;  edges: see `IntegratorType`."""
-    name = f"'{integrator.type}'"
-    if edges is None:
-        raise NoCounterpartError(f"{name} does not follow light from surface to surface")
-    if getattr(integrator, "hide_emitters", False):
-        raise NoCounterpartError("particles do not hide lamps")
-    roulette = getattr(integrator, "rr_depth", Light().rr_depth)
-    return Light(max_depth=edges(integrator), rr_depth=roulette, caustics_of_points=False)
 
 
 LIGHT = IntegratorType(

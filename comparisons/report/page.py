@@ -239,7 +239,7 @@ def _view(case: Case, mapped: bool, walls: Mapping[str, float]) -> dict[str, Any
     from comparisons.report.thumbnails import of_witness
 
     short, seen = in_short(case)
-    whose = next((r.numbers.get("whose", "") for r in case.rungs if r.name == "witness"), "")
+    whose = next((r.numbers["whose"] for r in case.rungs if "whose" in r.numbers), "the witness's")
     pictures = _thumbnails(case)
     return {
         "case": case,
