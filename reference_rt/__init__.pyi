@@ -49,6 +49,8 @@ from .materials import RoughDielectric as RoughDielectric
 from .materials import RoughPlastic as RoughPlastic
 from .materials import ThinDielectric as ThinDielectric
 from .materials import TwoSided as TwoSided
+from .rendering.derivative import Derivative as Derivative
+from .rendering.derivative import derivative as derivative
 from .rendering.image import read_image as read_image
 from .rendering.picture import Picture as Picture
 from .rendering.render import render as render
