@@ -5,7 +5,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field
 
 from comparisons.compare.looks import FIRST, PARTS, PATIENCE, SECONDS
-from comparisons.renderers import ReferenceSampler, WitnessName
+from comparisons.renderers import DifferentiatorName, Guiding, ReferenceSampler, WitnessName
 from reference_rt.cli.quantities import seconds_in
 from reference_rt.core.model import Description
 
@@ -36,6 +36,19 @@ def part_of(spp: int, parts: int, pixels: int) -> int:
     if parts > 1:
         part = max(part, min(2 * part, SMALL // pixels))
     return max(min(LEAST, spp), part)
+
+
+class Asked(Description):
+    """A derivative that is asked for in place of a picture."""
+
+    parameter: str
+    """Its path in the scene (`reference_rt.scene.parameters`)."""
+    integrator: DifferentiatorName = "prb"
+    """Mitsuba's."""
+    guiding: Guiding | None = None
+    """Of integrators that sample edges; None: Mitsuba's own choice."""
+    step: Annotated[float, Field(gt=0)] | None = None
+    """Of our differences, in the parameter's unit; None: of its scale."""
 
 
 class Budget(Description):
@@ -79,6 +92,8 @@ class Budget(Description):
     """The smallest relative bias of the image mean that must be detectable."""
     witness: WitnessName | None = None
     """A third renderer whose pictures say who stands alone (`comparisons.rungs.witness`)."""
+    derivative: Asked | None = None
+    """Compare a derivative of the picture in place of the picture."""
     control: bool = False
     """Compare Mitsuba with itself (another variant, other seeds) instead of ours with Mitsuba."""
 

@@ -12,6 +12,7 @@ from comparisons.compare import looks, pictures, precision, ray_starts
 from comparisons.compare.budget import Budget, part_of
 from comparisons.compare.control import control
 from comparisons.compare.darkness import why_dark
+from comparisons.compare.derivative import derivative_case
 from comparisons.compare.judge import Evidence, Rendered, at_look, check, judge
 from comparisons.compare.path_length import path_lengths
 from comparisons.compare.single_lights import single_lights
@@ -68,6 +69,8 @@ def compare_scene(
     """
     if budget.control:
         return control(budgeted(subject.scene, budget), budget, say)
+    if budget.derivative is not None:
+        return derivative_case(budgeted(subject.scene, budget), budget, say, threads)
     witness = None
     if budget.witness is not None:
         scene = budgeted(subject.witness or subject.scene, budget)

@@ -1,9 +1,9 @@
 """Pictures of a scene under each light alone, to recognise a lost or doubled light."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from reference_rt.core.arrays import FloatArray
-from reference_rt.lights import Ambient
+from reference_rt.lights import Ambient, Point
 from reference_rt.materials import AnyMaterial, Emissive
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
@@ -15,6 +15,9 @@ SAMPLES = 64
 """Samples per pixel: enough to recognise a light in a difference."""
 
 DARK = (0.0, 0.0, 0.0)
+
+OUT = Point(position=(0.0, 0.0, 0.0), intensity=0.0)
+"""A light that is out."""
 
 
 def single_lights(
@@ -38,6 +41,22 @@ def single_lights(
         one = scene.changed(lights=(light,), materials=_only(scene, None), sampler=sampler)
         pictures[f"lights[{k}] ({light.type})"] = render(one, threads=threads).colour
     return pictures
+
+
+def without_each(scene: Scene) -> Iterator[tuple[str, Scene]]:
+    """The scene without one of its lights or emissive materials, by its name; nothing if there are
+    fewer than two, or more than MOST.  The others keep their places."""
+    shining = [name for name, m in scene.materials.items() if isinstance(m, Emissive)]
+    lights = [k for k, light in enumerate(scene.lights) if not isinstance(light, Ambient)]
+    if not 2 <= len(shining) + len(lights) <= MOST:
+        return
+    for name in shining:
+        dark = scene.materials[name].model_copy(update={"radiance": DARK})
+        yield f"the material '{name}'", scene.changed(materials={**scene.materials, name: dark})
+    for k in lights:
+        light = scene.lights[k]
+        others = (*scene.lights[:k], OUT, *scene.lights[k + 1 :])
+        yield f"lights[{k}] ({light.type})", scene.changed(lights=others)
 
 
 def _only(scene: Scene, name: str | None) -> dict[str, AnyMaterial]:

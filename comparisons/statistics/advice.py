@@ -36,7 +36,10 @@ _UNKNOWN = "these pictures do not show how many samples are needed: give more re
 
 
 def noise_free_candidate(
-    reference: FloatArray | Known, margins: Margins | None = None, level: float = 1.0
+    reference: FloatArray | Known,
+    margins: Margins | None = None,
+    level: float = 1.0,
+    signed: bool = False,
 ) -> BiasTest | None:
     """The test of the image mean that a candidate equal to the reference, and without noise, would
     get: its `detectable` is the smallest bias that any candidate can show against this reference.
@@ -46,21 +49,26 @@ def noise_free_candidate(
     """
     if not isinstance(reference, Known) and len(reference) < 2:
         return None
-    side = side_of(reference)
-    perfect = known_side(Known(side.mean, np.zeros_like(side.mean)))
+    side = side_of(reference, signed)
+    perfect = known_side(Known(side.mean, np.zeros_like(side.mean)), signed=signed)
     return image_test(Pair(side, perfect, margins or Margins()), level * IMAGE.level)
 
 
 def replicates_asked(
-    candidate: FloatArray, reference: FloatArray, limit: float, level: float = 1.0
+    candidate: FloatArray,
+    reference: FloatArray,
+    limit: float,
+    level: float = 1.0,
+    signed: bool = False,
 ) -> int:
     """How many replicates of each side it takes to see a bias of `limit` with a chance of POWER, by
     the noise of these, and to meet enough of the rare light; their difference has no part in it.
 
-    candidate, reference: replicates (R, height, width, 3), two or more;  level: as in `compare`, of
-    a look at so many.  The noise of few replicates is not known well: neither is the number.
+    candidate, reference: replicates (R, height, width, 3), two or more;  level, signed: as in
+    `compare`, of a look at so many.  The noise of few replicates is not known well: neither is the
+    number.
     """
-    a, b = side_of(candidate), side_of(reference)
+    a, b = side_of(candidate, signed), side_of(reference, signed)
     count, margins = min(a.count, b.count), Margins()
     image = image_test(Pair(a, b, margins), level * IMAGE.level)
     known = image.errors[:2]  # the third grows with the difference
@@ -68,7 +76,8 @@ def replicates_asked(
     goal = limit * image.scale - image.margin * image.scale
     largest = np.max([error.value for error in known], axis=0)
     normal = (float(reach_of[MOST_DOF]) * largest) ** 2 + image.rare * image.margin * image.scale
-    missing = max(unseen(x, level * IMAGE.level).missing for x in (candidate, reference))
+    sizes = (np.abs(x) if signed else x for x in (candidate, reference))
+    missing = max(unseen(x, level * IMAGE.level).missing for x in sizes)
 
     def suffices(replicates: int) -> bool:
         factor = replicates / count

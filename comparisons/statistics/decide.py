@@ -15,7 +15,7 @@ from comparisons.statistics.order import by_pairs
 from comparisons.statistics.ranks import Uniformity, uniformity
 from comparisons.statistics.reading import UnlikePicturesError, read
 from comparisons.statistics.scales import IMAGE, PIXELS, SCALES, TILES, Pair, Place, Scale
-from comparisons.statistics.sides import Known, known_side, side_of
+from comparisons.statistics.sides import Known, Side, known_side, side_of
 from comparisons.statistics.single import single_factor, single_tests
 from comparisons.statistics.unseen import Unseen, unseen, worse
 from comparisons.statistics.welch import BiasTest
@@ -93,6 +93,7 @@ def compare(
     margins: Margins | None = None,
     level: float = 1.0,
     fixed_reference: bool = False,
+    signed: bool = False,
 ) -> RungResult:
     """Decide whether two sets of replicates have the same mean, by the rule of this package.
 
@@ -104,8 +105,10 @@ def compare(
     level: the share of each family's level that is used, for one of several looks at a growing
     number of replicates, whose shares must not exceed 1 together; not for single pictures;
     fixed_reference: the reference cannot be rendered with more samples, so that advice is about the
-    candidate's.  Raises ValueError for other shapes, for another level than 0 < level <= 1, and for
-    a limit that is not larger than the margin of the image mean.
+    candidate's;  signed: pictures of values of both signs, such as derivatives, whose biases are
+    fractions of their mean size; two or more of each.  Raises ValueError for other shapes, for
+    another level than 0 < level <= 1, and for a limit that is not larger than the margin of the
+    image mean.
     """
     margins = margins or Margins()
     if not limit > margins.image:
@@ -120,35 +123,45 @@ def compare(
     if not a.any() and not pictures.any():
         return RungResult("statistics", "not-applicable", "every picture of either side is black")
     other = b if isinstance(b, Known) else by_pairs(b)
-    tested = findings(by_pairs(a), other, tile, margins, level)
-    alone = noise_free_candidate(b, margins, level) if fixed_reference else None
+    if signed and (len(a) < 2 or (not isinstance(b, Known) and len(b) < 2)):
+        raise ValueError("a single picture of values of both signs; expected two or more")
+    tested = findings(by_pairs(a), other, tile, margins, level, signed)
+    alone = noise_free_candidate(b, margins, level, signed) if fixed_reference else None
     return _verdict(tested, a, pictures, limit, alone)
 
 
 def findings(
-    a: FloatArray, b: FloatArray | Known, tile: int, margins: Margins, level: float = 1.0
+    a: FloatArray,
+    b: FloatArray | Known,
+    tile: int,
+    margins: Margins,
+    level: float = 1.0,
+    signed: bool = False,
 ) -> Findings:
-    """All tests, for pictures (R, h, w, 3) that are finite and of one size;  level: as in
+    """All tests, for pictures (R, h, w, 3) that are finite and of one size;  level, signed: as in
     `compare`."""
     if len(a) == 1 or (not isinstance(b, Known) and len(b) == 1):
         tests, side = single_tests(a, b, tile, margins)
         return Findings(tests, None, None, side, True)
-    one = side_of(a)
-    two = known_side(b, one.mean) if isinstance(b, Known) else side_of(b)
+    one = side_of(a, signed)
+    two = known_side(b, one.mean, signed) if isinstance(b, Known) else side_of(b, signed)
     pair = Pair(one, two, margins, tile)
     applied = ((scale.name, scale.test(pair, level * scale.level)) for scale in SCALES)
     return Findings(
         {name: test for name, test in applied if test is not None},
         uniformity(one, two, margins, level),
-        worse(*(_unseen(side, level) for side in (a, b))),
+        worse(*(_unseen(side, level) for side in (one, two))),
         tile,
         False,
         level,
     )
 
 
-def _unseen(pictures: FloatArray | Known, level: float) -> Unseen | None:
-    return None if isinstance(pictures, Known) else unseen(pictures, level * IMAGE.level)
+def _unseen(side: Side, level: float) -> Unseen | None:
+    if side.pictures is None:
+        return None
+    pictures = np.abs(side.pictures) if side.signed else side.pictures
+    return unseen(pictures, level * IMAGE.level)
 
 
 def _verdict(

@@ -95,8 +95,8 @@ def uniformity(a: Side, b: Side, margins: Margins, level: float = 1.0) -> Unifor
     # Row 0 of the matrix is constant; row `half` is the difference candidate - reference.
     contrasts = np.tensordot(hadamard(2 * half)[1:] / half, blocks, axes=1)
     difference = half - 1
-    mean = cell_means(b.mean, BLOCK)
-    scale = divisor(mean, float(b.mean.mean()))
+    mean = cell_means(b.size, BLOCK)
+    scale = divisor(mean, float(b.size.mean()))
     size = np.abs(contrasts)
     size[size <= margins.constant * scale] = 0.0
     # If the sides are equal, only half of the other functions contain noise.

@@ -49,7 +49,7 @@ class Events:
         The side with fewer replicates has seen fewer rare paths: its events count as at least as
         large as the other's.
         """
-        of_a, of_b = (_in_cells(x, np.abs(y.mean), cells.sums) for x, y in ((a, b), (b, a)))
+        of_a, of_b = (_in_cells(x, np.abs(y.size), cells.sums) for x, y in ((a, b), (b, a)))
         if b.pictures is not None and a.count < b.count:
             of_a = np.maximum(of_a, of_b)
         elif b.pictures is not None and b.count < a.count:
@@ -67,7 +67,7 @@ class Events:
 
 def _in_cells(side: Side, seen: FloatArray, sums: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """The energy of an event of `side` in each cell of one picture;  seen: the other's radiance."""
-    mean, noisy = float(seen.mean()), side.variance > (HALF * side.mean) ** 2
+    mean, noisy = float(seen.mean()), side.variance > (HALF * side.size) ** 2
     sizes = []
     for least, of_places in ((DARK, 0.0), (1.0, 0.0), (1.0, 2.0)):
         scale = np.maximum(seen, least * mean) if mean else np.ones_like(seen)
@@ -105,7 +105,7 @@ def share_unmet(a: Side, b: Side) -> float:
     Pixels that no replicate met miss about as much energy as was met by one replicate alone, in
     other pixels (Good 1953). Where they miss far more, the pictures differ otherwise: then it is 0.
     """
-    difference, rounding = a.mean - b.mean, (HALF * b.mean) ** 2
+    difference, rounding = a.mean - b.mean, (HALF * b.size) ** 2
     noisy = np.maximum(a.variance, b.variance) > rounding
     seen = a.variance / a.count + b.variance / b.count + rounding
     unexplained = noisy & (difference**2 > FAR**2 * seen)

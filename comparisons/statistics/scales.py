@@ -44,14 +44,13 @@ def _of_means(pair: Pair, cells: Cells, margin: FloatArray | float, level: float
     """The means over parts of the picture, each channel by itself: errors of hue would cancel in
     luminance."""
     a, b = pair.a, pair.b
-    reference = cells.means(b.mean)
     return bias_test(
-        cells.means(a.mean) - reference,
-        reference,
+        cells.means(a.mean) - cells.means(b.mean),
+        cells.means(b.size),
         welch_errors(a.of(cells), b.of(cells), a, b),
         margin,
         level,
-        float(b.mean.mean()),
+        float(b.size.mean()),
         Events.of(a, b, cells),
     )
 
@@ -79,11 +78,11 @@ def pixel_test(pair: Pair, level: float) -> BiasTest:
     """
     a, b, margins, _ = pair
     own, near = welch_errors(a.of_pixels(), b.of_pixels(), a, b, single_pixels=True)
-    mean = float(b.mean.mean())
-    scale = divisor(b.mean, mean)
+    mean = float(b.size.mean())
+    scale = divisor(b.size, mean)
     spread = np.sqrt(np.maximum(a.variance, b.variance))
     hit = np.minimum(margins.pixel, 0.5 * np.minimum(ratio(spread, scale), 1.0))
-    margin = margins.constant + np.maximum(hit, ratio(margins.stored * np.abs(b.mean), scale))
+    margin = margins.constant + np.maximum(hit, ratio(margins.stored * np.abs(b.size), scale))
     parted = scale.size * (chance_of_parting(a.count, b.count) if b.pictures is not None else 0.0)
     still = spread <= margins.constant * scale
     noisy = neighbourhood(np.where(still, 0.0, 1.0)).max(axis=-1, keepdims=True) > 0.0
@@ -95,7 +94,7 @@ def pixel_test(pair: Pair, level: float) -> BiasTest:
         np.sqrt(np.maximum(own.value, near.value) ** 2 + missed),
         np.full(difference.shape, float(MOST_DOF)),
     )
-    test = bias_test(difference, b.mean, (own, near, unmet), margin, level, mean)
+    test = bias_test(difference, b.size, (own, near, unmet), margin, level, mean)
 
     proven = test.differs & noisy
     # The channels of a pixel may depend on each other: pixels are counted, against the expected
@@ -128,7 +127,7 @@ def line_test(pair: Pair, level: float) -> BiasTest | None:
         return None
     cells = lines(b.mean)
     steps = _steps(b.mean) / cells.pixels
-    scale = divisor(cells.means(b.mean), float(b.mean.mean()))
+    scale = divisor(cells.means(b.size), float(b.size.mean()))
     edges = margins.pixel * ratio(steps, scale)
     return _of_means(pair, cells, np.minimum(margins.image + edges, margins.tile), level)
 
@@ -166,7 +165,7 @@ def mode_test(pair: Pair, level: float) -> BiasTest | None:
     once, twice, four = (partial(_along, waves**n) for n in (1, 2, 4))
     pixels = np.full((len(waves), 1), float(height * width))
     noise_a, noise_b = (side.of_sums(once, twice, four, pixels) for side in (a, b))
-    mean = np.broadcast_to(b.mean.mean(axis=(0, 1)), (len(waves), 3))
+    mean = np.broadcast_to(b.size.mean(axis=(0, 1)), (len(waves), 3))
     # At a crest an event counts by its height; either side may have missed it, since waves have
     # both signs.
     event = np.abs(waves).max(axis=(1, 2))[:, None] * Events.of(a, b, whole(b.mean)).largest()

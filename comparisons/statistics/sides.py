@@ -62,6 +62,8 @@ class Side:
     count: int
     filtered: float = 0.0
     """Of a known mean the excess of the variance of sums of pixels (see `excess_by_filter`)."""
+    signed: bool = False
+    """Whether the pictures are of values of both signs, such as derivatives."""
 
     def of(self, cells: Cells) -> Noise:
         """The noise of the means over parts of one picture."""
@@ -89,10 +91,24 @@ class Side:
         return Noise(self.variance, own_dof, around, dof)
 
     @functools.cached_property
+    def size(self) -> FloatArray:
+        """(h, w, 3): what biases are divided by: the mean, and the mean's size where values have
+        both signs.  That is estimated by one half of the replicates with the signs of the other:
+        the size of a mean of noise alone would be the noise's."""
+        if not self.signed:
+            return self.mean
+        if self.pictures is None:
+            return np.abs(self.mean)
+        one, two = self.pictures[::2].mean(axis=0), self.pictures[1::2].mean(axis=0)
+        return np.asarray(0.5 * (one * np.sign(two) + two * np.sign(one)))
+
+    @functools.cached_property
     def met_once(self) -> FloatArray:
         """(h, w, 3): the energy of one picture that only one replicate has met; of a known mean,
         for which this is unknown, zero."""
-        return np.zeros_like(self.mean) if self.pictures is None else met_once(self.pictures)
+        if self.pictures is None:
+            return np.zeros_like(self.mean)
+        return met_once(np.abs(self.pictures) if self.signed else self.pictures)
 
     def event(self, scale: FloatArray, weight: FloatArray | float = 1.0) -> FloatArray:
         """(3,): the energy of an event of rare light in a pixel of one picture over `scale`, (h, w,
@@ -127,10 +143,10 @@ class Side:
         return np.asarray(2.0 * pixels * (self.count - 1) / np.maximum(excess, 1.0))
 
 
-def side_of(images: FloatArray | Known) -> Side:
+def side_of(images: FloatArray | Known, signed: bool = False) -> Side:
     """A side with replicates (R >= 2, h, w, 3), or with a known mean of independent pixels."""
     if isinstance(images, Known):
-        return known_side(images)
+        return known_side(images, signed=signed)
     mean = images.mean(axis=0)
     squares = np.zeros_like(mean)
     fourth = np.zeros_like(mean)
@@ -138,14 +154,15 @@ def side_of(images: FloatArray | Known) -> Side:
         square = (image - mean) ** 2
         squares += square
         fourth += square * square
-    return Side(images, mean, squares / (len(images) - 1), fourth / len(images), len(images))
+    variance = squares / (len(images) - 1)
+    return Side(images, mean, variance, fourth / len(images), len(images), signed=signed)
 
 
-def known_side(known: Known, other: FloatArray | None = None) -> Side:
+def known_side(known: Known, other: FloatArray | None = None, signed: bool = False) -> Side:
     """A side of which only the mean and its variance are known;  other: the other side's mean,
     which shows whether its pixels share noise."""
     shared = 0.0 if other is None else excess_by_filter(other, known.mean, known.variance)
-    return Side(None, known.mean, known.variance, known.variance**2, 1, shared)
+    return Side(None, known.mean, known.variance, known.variance**2, 1, shared, signed)
 
 
 def met_once(pictures: FloatArray) -> FloatArray:

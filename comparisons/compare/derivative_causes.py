@@ -1,0 +1,256 @@
+"""Why a derivative is wrong: hypotheses that are rendered, and named only if they leave no
+difference.
+
+A wrong derivative is mostly right: it lacks what moves with edges, a light, the bounces; or it is
+in another unit.  Our differences of another scene, or with another step, make each of these
+pictures, and the statistics say which of them the candidate's is.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from functools import lru_cache, partial
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from comparisons.compare.path_length import DIRECT
+from comparisons.compare.single_lights import without_each
+from comparisons.results.case import Cause
+from comparisons.statistics.cells import Margins
+from comparisons.statistics.decide import compare
+from reference_rt.core.arrays import FloatArray
+from reference_rt.integrators import Path
+from reference_rt.rendering.derivative import Derivative, derivative, difference
+from reference_rt.rendering.scene import Scene
+from reference_rt.scene.parameters import parameter
+from reference_rt.util.errors import ReferenceRtError
+
+SEED = 3 << 40
+"""Of our replicates: far from those of users."""
+
+NO_EDGE = 2.0**-30
+"""A step, in parts of the parameter's scale, that no sample crosses an edge with: of a million
+samples one in a thousand pictures has one that does.  Rounding is 2^-53 over it, 1e-7."""
+
+UNITS = {
+    math.pi / 180.0: "per degree, where the parameter is in radians",
+    180.0 / math.pi: "per radian, where the parameter is in degrees",
+    2.0: "twice the derivative, as of a radius for a diameter",
+    0.5: "half the derivative, as of a diameter for a radius",
+    math.pi: "pi times the derivative",
+    1.0 / math.pi: "a pi-th of the derivative",
+    3.0: "three times the derivative, as the sum over channels",
+    1.0 / 3.0: "a third of the derivative, as the mean over channels",
+}
+"""Factors that have a meaning."""
+
+NEAR = 0.01
+"""How near a factor must be to one of UNITS, and its standard error to nothing."""
+
+Sizes = Callable[[int], tuple[FloatArray, FloatArray]]
+"""Replicates of both sides with half as many pixels along each side."""
+
+
+class Ours:
+    """Our derivatives of a scene, in replicates (R, height, width, 3)."""
+
+    def __init__(
+        self, scene: Scene, path: str, step: float | None = None, threads: int | None = None
+    ) -> None:
+        self.scene, self.path, self.step, self.threads = scene, path, step, threads
+        self._truncations: list[tuple[int, FloatArray]] = []
+        self._said: list[str] = []
+
+    @property
+    def truncation(self) -> FloatArray:
+        """(height, width, 3): the mean of the estimates."""
+        counts = [count for count, _ in self._truncations]
+        found = np.average([x for _, x in self._truncations], axis=0, weights=counts)
+        return np.asarray(found)
+
+    def notes(self) -> tuple[str, ...]:
+        """The step of the differences."""
+        found = difference(self.scene, self.path, self.step)
+        return (f"ours are {found.side} differences with a step of {found.step:.3g}",)
+
+    def replicates(self, count: int, begun: int = 0) -> FloatArray:
+        """Those with the seeds from `begun` on, of the scene's samples each."""
+        found = self._derivative(self.scene, count, begun, self.step)
+        self._truncations.append((count, found.truncation))
+        return found.replicates
+
+    def of(self, scene: Scene, count: int, step: float | None = None) -> FloatArray:
+        """Those of another scene, or with another step."""
+        return self._derivative(scene, count, 0, step or self.step).replicates
+
+    def _derivative(self, scene: Scene, count: int, begun: int, step: float | None) -> Derivative:
+        spp = scene.resolved_sampler.spp
+        return derivative(
+            scene,
+            self.path,
+            spp=spp * count,
+            seed=SEED + begun,
+            replicates=count,
+            step=step,
+            threads=self.threads,
+        )
+
+
+class _Hypothesis(NamedTuple):
+    """name, evidence: of the cause;  make: the candidate's picture if it is so;  rim: pixels along
+    the edges of which nothing is known."""
+
+    name: str
+    evidence: str
+    make: Callable[[], FloatArray]
+    rim: int = 0
+
+
+def likeliest(
+    ours: Ours, right: FloatArray, wrong: FloatArray, margins: Margins, at_half_size: Sizes | None
+) -> Cause | None:
+    """The first hypothesis that leaves no difference; None if none does.
+
+    right, wrong: replicates of both sides;  at_half_size: None where the candidate cannot be
+    rendered again.
+    """
+    if (found := _factor(right, wrong, margins, at_half_size)) is not None:
+        return found
+    for one in _hypotheses(ours, right):
+        try:
+            picture = one.make()
+        except ReferenceRtError:  # a scene that lacks the parameter, or whose film is too small
+            continue
+        if picture.shape[1:] != wrong.shape[1:]:
+            continue
+        inner = [_inner(x, one.rim) for x in (picture, right, wrong)]
+        if inner[0].size and _is(inner[0], inner[2], margins):
+            return Cause(one.name, one.evidence, _explained(*inner))
+    return None
+
+
+def _is(picture: FloatArray, wrong: FloatArray, margins: Margins) -> bool:
+    """Whether the statistics see no difference, though they would see the whole of it."""
+    if not picture.any() and not wrong.any():
+        return True
+    if not picture.any() or not wrong.any():
+        return False
+    found = compare(wrong, picture, limit=0.5, margins=margins, signed=True)
+    return found.status in ("agree", "inconclusive")
+
+
+def _inner(pictures: FloatArray, rim: int) -> FloatArray:
+    height, width = pictures.shape[1:3]
+    return pictures[:, rim : height - rim, rim : width - rim]
+
+
+def _explained(picture: FloatArray, right: FloatArray, wrong: FloatArray) -> float:
+    """The part of the squared difference that goes."""
+    before = float(np.square(wrong.mean(axis=0) - right.mean(axis=0)).sum())
+    after = float(np.square(wrong.mean(axis=0) - picture.mean(axis=0)).sum())
+    return max(0.0, 1.0 - after / before) if before else 0.0
+
+
+def _factor(
+    right: FloatArray, wrong: FloatArray, margins: Margins, at_half_size: Sizes | None
+) -> Cause | None:
+    """A factor of all of it."""
+    factor, error = factor_of(right, wrong)
+    if not math.isfinite(factor) or error > 0.1 * abs(factor):
+        return None
+    if not _is(factor * right, wrong, margins):
+        return None
+    told = f"the candidate's is {factor:.4g} ± {error:.1g} times the derivative"
+    explained = _explained(factor * right, right, wrong)
+    if abs(factor + 1.0) < max(NEAR, 3.0 * error):
+        return Cause("the sign", told, explained)
+    if at_half_size is not None and abs(factor - 1.0) > NEAR:
+        small, small_error = factor_of(*at_half_size(len(right)))
+        growth = factor / small
+        if abs(growth - 4.0) < 0.5 + 4.0 * (error / abs(factor) + small_error / abs(small)):
+            return Cause(
+                "a factor that grows with the number of pixels",
+                f"{told}, and {small:.4g} with a quarter of the pixels",
+                explained,
+            )
+    for unit, words in UNITS.items():
+        if abs(factor / unit - 1.0) < NEAR and error < NEAR * unit:
+            return Cause("another unit of the parameter", f"{told}: {words}", explained)
+    return Cause("a constant factor", told, explained)
+
+
+def factor_of(right: FloatArray, wrong: FloatArray) -> tuple[float, float]:
+    """The factor of `right` that is nearest to `wrong` (least squares), and its standard error by
+    the replicates.  Halves of `right` make its square, which noise would make larger."""
+    count = min(len(right), len(wrong))
+    one, two = (right[k::2].mean(axis=0) for k in (0, 1))
+    square = float((one * two).sum())
+    if square <= 0.0:
+        return math.nan, math.inf
+    shares = np.array([(w * right.mean(axis=0)).sum() / square for w in wrong[:count]])
+    of_right = np.array([(wrong.mean(axis=0) * r).sum() / square for r in right[:count]])
+    error = math.hypot(shares.std(ddof=1), 2.0 * of_right.std(ddof=1)) / math.sqrt(count)
+    return float(shares.mean()), error
+
+
+def _hypotheses(ours: Ours, right: FloatArray) -> Iterator[_Hypothesis]:
+    """The cheapest first."""
+    scene, count = ours.scene, len(right)
+    for words, picture in (
+        ("the picture is upside down", right[:, ::-1]),
+        ("the picture is mirrored", right[:, :, ::-1]),
+        ("negative values are cut off", np.maximum(right, 0.0)),
+        ("the size in place of the value", np.abs(right)),
+    ):
+        yield _Hypothesis(words, "so is the derivative, changed so", partial(np.asarray, picture))
+    scale = parameter(scene, ours.path).scale
+    yield _Hypothesis(
+        "edges that move are left out",
+        "so are our differences with a step that no sample crosses an edge with: the difference "
+        "sits on silhouettes, and on the edges of shadows and of lamps",
+        partial(ours.of, scene, count, NO_EDGE * scale),
+    )
+    fine = lru_cache(partial(_of_quarter_pixels, ours, count))
+    for down, across in product((0, 1, -1), repeat=2):
+        if down or across:
+            words = " and ".join(way for n, way in ((across, "x"), (down, "y")) if n)
+            yield _Hypothesis(
+                "half a pixel",
+                f"so is the derivative of a picture moved by half a pixel along {words}",
+                partial(_moved, fine, down, across),
+                rim=1,
+            )
+    for name, one in without_each(scene):
+        yield _Hypothesis(
+            f"the share of {name} is missing",
+            f"so is the derivative of the scene without {name}",
+            partial(ours.of, one, count),
+        )
+    if isinstance(scene.integrator, Path):
+        own = scene.integrator.max_depth
+        others = [DIRECT] if own is None else sorted({DIRECT, own - 1, own + 1} - {own})
+        for depth in others:
+            integrator = scene.integrator.model_copy(update={"max_depth": depth})
+            yield _Hypothesis(
+                "direct light alone" if depth == DIRECT else "the length of paths",
+                f"so is the derivative with max_depth {depth}, where the scene has "
+                f"{'no limit' if own is None else own}",
+                partial(ours.of, scene.changed(integrator=integrator), count),
+            )
+
+
+def _of_quarter_pixels(ours: Ours, count: int) -> FloatArray:
+    """Replicates with twice as many pixels along each side."""
+    film = ours.scene.film
+    twice = film.model_copy(update={"width": 2 * film.width, "height": 2 * film.height})
+    return ours.of(ours.scene.changed(film=twice), count)
+
+
+def _moved(fine: Callable[[], FloatArray], down: int, across: int) -> FloatArray:
+    """The derivative moved by half a pixel, to the right and down where positive; the rim is of no
+    use."""
+    moved = np.roll(fine(), (down, across), axis=(1, 2))
+    count, height, width, _ = moved.shape
+    blocks = moved.reshape(count, height // 2, 2, width // 2, 2, 3)
+    return np.asarray(blocks.mean(axis=(2, 4)))
