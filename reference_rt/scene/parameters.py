@@ -137,7 +137,8 @@ def _made(scene: SceneModel, keys: Keys, value: Any) -> Parameter:
 
 
 def _scale(scene: SceneModel, keys: Keys, value: float | tuple[float, ...]) -> float:
-    """A number's own magnitude, or 1.  A number of a vector has that of the vector, but at most that
+    """A number's own magnitude, or 1.  A number of a vector has that of the vector, but at most
+    that
     of the single numbers beside it: a ball far away moves by parts of its radius; where the vector
     is 0, the least that is beside it.  An array has its extent."""
     holder = reduce(_child, keys[:-1], scene)
