@@ -71,7 +71,7 @@ def diffuse_furnace(rho: FloatArray = RHO) -> Expected:
     return _uniform(rho)
 
 
-@derivative("materials.matte.reflectance", diffuse_furnace, "rho", r"$L$ on the ball")
+@derivative("materials.matte.reflectance", diffuse_furnace, "rho", r"$L$ on the ball", spp=256)
 def diffuse_furnace_by_reflectance() -> Expected:
     """All three reflectances move alike."""
     return Expected(_uniform(np.ones(3)).pixels - _uniform(np.zeros(3)).pixels, 1e-9)
@@ -118,7 +118,7 @@ def glass_reflection(eta: float = 1.5) -> Expected:
     return _plane(lambda c: fresnel(c, eta))
 
 
-@derivative("materials.glass.interior_ior", glass_reflection, "eta", RATE)
+@derivative("materials.glass.interior_ior", glass_reflection, "eta", RATE, spp=16384, step=1 / 16)
 def glass_reflection_by_index() -> Expected:
     """As `metal_furnace_by_eta`, of a real index: near Brewster's angle r_p is small, and so is its
     part of the derivative."""
@@ -134,7 +134,7 @@ def glass_boundary(eta: float = 1.5) -> Expected:
 
 @derivative(
     "materials.glass.interior_ior", glass_boundary, "eta",
-    r"$(F' (1 - \frac{1}{\eta^2}) - \frac{2 (1 - F)}{\eta^3}) L$",
+    r"$(F' (1 - \frac{1}{\eta^2}) - \frac{2 (1 - F)}{\eta^3}) L$", spp=4096
 )  # fmt: skip
 def glass_boundary_by_index() -> Expected:
     """The product rule.  That radiance is spread over eta^2 outweighs the change of F."""
@@ -415,7 +415,7 @@ def plastic_furnace(rho: FloatArray = RHO) -> Expected:
 
 @derivative(
     "materials.coated.reflectance", plastic_furnace, "rho",
-    r"$\frac{(1 - F) (1 - F_{in})}{(1 - \rho F_{in})^2} L$",
+    r"$\frac{(1 - F) (1 - F_{in})}{(1 - \rho F_{in})^2} L$", spp=8192, step=1 / 64
 )  # fmt: skip
 def plastic_furnace_by_reflectance() -> Expected:
     """rho / (1 - rho F_in) by rho: each bounce below the coat brings the reflectance once more."""
@@ -447,7 +447,12 @@ def mask_furnace(opacity: float = 0.4) -> Expected:
 
 
 @derivative(
-    "materials.gauze.opacity", mask_furnace, "opacity", r"$(\rho - 1) L$ on the disk", spp=4096
+    "materials.gauze.opacity",
+    mask_furnace,
+    "opacity",
+    r"$(\rho - 1) L$ on the disk",
+    spp=4096,
+    step=1 / 8,
 )
 def mask_furnace_by_opacity() -> Expected:
     """What the base sends back less than the sky behind it."""

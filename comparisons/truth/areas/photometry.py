@@ -174,7 +174,7 @@ def disk_rate(r2: FloatArray, height: float, radius: float) -> FloatArray:
 @derivative(
     "shapes[1].transform[0].scale", disk_lamp, "radius",
     r"$\rho L a (\frac{1}{S} + \frac{(z - 2 a^2) (z - 2 r^2)}{S^3})$, $z = h^2 + r^2 + a^2$, "
-    r"$S^2 = z^2 - 4 a^2 r^2$",
+    r"$S^2 = z^2 - 4 a^2 r^2$", spp=1024
 )  # fmt: skip
 def disk_lamp_by_radius() -> Expected:
     """The quotient rule, with z' = 2 a.  The lamp's edge moves; the light of its inside stays."""
@@ -210,7 +210,12 @@ def _moved(corners: FloatArray, velocity: object, **picture: float) -> Expected:
 
 
 @derivative(
-    "shapes[1].transform[1].rotate.degrees", rectangle_lamp, "degrees", LAMBERT_RATE, step=0.25
+    "shapes[1].transform[1].rotate.degrees",
+    rectangle_lamp,
+    "degrees",
+    LAMBERT_RATE,
+    spp=1024,
+    step=0.5,
 )
 def rectangle_lamp_by_angle() -> Expected:
     """A plate turns: a corner (x, y, z) from the axis moves by (0, -z, y) per radian."""
@@ -231,7 +236,7 @@ def triangle_lamp(x: float = -1.0) -> Expected:
     return _floor(lambda x, y: floor_irradiance(corners, x, y), width=3.0)
 
 
-@derivative("shapes[1].v2[0]", triangle_lamp, "x", LAMBERT_RATE)
+@derivative("shapes[1].v2[0]", triangle_lamp, "x", LAMBERT_RATE, spp=4096)
 def triangle_lamp_by_corner() -> Expected:
     """Two of the three edges move with their corner."""
     return _moved(TRIANGLE, [[0, 0, 0], [0, 0, 0], [1, 0, 0]], width=3.0)
@@ -267,7 +272,9 @@ def sphere_lamp(radius: float = 0.8) -> Expected:
     return _floor(irradiance)
 
 
-@derivative("shapes[1].radius", sphere_lamp, "radius", r"$2 \rho L \frac{r}{d^2} \cos\theta$")
+@derivative(
+    "shapes[1].radius", sphere_lamp, "radius", r"$2 \rho L \frac{r}{d^2} \cos\theta$", spp=256
+)
 def sphere_lamp_by_radius() -> Expected:
     """r^2 by r."""
     return Expected(sphere_lamp().pixels * 2.0 / 0.8)

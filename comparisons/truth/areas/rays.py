@@ -45,7 +45,7 @@ def perspective(x: float = 0.1) -> Expected:
 SWEPT = r"$L \int (v \cdot n) ds$ over the outline in the pixel, $v$ its velocity on the film"
 
 
-@derivative("shapes[0].v2[0]", perspective, "x", SWEPT, spp=4096)
+@derivative("shapes[0].v2[0]", perspective, "x", SWEPT, spp=65536, step=1 / 128)
 def perspective_by_corner() -> Expected:
     """The film's outline moves linearly along the two edges of the corner that moves."""
     half = np.tan(np.radians(20.0))
@@ -61,7 +61,7 @@ def perspective_fov_y(fov: float = 30.0) -> Expected:
     return _triangles(View((0, 0, 5), (0.1, 0, 0), (0, 1, 0), (2 * half, half), (48, 24)))
 
 
-@derivative("camera.fov", perspective_fov_y, "fov", SWEPT, spp=4096)
+@derivative("camera.fov", perspective_fov_y, "fov", SWEPT, spp=16384, step=0.25)
 def perspective_fov_y_by_fov() -> Expected:
     """All images shrink towards the middle, as one over the tangent of half the angle, whose
     derivative is 1 + tan^2 over two."""
@@ -154,7 +154,7 @@ def orthographic(width: float = 3.4) -> Expected:
     return Expected(mix(first, WARM) + mix(second, COLD))
 
 
-@derivative("camera.width", orthographic, "width", SWEPT, spp=4096)
+@derivative("camera.width", orthographic, "width", SWEPT, spp=16384, step=1 / 32)
 def orthographic_by_width() -> Expected:
     """All images shrink towards the middle, as one over the width."""
     first, second = (swept_from_above(p[:, :2], p[:, :2] / -3.4, 3.4, 32) for p in (FIRST, SECOND))
@@ -213,7 +213,7 @@ def box_outline(degrees: float = 25.0) -> Expected:
 
 
 @derivative(
-    "shapes[0].transform[2].rotate.degrees", box_outline, "degrees", SWEPT, spp=4096, step=0.25
+    "shapes[0].transform[2].rotate.degrees", box_outline, "degrees", SWEPT, spp=32768, step=0.5
 )
 def box_outline_by_angle() -> Expected:
     """A corner (x, y, z) that turns about x moves by (0, -z, y) per radian."""
@@ -359,7 +359,7 @@ def lens_blur(focus: float = 4.0) -> Expected:
 @derivative(
     "camera.focus_distance", lens_blur, "focus",
     r"$-\frac{A z L}{f^2} [\frac{2}{3 \pi} (1 - u^2)^{3/2}]$ between the pixel's borders, over "
-    r"its width",
+    r"its width", spp=131072, step=1 / 8
 )  # fmt: skip
 def lens_blur_by_focus() -> Expected:
     """The segment's share has the derivative 2 sqrt(1 - u^2) / pi by u, and u that of -u over the

@@ -111,7 +111,7 @@ def sheared_ball(entry: float = 0.4) -> Expected:
 
 
 @derivative(
-    "shapes[0].transform[0].matrix[0][2]", sheared_ball, "entry", SWEPT, spp=4096, step=1 / 64
+    "shapes[0].transform[0].matrix[0][2]", sheared_ball, "entry", SWEPT, spp=8192, step=1 / 32
 )
 def sheared_ball_by_matrix() -> Expected:
     """The ellipse reaches |B^T n| along its normal n, at the point B B^T n / |B^T n|; by an entry

@@ -25,7 +25,7 @@ def closed_room(rho: FloatArray = RHO) -> Expected:
 
 
 @derivative(
-    "materials.matte.reflectance", closed_room, "rho", r"$\frac{L}{(1 - \rho)^2}$",
+    "materials.matte.reflectance", closed_room, "rho", r"$\frac{L}{(1 - \rho)^2}$", spp=8192
 )  # fmt: skip
 def closed_room_by_reflectance() -> Expected:
     """B' = B + rho B': the derivative is a radiance as well, of a room that shines with B."""
@@ -140,7 +140,7 @@ def mirror_image(place: float = 0.5) -> Expected:
 
 @derivative(
     "shapes[1].transform[2].translate[0]", mirror_image, "place",
-    r"$\rho L (F_{lamp}' - \rho_m F_{image}')$, by each one's own place", spp=4096,
+    r"$\rho L (F_{lamp}' - \rho_m F_{image}')$, by each one's own place", spp=16384, step=1 / 32
 )  # fmt: skip
 def mirror_image_by_place() -> Expected:
     """As the lamp moves away from the mirror its image moves the other way."""
