@@ -43,6 +43,12 @@ def truth(
         int | None, typer.Option(min=1, help="Samples per pixel. (default: the scene's)")
     ] = None,
     threads: Threads = None,
+    derivatives: Annotated[
+        bool,
+        typer.Option(
+            "--derivatives", help="Judge derivatives by a parameter in place of pictures."
+        ),
+    ] = False,
     markdown: Annotated[Path | None, table_in("truth")] = None,
 ) -> None:
     """Render scenes whose pixels are known by formula, by ours and by Mitsuba.
@@ -59,16 +65,25 @@ def truth(
         from comparisons.report import terminal
         from comparisons.runs.provenance import ours, provenance
         from comparisons.truth import outputs
-        from comparisons.truth.renderers import RENDERERS, REPLICATES, load
-        from comparisons.truth.renderers import row_of as rendered
+        from comparisons.truth import renderers as by
+        from comparisons.truth.case import Derivative
     from reference_rt.util.console import ProgressLine
 
-    if renderer not in (*RENDERERS, "both"):
+    if derivatives:
+        if replicates is not None or spp is not None:
+            raise UsageError("--derivatives: each case has its own samples; expected no --spp")
+        if renderer != "both" and renderer not in by.DIFFERENTIATED:
+            known = ", ".join(by.DIFFERENTIATED)
+            raise UsageError(f"--renderer: expected {known} of derivatives, got '{renderer}'")
+    if renderer not in (*by.RENDERERS, "both"):
         expected = "ours, mitsuba, both, cycles or povray"
         raise UsageError(f"--renderer: expected {expected}, got '{renderer}'")
-    picked = _chosen(names or ())
-    who = [each for each in RENDERERS if renderer == each or (renderer, each) in BOTH]
-    writes = Outputs(out, ("results.json", "report.html"), markdown=(markdown, "truth"))
+    picked = _chosen(names or (), derivatives=derivatives)
+    who = [each for each in by.RENDERERS if renderer == each or (renderer, each) in BOTH]
+    if derivatives:
+        who = [each for each in who if each in by.DIFFERENTIATED]
+    table = "truth derivatives" if derivatives else "truth"
+    writes = Outputs(out, ("results.json", "report.html"), markdown=(markdown, table))
     writes.prepare()
     begun = time.perf_counter()
     facts = provenance() if "mitsuba" in who else ours()
@@ -78,8 +93,13 @@ def truth(
         for k, case in enumerate(picked):
             progress("cases", k / len(picked))
             progress.note(case.name)
-            scene = load(scenes / f"{case.name}.yaml", spp)
-            rows += rendered(case, scene, who, replicates or REPLICATES, threads)
+            if isinstance(case, Derivative):
+                scene = by.load(scenes / f"{case.of.name}.yaml")
+                chosen = {each: by.DIFFERENTIATED[each] for each in who}
+                rows += by.derivative_rows(case, scene, chosen, threads)
+                continue
+            scene = by.load(scenes / f"{case.name}.yaml", spp)
+            rows += by.row_of(case, scene, who, replicates or by.REPLICATES, threads)
         progress("cases", 1.0)
     facts |= {"variant": SCALAR} if "mitsuba" in who else {}
     facts |= {"seconds": round(time.perf_counter() - begun, 1)}
@@ -131,10 +151,10 @@ def truth_gate(
     raise typer.Exit(outputs.exit_code(rows))
 
 
-def _chosen(names: Sequence[str], option: str = "") -> "list[Case]":
-    from comparisons.truth.case import chosen
+def _chosen(names: Sequence[str], option: str = "", derivatives: bool = False) -> "Sequence[Case]":
+    from comparisons.truth import case
 
     try:
-        return chosen(names)
+        return case.chosen(names, case.derivatives()) if derivatives else case.chosen(names)
     except ValueError as error:
         raise UsageError(f"{option}{error}") from None

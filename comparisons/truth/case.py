@@ -1,10 +1,11 @@
 """A case of truth: a scene file, and a function that computes its picture without a renderer."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
 from importlib import import_module
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -61,12 +62,29 @@ class Case:
     tests: str
     source: str
     derivation: str
-    compute: Callable[[], Expected]
+    compute: Callable[..., Expected]
+
+
+@dataclass(frozen=True)
+class Derivative(Case):
+    """A case whose formula is the derivative of another's picture by a parameter of its scene.
+
+    of: that case;  parameter: the path in the scene;  argument: of the function `of.compute`, the
+    parameter's value;  spp, step: of differences of a renderer; None: the scene's, and as many as
+    are usual.
+    """
+
+    of: Case
+    parameter: str
+    argument: str
+    spp: int | None
+    step: float | None
 
 
 _CASES: dict[str, Case] = {}
+_DERIVATIVES: dict[str, Derivative] = {}
 
-Formula = Callable[[], Expected]
+Formula = Callable[..., Expected]
 
 
 def case(formula: str, tests: str, source: str = "elementary") -> Callable[[Formula], Formula]:
@@ -82,19 +100,54 @@ def case(formula: str, tests: str, source: str = "elementary") -> Callable[[Form
     return register
 
 
-def cases() -> dict[str, Case]:
-    """All cases by name, in the order of AREAS."""
+def derivative(
+    parameter: str, of: Formula, argument: str, formula: str, *,
+    spp: int | None = None, step: float | None = None,
+) -> Callable[[Formula], Formula]:  # fmt: skip
+    """Register a function as the derivative of a case, in the case's module; see `Derivative`."""
+
+    def register(function: Formula) -> Formula:
+        case = _CASES[of.__name__]
+        name = function.__name__
+        text = " ".join((function.__doc__ or "").split())
+        tests = f"`{case.name}` by `{parameter}`"
+        _DERIVATIVES[name] = Derivative(
+            name, case.area, formula, tests, case.source, text, function,
+            case, parameter, argument, spp, step,
+        )  # fmt: skip
+        return function
+
+    return register
+
+
+C = TypeVar("C", bound=Case)
+
+
+def _in_order(known: dict[str, C]) -> dict[str, C]:
     for area in AREAS:
         import_module(f"comparisons.truth.areas.{area}")
     order = list(AREAS)
-    return dict(sorted(_CASES.items(), key=lambda item: order.index(item[1].area)))
+    return dict(sorted(known.items(), key=lambda item: order.index(item[1].area)))
 
 
-def chosen(names: Sequence[str]) -> list[Case]:
+def cases() -> dict[str, Case]:
+    """All cases by name, in the order of AREAS."""
+    return _in_order(_CASES)
+
+
+def derivatives() -> dict[str, Derivative]:
+    """All derivatives by name, in the order of AREAS."""
+    return _in_order(_DERIVATIVES)
+
+
+def chosen(names: Sequence[str], known: Mapping[str, C] | None = None) -> list[C]:
     """The cases of these names, areas, or patterns such as 'glass_*'; all for none, or for "all".
-    Raises ValueError for one that matches nothing."""
-    known = cases()
-    selected: dict[str, Case] = {}
+
+    known: the cases by name, default `cases()`.  Raises ValueError for one that matches nothing.
+    """
+    known = cases() if known is None else known  # type: ignore[assignment]
+    assert known is not None
+    selected: dict[str, C] = {}
     for name in names or ("all",):
         some = [
             one

@@ -24,6 +24,25 @@ def polygon_irradiance(
     return np.asarray(np.abs(total) / 2.0)
 
 
+def polygon_irradiance_rate(
+    corners: npt.ArrayLike, velocity: npt.ArrayLike, points: FloatArray, normal: npt.ArrayLike
+) -> FloatArray:
+    """The derivative of `polygon_irradiance` as the corners move: the product rule in each edge,
+    whose angle is atan2(|v x w|, v . w)."""
+    v = np.asarray(corners, float) - points[..., None, :]
+    w, dv = np.roll(v, -1, axis=-2), np.broadcast_to(velocity, np.shape(corners))
+    dw, n = np.roll(dv, -1, axis=-2), np.asarray(normal, float)
+    cross, dcross = np.cross(v, w), np.cross(dv, w) + np.cross(v, dw)
+    length, cosine = np.linalg.norm(cross, axis=-1), (v * w).sum(axis=-1)
+    dlength, dcosine = (cross * dcross).sum(axis=-1) / length, (dv * w + v * dw).sum(axis=-1)
+    angle = np.arctan2(length, cosine)
+    dangle = (cosine * dlength - length * dcosine) / (length**2 + cosine**2)
+    parts = angle / length * (cross @ n)
+    rates = (dangle - angle / length * dlength) / length * (cross @ n)
+    rates += angle / length * (dcross @ n)
+    return np.asarray(np.sign(parts.sum(axis=-1)) * rates.sum(axis=-1) / 2.0)
+
+
 def on_floor(x: FloatArray, y: FloatArray, z: float = 0.0) -> FloatArray:
     """(..., 3): points (x, y, z)."""
     return np.stack([x, y, np.full_like(x, z)], axis=-1)
@@ -53,6 +72,18 @@ def fresnel_metal(cosine: FloatArray, eta: float, k: float) -> FloatArray:
     s = (cosine - index * behind) / (cosine + index * behind)
     p = (index * cosine - behind) / (index * cosine + behind)
     return np.asarray((np.abs(s) ** 2 + np.abs(p) ** 2) / 2.0)
+
+
+def fresnel_rate(cosine: FloatArray, index: complex) -> FloatArray:
+    """The derivative of both reflectances by the real part of the index, which is not beyond the
+    critical angle: by that of the cosine behind and the quotient rule."""
+    behind = np.sqrt(1.0 - (1.0 - cosine**2) / index**2 + 0j)
+    turn = (1.0 - cosine**2) / (index**3 * behind)
+    s = (cosine - index * behind) / (cosine + index * behind)
+    p = (index * cosine - behind) / (index * cosine + behind)
+    ds = -2.0 * cosine * (behind + index * turn) / (cosine + index * behind) ** 2
+    dp = 2.0 * cosine * (behind - index * turn) / (index * cosine + behind) ** 2
+    return np.asarray((s.conj() * ds + p.conj() * dp).real)
 
 
 def ggx(tangent2: FloatArray, alpha: float) -> FloatArray:

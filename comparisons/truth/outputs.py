@@ -291,14 +291,24 @@ def _shown(expected: Expected, mean: FloatArray) -> tuple[tuple[str, str], ...]:
     """Formula, picture and difference; what the formula does not state is grey."""
     stated = expected.stated[..., None]
     truth = np.where(stated, expected.pixels, 0.0)
-    grey = np.full_like(truth, 128.0)
     difference = np.where(stated, mean - truth, 0.0)
-    worst = np.take_along_axis(difference, np.abs(difference).argmax(axis=-1)[..., None], axis=-1)
     span = float(np.abs(difference).max()) or 1.0
-    end = np.where(worst > 0.0, RED, BLUE)
-    red_blue = WHITE + np.abs(worst) / span * (end - np.array(WHITE))
+    if (truth < 0.0).any():
+        largest = float(np.abs(truth).max())
+        formula, picture = (_red_blue(some, stated, largest) for some in (truth, mean))
+    else:
+        formula = formula_picture(expected)
+        picture = 255.0 * encode(np.maximum(mean, 0.0), white_level(truth))
     return (
-        ("formula", png_url(formula_picture(expected))),
-        ("picture", png_url(255.0 * encode(np.maximum(mean, 0.0), white_level(truth)))),
-        (f"difference, up to {span:.2g}", png_url(np.where(stated, red_blue, grey))),
+        ("formula", png_url(formula)),
+        ("picture", png_url(picture)),
+        (f"difference, up to {span:.2g}", png_url(_red_blue(difference, stated, span))),
     )
+
+
+def _red_blue(values: FloatArray, stated: FloatArray, span: float) -> FloatArray:
+    """Red above 0 and blue below, of each pixel the channel farthest from 0; from -span to span."""
+    worst = np.take_along_axis(values, np.abs(values).argmax(axis=-1)[..., None], axis=-1)
+    end = np.where(worst > 0.0, RED, BLUE)
+    share = np.minimum(np.abs(worst) / span, 1.0)
+    return np.where(stated, WHITE + share * (end - np.array(WHITE)), 128.0)

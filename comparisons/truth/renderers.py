@@ -1,9 +1,10 @@
 """The pictures of a case by ours, by other renderers and by anybody, and the verdicts on them."""
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -11,9 +12,10 @@ from comparisons.gate.driver import Command, Driver, RendererError
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import stacked
 from comparisons.renderers import PLACES, NoCounterpartError, Renderer, other
-from comparisons.truth.case import Case, FloatArray
+from comparisons.truth.case import Case, Derivative, Expected, FloatArray
 from comparisons.truth.judge import judge
 from comparisons.truth.outputs import Row
+from reference_rt.rendering.derivative import derivative
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import build_tables
@@ -82,6 +84,63 @@ def row_of(
         verdict = judge(expected, pictures)
         rows.append(Row.of(case, name, verdict, expected, pictures, seconds))
     return rows
+
+
+# ---- derivatives --------------------------------------------------------------------------------
+
+
+class Estimate(Protocol):
+    """replicates (replicates, height, width, 3): independent estimates of a derivative;  truncation
+    (height, width, 3): an estimate of what a step adds to them, 0 without one."""
+
+    @property
+    def replicates(self) -> FloatArray: ...
+
+    @property
+    def truncation(self) -> FloatArray: ...
+
+
+Differentiated = Callable[[Derivative, Scene, int | None], Estimate]
+"""A renderer's derivative of a scene by a case's parameter, with so many threads.  Raises
+NoCounterpartError, ReferenceUnavailableError."""
+
+
+def our_derivative(case: Derivative, scene: Scene, threads: int | None = None) -> Estimate:
+    return derivative(scene, case.parameter, spp=case.spp, step=case.step, threads=threads)
+
+
+DIFFERENTIATED: dict[str, Differentiated] = {"ours": our_derivative}
+
+
+def derivative_rows(
+    case: Derivative,
+    scene: Scene,
+    by: Mapping[str, Differentiated] = DIFFERENTIATED,
+    threads: int | None = None,
+) -> list[Row]:
+    """The verdicts on a derivative by these renderers.  scene: that of `case.of`."""
+    expected = case.compute()
+    rows = []
+    for name, differentiated in by.items():
+        start = time.perf_counter()
+        try:
+            found = differentiated(case, scene, threads)
+        except (NoCounterpartError, ReferenceUnavailableError) as error:
+            rows.append(Row(case, name, "not comparable", str(error)))
+            continue
+        seconds = time.perf_counter() - start
+        allowed = with_truncation(expected, found.truncation)
+        verdict = judge(allowed, found.replicates)
+        rows.append(Row.of(case, name, verdict, expected, found.replicates, seconds))
+    return rows
+
+
+def with_truncation(expected: Expected, truncation: FloatArray) -> Expected:
+    """The formula with the truncation of a difference, of the whole picture, in its bound."""
+    stated = expected.stated
+    size = np.abs(expected.pixels[stated]).mean()
+    added = np.abs(truncation[stated].mean(axis=0)).max()
+    return replace(expected, bound=float(expected.bound + added / size))
 
 
 CANDIDATE = "candidate"

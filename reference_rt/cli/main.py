@@ -1,4 +1,4 @@
-"""`reference-rt`: render, explain, warm-up, schema, and the commands of other packages."""
+"""`reference-rt`: render, derivative, explain, warm-up, schema, and other packages' commands."""
 
 import atexit
 import gc
@@ -23,7 +23,7 @@ from reference_rt.cli.options import (
     by_name,
     without_blas,
 )
-from reference_rt.util.errors import ImageError, meant_by
+from reference_rt.util.errors import ImageError, UsageError, meant_by
 from reference_rt.util.processes import catch_signals, exit_code_of
 
 
@@ -171,6 +171,69 @@ def preview(
 
 @app.command()
 @guarded
+def derivative(
+    scene: SceneArgument,
+    parameter: Annotated[
+        str,
+        typer.Argument(
+            metavar="PARAMETER",
+            help="Its path, such as shapes[0].radius or 'materials.red.reflectance[0]'; see "
+            "explain --parameters.",
+        ),
+    ],
+    output: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--output",
+            "-o",
+            help="An .exr (with standard errors and truncation) or a .png (red above 0, blue "
+            "below); repeatable.",
+        ),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON.")] = False,
+    step: Annotated[
+        float | None,
+        typer.Option(help="In the parameter's unit. (default: 1/256 of its scale)"),
+    ] = None,
+    spp: Annotated[int | None, typer.Option(help="Samples per pixel of each picture.")] = None,
+    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
+    integrator: Annotated[
+        str | None, typer.Option(help="ray_cast, whitted, direct or path.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the random numbers.")] = None,
+    threads: Threads = None,
+    define: Defaults = None,
+    allow_missing: AllowMissing = False,
+) -> None:
+    """Compute the derivative of a picture by a parameter of its scene, and its error.
+
+    By central differences with common random numbers: as costly as two pictures.
+    """
+    from reference_rt.cli import derivative as derivatives
+    from reference_rt.rendering.image import check_suffix
+    from reference_rt.rendering.scene import Scene
+    from reference_rt.util.files import check_writable
+
+    outputs = output or []
+    if not outputs and not as_json:
+        raise UsageError("expected --output, --json or both")
+    for path in outputs:
+        check_suffix(path)
+    loaded = adjusted(
+        Scene.load(scene, by_name(define), allow_missing), spp, size, integrator, seed
+    )
+    check_writable(*outputs)
+    with without_blas():
+        found = derivatives.derivative(loaded, parameter, outputs, threads, step)
+    for warning in found.warnings:
+        say(f"warning: {warning}", err=True)
+    say(derivatives.in_words(found, outputs), err=True)
+    if as_json:
+        say(derivatives.as_json(found))
+
+
+@app.command()
+@guarded
 def trace(
     scene: SceneArgument,
     pixel: Annotated[
@@ -220,6 +283,10 @@ def explain(
     scene: SceneArgument,
     define: Defaults = None,
     allow_missing: AllowMissing = False,
+    parameters: Annotated[
+        bool,
+        typer.Option("--parameters", help="List what `derivative` can be asked, with values."),
+    ] = False,
     witness: Annotated[
         str | None,
         typer.Option(
@@ -234,6 +301,12 @@ def explain(
     loaded = Scene.load(scene, by_name(define), allow_missing)
     if witness is not None:
         print_witness(loaded, witness)
+        return
+    if parameters:
+        from reference_rt.cli.derivative import lines_of
+
+        for line in lines_of(loaded):
+            say(line)
         return
     print_page(loaded)
 

@@ -101,6 +101,9 @@ def difference(scene: S, path: str, step: float | None = None) -> Difference[S]:
             scenes, coarse = (
                 tuple(moved(scene, of, k * times * h) for k, _ in rule) for times in (1, 2)
             )
+            for one in (*scenes, *coarse):
+                if isinstance(one, BuiltScene):
+                    _ = one.tables  # some faults show only there
         except SceneError as error:
             reasons.append(error.message)
             continue
@@ -204,7 +207,7 @@ def derivative(
     `difference`;  replicates: independent estimates, with the seeds that follow the first.  It
     costs as much as two pictures, and one part in `replicates` more; at a bound, three.
 
-    Raises UsageError, SceneError; issues no warning that its result does not carry.
+    Raises UsageError, SceneError.
     """
     began = time.perf_counter()
     if not isinstance(scene, BuiltScene):
@@ -291,12 +294,20 @@ def _warnings(of: Derivative, brightest: float) -> Iterator[str]:
     if not np.isfinite(of.replicates).all():
         yield "some values are not finite: the scene's picture has pixels that are not"
         return
-    if not of.replicates.any() and not of.truncation.any():
-        yield f"no pixel changes with {of.parameter} within {of.step:g}: it is not seen"
-        return
+    if len(of.replicates) == 1:
+        yield (
+            "one replicate has no standard error, and the points of a grid miss edges that move "
+            "between them; expected a sampler 'sobol' or 'independent', of 2 samples or more"
+        )
     tiles = _tiles(of.replicates)
     size = float(np.square(tiles.mean(axis=0)).sum())
-    share = math.inf
+    rounding, mean = _ROUNDINGS * brightest / of.step, math.sqrt(size / tiles[0].size)
+    if mean <= rounding:
+        yield (
+            f"nothing changes, beyond rounding, with {of.parameter} within {of.step:g}: it is not "
+            "seen, or too rarely; expected a larger step or more samples"
+        )
+        return
     if len(tiles) > 1:
         noise = float(tiles.var(axis=0, ddof=1).sum()) / len(tiles)
         share = math.sqrt(noise / size)
@@ -312,13 +323,7 @@ def _warnings(of: Derivative, brightest: float) -> Iterator[str]:
                 f"the standard error of its tiles is {share:.0%} of it: too much for a statement; "
                 f"{_NOISY:.0%} takes about {times:.2g} times the samples"
             )
-    else:
-        yield (
-            "one replicate has no standard error, and the points of a grid miss edges that move "
-            "between them; expected a sampler 'sobol' or 'independent', of 2 samples or more"
-        )
-    rounding = _ROUNDINGS * brightest / of.step
-    if rounding > _ROUNDED * math.sqrt(size / tiles[0].size):
+    if rounding > _ROUNDED * mean:
         yield f"the step, {of.step:g}, is so small that rounding shows; expected a larger one"
 
 

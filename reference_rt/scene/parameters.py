@@ -47,7 +47,8 @@ def parameter(scene: SceneModel, path: str) -> Parameter:
     """The parameter of a path.  Raises UsageError, which names those that are near."""
     value, keys, rest = _walked(scene, path)
     if rest:
-        raise UsageError(f"{path}: {_missing(value, keys, rest)}{_near(scene, path, keys)}")
+        why, advice = _missing(value, keys, rest)
+        raise UsageError(f"{path}: {why}{_near(scene, path, keys)}{advice}")
     if _is_number(value) or _is_whole(scene, keys, value):
         return _made(scene, keys, value)
     raise UsageError(f"{path}: {_no_number(value)}{_near(scene, path, keys)}")
@@ -137,9 +138,9 @@ def _made(scene: SceneModel, keys: Keys, value: Any) -> Parameter:
 
 
 def _scale(scene: SceneModel, keys: Keys, value: float | tuple[float, ...]) -> float:
-    """A number's own magnitude, or 1.  A number of a vector has that of the vector, but at most that
-    of the single numbers beside it: a ball far away moves by parts of its radius; where the vector
-    is 0, the least that is beside it.  An array has its extent."""
+    """A number's own magnitude, or 1.  A number of a vector has that of the vector, but at most
+    that of the single numbers beside it: a ball far away moves by parts of its radius; where the
+    vector is 0, the least that is beside it.  An array has its extent."""
     holder = reduce(_child, keys[:-1], scene)
     if isinstance(value, float) and isinstance(holder, Description):
         return abs(value) or 1.0
@@ -209,20 +210,21 @@ def _walked(scene: SceneModel, path: str) -> tuple[Any, Keys, str]:
     return part, keys, rest
 
 
-def _missing(part: Any, keys: Keys, rest: str) -> str:
+def _missing(part: Any, keys: Keys, rest: str) -> tuple[str, str]:
+    """Why what is left of a path leads nowhere, and what was meant."""
     where = f"'{_text(keys)}'" if keys else "the scene"
     known = [key for key, _ in _children(part)]
     if not known:
-        return f"{where} {_no_number(part) if not _is_number(part) else 'is a number'}"
+        return f"{where} {'is a number' if _is_number(part) else _no_number(part)}", ""
     if isinstance(known[0], int):
-        return f"{where} has the numbers 0 to {known[-1]}, got '{rest.lstrip('.')}'"
+        return f"{where} has the numbers 0 to {known[-1]}, got '{rest.lstrip('.')}'", ""
     name = rest.lstrip(".").partition(".")[0].partition("[")[0]
-    return f"{where} has no '{name}'{meant(name, map(str, known))}"
+    return f"{where} has no '{name}'", meant(name, map(str, known))
 
 
 def _no_number(value: Any) -> str:
     if value is None:
-        return "is not set"
+        return "is not set: what stands for it does not move; give it a value"
     if isinstance(value, bool | int):
         return f"is {value}, which is no real number: a picture has no derivative by it"
     if isinstance(value, str):

@@ -7,11 +7,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from comparisons.truth.case import Expected, FloatArray, case
+from comparisons.truth.case import Expected, FloatArray, case, derivative
 from comparisons.truth.film import View, coverage, level, mix, pixel_means, seen_from_above, turn
 from comparisons.truth.optics import (
     fresnel,
     fresnel_metal,
+    fresnel_rate,
     half_vector_mean,
     rough_metal,
 )
@@ -19,6 +20,7 @@ from comparisons.truth.optics import (
 SKY = np.array([0.5, 1.0, 2.0])
 RHO = np.array([0.8, 0.5, 0.2])
 GOLD = ((0.14, 3.98), (0.37, 2.38), (1.44, 1.6))
+GOLD_ETA = np.array([eta for eta, _ in GOLD])
 """(eta, k) of red, green and blue."""
 
 Albedo = Callable[[FloatArray], FloatArray]
@@ -28,15 +30,15 @@ WIDTH = 2.4
 FRESNEL = "Fresnel's equations"
 
 
-def _ball(albedo: Albedo, bound: float = 1e-9) -> Expected:
+def _ball(albedo: Albedo, bound: float = 1e-9, sky: float = 1.0) -> Expected:
     """A unit sphere in the sky: pixels within 0.9 of the radius by the albedo, pixels outside of it
-    by the sky."""
+    by the sky, times `sky`."""
 
     def radiance(x: FloatArray, y: FloatArray) -> FloatArray:
         r2 = x * x + y * y
         values = np.asarray(albedo(np.sqrt(1.0 - np.minimum(r2, 0.81))))
         values = values[..., None] if values.ndim == 2 else values
-        inner = np.where(r2[..., None] < 0.81, values, np.where(r2[..., None] > 1.0, 1.0, np.nan))
+        inner = np.where(r2[..., None] < 0.81, values, np.where(r2[..., None] > 1.0, sky, np.nan))
         return np.asarray(inner * SKY)
 
     return Expected(seen_from_above(radiance, WIDTH, 32, 8), bound)
@@ -64,9 +66,15 @@ def _uniform(albedo: FloatArray) -> Expected:
 
 
 @case(r"$\rho L$", "a matte ball in a furnace")
-def diffuse_furnace() -> Expected:
+def diffuse_furnace(rho: FloatArray = RHO) -> Expected:
     """A matte surface sends back its reflectance, in all directions."""
-    return _uniform(RHO)
+    return _uniform(rho)
+
+
+@derivative("materials.matte.reflectance", diffuse_furnace, "rho", r"$L$ on the ball", spp=256)
+def diffuse_furnace_by_reflectance() -> Expected:
+    """All three reflectances move alike."""
+    return Expected(_uniform(np.ones(3)).pixels - _uniform(np.zeros(3)).pixels, 1e-9)
 
 
 @case(r"$\rho L$", "a mirror ball in a furnace")
@@ -87,22 +95,55 @@ def glass_furnace() -> Expected:
     "a metal's Fresnel reflectance",
     "Born & Wolf, 14.2",
 )
-def metal_furnace() -> Expected:
+def metal_furnace(eta: FloatArray = GOLD_ETA) -> Expected:
     """The mean of the reflectances of both polarisations."""
-    return _ball(lambda c: np.stack([fresnel_metal(c, *pair) for pair in GOLD], axis=-1))
+    pairs = [(eta[k], GOLD[k][1]) for k in range(3)]
+    return _ball(lambda c: np.stack([fresnel_metal(c, *pair) for pair in pairs], axis=-1))
+
+
+RATE = r"$\frac{r_s^2 + r_p^2}{2}$ by the index, $r_s$ and $r_p$ by the quotient rule"
+
+
+@derivative("materials.gold.eta", metal_furnace, "eta", RATE)
+def metal_furnace_by_eta() -> Expected:
+    """The derivative of a square of a complex amplitude r is 2 Re(r* r')."""
+    return _ball(
+        lambda c: np.stack([fresnel_rate(c, complex(n, -k)) for n, k in GOLD], axis=-1), sky=0.0
+    )
 
 
 @case(r"$F(\cos\theta) L$", "the reflectance of glass at every angle", FRESNEL)
-def glass_reflection() -> Expected:
+def glass_reflection(eta: float = 1.5) -> Expected:
     """The glass's transmittance is set to 0."""
-    return _plane(lambda c: fresnel(c, 1.5))
+    return _plane(lambda c: fresnel(c, eta))
+
+
+@derivative("materials.glass.interior_ior", glass_reflection, "eta", RATE, spp=16384, step=1 / 16)
+def glass_reflection_by_index() -> Expected:
+    """As `metal_furnace_by_eta`, of a real index: near Brewster's angle r_p is small, and so is its
+    part of the derivative."""
+    return _plane(lambda c: fresnel_rate(c, 1.5))
 
 
 @case(r"$(F + \frac{1 - F}{\eta^2}) L$", "radiance changes with the index squared", FRESNEL)
-def glass_boundary() -> Expected:
+def glass_boundary(eta: float = 1.5) -> Expected:
     """One boundary, and the same radiance from both sides.  What comes out of glass fills eta^2
     times the solid angle that it had inside."""
-    return _plane(lambda c: fresnel(c, 1.5) + (1.0 - fresnel(c, 1.5)) / 2.25)
+    return _plane(lambda c: fresnel(c, eta) + (1.0 - fresnel(c, eta)) / eta**2)
+
+
+@derivative(
+    "materials.glass.interior_ior", glass_boundary, "eta",
+    r"$(F' (1 - \frac{1}{\eta^2}) - \frac{2 (1 - F)}{\eta^3}) L$", spp=4096
+)  # fmt: skip
+def glass_boundary_by_index() -> Expected:
+    """The product rule.  That radiance is spread over eta^2 outweighs the change of F."""
+
+    def rate(c: FloatArray) -> FloatArray:
+        spread = 2.0 * (1.0 - fresnel(c, 1.5)) / 1.5**3
+        return np.asarray(fresnel_rate(c, 1.5) * (1.0 - 1.0 / 2.25) - spread)
+
+    return _plane(rate)
 
 
 @case(r"$(F + (1 - F) \eta^2) L$, $F = 1$ beyond the critical angle", "total reflection", FRESNEL)
@@ -221,10 +262,33 @@ MICROFACETS = "Walter et al. 2007"
 
 
 @case(r"$\frac{D G F}{4 \cos\theta} E$", "a rough metal (GGX) in one light", MICROFACETS)
-def ggx_in_light() -> Expected:
+def ggx_in_light(alpha: float = 0.4) -> Expected:
     """D is GGX's distribution of normals, G Smith's masking of both directions, F Fresnel's
     reflectance at the half vector."""
-    return _lit_ball(lambda wi, wo, k: rough_metal(wi, wo, 0.4, *GOLD[k], name="ggx"))
+    return _lit_ball(lambda wi, wo, k: rough_metal(wi, wo, alpha, *GOLD[k], name="ggx"))
+
+
+@derivative(
+    "materials.gold.alpha", ggx_in_light, "alpha",
+    r"$f E (\frac{4 t^2}{\alpha^3 + \alpha t^2} - \frac{2}{\alpha} - "
+    r"\sum_{i, o} \frac{\Lambda'}{1 + \Lambda})$, $t$ of the half vector",
+)  # fmt: skip
+def ggx_in_light_by_alpha() -> Expected:
+    """By the logarithms of D and of the maskings 1 / (1 + Lambda), Lambda' = alpha t^2 / (2
+    sqrt(1 + alpha^2 t^2)) with the direction's tangent t; F does not know the roughness."""
+    a = 0.4
+
+    def rate(wi: FloatArray, wo: FloatArray, k: int) -> FloatArray:
+        hz = ((wi + wo) / np.linalg.norm(wi + wo, axis=-1, keepdims=True))[..., 2]
+        t2 = 1.0 / hz**2 - 1.0
+        total = 4.0 * t2 / (a**3 + a * t2) - 2.0 / a
+        for w in (wi, wo):
+            tan2 = 1.0 / np.where(w[..., 2] > 0.0, w[..., 2], 1.0) ** 2 - 1.0
+            root = np.sqrt(1.0 + a * a * tan2)
+            total = total - a * tan2 / (2.0 * root) / ((1.0 + root) / 2.0)
+        return np.asarray(total * rough_metal(wi, wo, a, *GOLD[k], name="ggx"))
+
+    return _lit_ball(rate)
 
 
 @case(r"$\frac{D G F}{4 \cos\theta} E$", "a rough metal (Beckmann) in one light", MICROFACETS)
@@ -234,16 +298,33 @@ def beckmann_in_light() -> Expected:
 
 
 @case(r"$(k_d (n \cdot l) + k_s (r \cdot v)^p) E$", "the textbook's local shading", "Phong 1975")
-def phong_in_light() -> Expected:
+def phong_in_light(exponent: float = 20.0) -> Expected:
     """The highlight's cosine is that of the light's direction and the mirrored view."""
 
     def shading(wi: FloatArray, wo: FloatArray, k: int) -> FloatArray:
-        mirrored = wo * [-1.0, -1.0, 1.0]
-        cosine = np.maximum((wi * mirrored).sum(axis=-1), 0.0)
-        lit = wi[..., 2] > 0.0
-        return np.asarray(np.where(lit, RHO[k] / 4 * wi[..., 2] + 0.1 * cosine**20, 0.0))
+        cosine, lit = _highlight(wi, wo), wi[..., 2] > 0.0
+        return np.asarray(np.where(lit, RHO[k] / 4 * wi[..., 2] + 0.1 * cosine**exponent, 0.0))
 
     return _lit_ball(shading)
+
+
+def _highlight(wi: FloatArray, wo: FloatArray) -> FloatArray:
+    """The cosine between the light and the mirrored view, at least 0."""
+    return np.asarray(np.maximum((wi * wo * [-1.0, -1.0, 1.0]).sum(axis=-1), 0.0))
+
+
+@derivative(
+    "materials.clay.exponent", phong_in_light, "exponent", r"$k_s (r \cdot v)^p \ln(r \cdot v) E$"
+)
+def phong_in_light_by_exponent() -> Expected:
+    """A power by its exponent: 0 in the middle of the highlight, negative around it."""
+
+    def rate(wi: FloatArray, wo: FloatArray, k: int) -> FloatArray:
+        cosine = _highlight(wi, wo)
+        safe = np.where(cosine > 0.0, cosine, 1.0)
+        return np.asarray(np.where(wi[..., 2] > 0.0, 0.1 * safe**20 * np.log(safe), 0.0))
+
+    return _lit_ball(rate)
 
 
 @case(r"$(k_d (n \cdot l) + k_s (h \cdot n)^p) E$", "the form by the half vector", "Blinn 1977")
@@ -303,12 +384,16 @@ def rough_boundary() -> Expected:
     return _plane(lambda c: half_vector_mean(c, 0.3, parts, "ggx", 1.5), 2e-5)
 
 
-def _coat(eta: float, rho: FloatArray) -> Albedo:
-    """F + (1 - F) rho (1 - F_in) / (1 - rho F_in)."""
+def _inside(eta: float) -> float:
+    """F_in: the mean of F over a matte light from within."""
     nodes, weights = np.polynomial.legendre.leggauss(64)
     c = (nodes + 1.0) / 2.0
-    outside = float((fresnel(c, eta) * c) @ weights)
-    inside = 1.0 - (1.0 - outside) / eta**2
+    return 1.0 - (1.0 - float((fresnel(c, eta) * c) @ weights)) / eta**2
+
+
+def _coat(eta: float, rho: FloatArray) -> Albedo:
+    """F + (1 - F) rho (1 - F_in) / (1 - rho F_in)."""
+    inside = _inside(eta)
     base = rho * (1.0 - inside) / (1.0 - rho * inside)
 
     def albedo(c: FloatArray) -> FloatArray:
@@ -322,10 +407,25 @@ COAT = r"$(F + (1 - F) \frac{\rho (1 - F_{in})}{1 - \rho F_{in}}) L$"
 
 
 @case(COAT, "a matte base under a clear coat", "Saunderson 1942")
-def plastic_furnace() -> Expected:
+def plastic_furnace(rho: FloatArray = RHO) -> Expected:
     """Light that passes the coat, 1 - F, is scattered by the base and mirrored back by the coat
     from within, F_in, again and again.  1 - F_in = (1 - F_out) / eta^2 ties the means of F."""
-    return _ball(_coat(1.5, RHO))
+    return _ball(_coat(1.5, rho))
+
+
+@derivative(
+    "materials.coated.reflectance", plastic_furnace, "rho",
+    r"$\frac{(1 - F) (1 - F_{in})}{(1 - \rho F_{in})^2} L$", spp=8192, step=1 / 64
+)  # fmt: skip
+def plastic_furnace_by_reflectance() -> Expected:
+    """rho / (1 - rho F_in) by rho: each bounce below the coat brings the reflectance once more."""
+    inside = _inside(1.5)
+    base = (1.0 - inside) / (1.0 - RHO * inside) ** 2
+
+    def rate(c: FloatArray) -> FloatArray:
+        return np.asarray((1.0 - fresnel(c, 1.5))[..., None] * base)
+
+    return _ball(rate, sky=0.0)
 
 
 @case(COAT, "the same with an index of 2.4", "Saunderson 1942")
@@ -341,9 +441,22 @@ def blend_furnace() -> Expected:
 
 
 @case(r"$(o \rho + 1 - o) L$", "a mask that is open in part")
-def mask_furnace() -> Expected:
+def mask_furnace(opacity: float = 0.4) -> Expected:
     """A matte disk of opacity 0.4, in front of the sky, both sides alike."""
-    return _uniform(0.4 * RHO + 0.6)
+    return _uniform(opacity * RHO + 1.0 - opacity)
+
+
+@derivative(
+    "materials.gauze.opacity",
+    mask_furnace,
+    "opacity",
+    r"$(\rho - 1) L$ on the disk",
+    spp=4096,
+    step=1 / 8,
+)
+def mask_furnace_by_opacity() -> Expected:
+    """What the base sends back less than the sky behind it."""
+    return Expected(mask_furnace(1.0).pixels - mask_furnace(0.0).pixels, 1e-9)
 
 
 @case(r"$o \frac{\rho I \cos\theta}{\pi d^2}$, $o$ the opacity", "a mask in the light of a point")

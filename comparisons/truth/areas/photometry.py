@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from comparisons.truth.case import Expected, FloatArray, case
+from comparisons.truth.case import Expected, FloatArray, case, derivative
 from comparisons.truth.film import drawn_from_above, mix, seen_from_above
-from comparisons.truth.optics import floor_irradiance
+from comparisons.truth.optics import UP, floor_irradiance, on_floor, polygon_irradiance_rate
 
 RHO = np.array([0.8, 0.5, 0.2])
 INTENSITY = np.array([10.0, 6.0, 2.0])
@@ -39,9 +39,24 @@ def _point(
 
 
 @case(r"$\frac{\rho I h}{\pi d^3}$", "the inverse square, and the cosine")
-def point_over_floor() -> Expected:
+def point_over_floor(height: float = 1.0) -> Expected:
     """Irradiance is I cos / d^2, and the cosine h / d."""
-    return _floor(lambda x, y: _point(x, y, (0.5, 0.3, 1.0), (0, 0, 1)), INTENSITY)
+    return _floor(lambda x, y: _point(x, y, (0.5, 0.3, height), (0, 0, 1)), INTENSITY)
+
+
+@derivative(
+    "lights[0].position[2]", point_over_floor, "height",
+    r"$\frac{\rho I (d^2 - 3 h^2)}{\pi d^5}$",
+)  # fmt: skip
+def point_over_floor_by_height() -> Expected:
+    """h / d^3 by h, with d' = h / d: far from the light a larger height helps, below it it does
+    not."""
+
+    def rate(x: FloatArray, y: FloatArray) -> FloatArray:
+        d2 = (x - 0.5) ** 2 + (y - 0.3) ** 2 + 1.0
+        return np.asarray((d2 - 3.0) / d2**2.5)
+
+    return _floor(rate, INTENSITY)
 
 
 @case(r"$\frac{\rho I (n \cdot l)}{\pi d^3}$", "the cosine at a tilted surface")
@@ -69,21 +84,41 @@ def three_points() -> Expected:
 
 
 @case(r"$\frac{\rho I s(\alpha) \cos\theta}{\pi d^2}$", "a spot's beam, fall-off and cut-off")
-def spot_falloff() -> Expected:
+def spot_falloff(cutoff: float = 25.0) -> Expected:
     """s is 1 within the beam (10 degrees), 0 beyond the cut-off (25), and linear in the angle
     between.  Pixels that the two circles may cross are not stated: s has kinks there."""
-    axis = np.array([0.3, 0.2, -2.0]) / np.linalg.norm([0.3, 0.2, -2.0])
-    half_pixel = 4.0 / 32 / 2
 
     def irradiance(x: FloatArray, y: FloatArray) -> FloatArray:
-        to = np.stack([x, y, np.full_like(x, -2.0)], axis=-1)
-        d = np.linalg.norm(to, axis=-1)
-        angle = np.degrees(np.arccos(to @ axis / d))
-        s = np.clip((25.0 - angle) / 15.0, 0.0, 1.0)
-        close = np.minimum(abs(angle - 10.0), abs(angle - 25.0)) < np.degrees(half_pixel / 2.0)
-        return np.where(close, np.nan, s * 2.0 / d**3)
+        angle, d = _from_spot(x, y)
+        return np.asarray(np.clip((cutoff - angle) / (cutoff - 10.0), 0.0, 1.0) * 2.0 / d**3)
 
     return _floor(irradiance, INTENSITY)
+
+
+def _from_spot(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The angle from the spot's axis in degrees, NaN near its circles, and the distance."""
+    axis = np.array([0.3, 0.2, -2.0]) / np.linalg.norm([0.3, 0.2, -2.0])
+    half_pixel = 4.0 / 32 / 2
+    to = np.stack([x, y, np.full_like(x, -2.0)], axis=-1)
+    d = np.linalg.norm(to, axis=-1)
+    angle = np.degrees(np.arccos(to @ axis / d))
+    close = np.minimum(abs(angle - 10.0), abs(angle - 25.0)) < np.degrees(half_pixel / 2.0)
+    return np.where(close, np.nan, angle), d
+
+
+@derivative(
+    "lights[0].cutoff_angle", spot_falloff, "cutoff",
+    r"$\frac{\rho I \cos\theta}{\pi d^2} \frac{\alpha - b}{(c - b)^2}$ between beam and cut-off",
+)  # fmt: skip
+def spot_falloff_by_cutoff() -> Expected:
+    """(c - alpha) / (c - b) by c, with the beam's angle b; elsewhere nothing changes."""
+
+    def rate(x: FloatArray, y: FloatArray) -> FloatArray:
+        angle, d = _from_spot(x, y)
+        between = (angle > 10.0) & (angle < 25.0)
+        return np.where(between, (angle - 10.0) / 225.0, 0.0 * angle) * 2.0 / d**3
+
+    return _floor(rate, INTENSITY)
 
 
 @case(
@@ -123,20 +158,71 @@ def disk(r2: FloatArray, height: float, radius: float) -> FloatArray:
     "a disk lamp",
     "Howell & Mengüç, A Catalog of Radiation Transfer Configuration Factors, B-13",
 )
-def disk_lamp() -> Expected:
+def disk_lamp(radius: float = 0.9) -> Expected:
     """The factor from a level element to a level disk, whose axis is at the distance r."""
-    return _floor(lambda x, y: disk((x - 0.7) ** 2 + y**2, 1.5, 0.9))
+    return _floor(lambda x, y: disk((x - 0.7) ** 2 + y**2, 1.5, radius))
+
+
+def disk_rate(r2: FloatArray, height: float, radius: float) -> FloatArray:
+    """The derivative of `disk` by its radius."""
+    z = r2 + height**2 + radius**2
+    root = np.sqrt(z * z - 4.0 * r2 * radius**2)
+    turn = (z - 2.0 * radius**2) * (z - 2.0 * r2) / root**3
+    return np.asarray(np.pi * radius * (1.0 / root + turn))
+
+
+@derivative(
+    "shapes[1].transform[0].scale", disk_lamp, "radius",
+    r"$\rho L a (\frac{1}{S} + \frac{(z - 2 a^2) (z - 2 r^2)}{S^3})$, $z = h^2 + r^2 + a^2$, "
+    r"$S^2 = z^2 - 4 a^2 r^2$", spp=1024
+)  # fmt: skip
+def disk_lamp_by_radius() -> Expected:
+    """The quotient rule, with z' = 2 a.  The lamp's edge moves; the light of its inside stays."""
+    return _floor(lambda x, y: disk_rate((x - 0.7) ** 2 + y**2, 1.5, 0.9))
 
 
 LAMBERT = r"$\frac{\rho L}{2 \pi} \sum_k \beta_k \cos\gamma_k$, over edges, $\beta$ their angles"
 
 
 @case(LAMBERT, "a rectangle lamp, tilted", "Lambert 1760")
-def rectangle_lamp() -> Expected:
+def rectangle_lamp(degrees: float = 210.0) -> Expected:
     """Stokes' theorem turns the solid angle's cosine integral into one along the outline."""
-    a = np.radians(30.0)
-    corners = np.array([[x, y * np.cos(a), y * np.sin(a)] for x, y in _SQUARE]) * 0.8
+    corners = _tilted(degrees)
     return _floor(lambda x, y: floor_irradiance(corners + np.array([0.4, 0.3, 1.5]), x, y))
+
+
+def _tilted(degrees: float) -> FloatArray:
+    a = np.radians(degrees)
+    return np.array([[x, y * np.cos(a), y * np.sin(a)] for x, y in _SQUARE]) * 0.8
+
+
+LAMBERT_RATE = r"$\frac{\rho L}{2 \pi} \sum_k (\beta_k \cos\gamma_k)'$, over edges as they move"
+
+
+def _moved(corners: FloatArray, velocity: object, **picture: float) -> Expected:
+    """The derivative of the floor's picture as a lamp's corners move."""
+    v = np.array(velocity)
+
+    def rate(x: FloatArray, y: FloatArray) -> FloatArray:
+        return polygon_irradiance_rate(corners, v, on_floor(x, y), UP)
+
+    return _floor(rate, **picture)  # type: ignore[arg-type]
+
+
+@derivative(
+    "shapes[1].transform[1].rotate.degrees",
+    rectangle_lamp,
+    "degrees",
+    LAMBERT_RATE,
+    spp=1024,
+    step=0.5,
+)
+def rectangle_lamp_by_angle() -> Expected:
+    """A plate turns: a corner (x, y, z) from the axis moves by (0, -z, y) per radian."""
+    corners = _tilted(210.0)
+    x, y, z = corners.T
+    velocity = np.radians(1.0) * np.stack([0.0 * x, -z, y], axis=1)
+    return _moved(corners + np.array([0.4, 0.3, 1.5]), velocity)
 
 
 _SQUARE = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
@@ -144,9 +230,16 @@ TRIANGLE = np.array([[1.0, 2.0, 0.5], [1.5, 1.0, 1.5], [-1.0, 1.5, 1.0]])
 
 
 @case(LAMBERT, "a triangle lamp", "Lambert 1760")
-def triangle_lamp() -> Expected:
+def triangle_lamp(x: float = -1.0) -> Expected:
     """As `rectangle_lamp`."""
-    return _floor(lambda x, y: floor_irradiance(TRIANGLE, x, y), width=3.0)
+    corners = np.array([*TRIANGLE[:2], [x, *TRIANGLE[2, 1:]]])
+    return _floor(lambda x, y: floor_irradiance(corners, x, y), width=3.0)
+
+
+@derivative("shapes[1].v2[0]", triangle_lamp, "x", LAMBERT_RATE, spp=4096)
+def triangle_lamp_by_corner() -> Expected:
+    """Two of the three edges move with their corner."""
+    return _moved(TRIANGLE, [[0, 0, 0], [0, 0, 0], [1, 0, 0]], width=3.0)
 
 
 @case(LAMBERT, "a box lamp: only the faces that a point sees", "Lambert 1760")
@@ -169,14 +262,22 @@ def box_lamp() -> Expected:
 
 
 @case(r"$\rho L \frac{r^2}{d^2} \cos\theta$", "a sphere lamp", "Howell & Mengüç, B-42")
-def sphere_lamp() -> Expected:
+def sphere_lamp(radius: float = 0.8) -> Expected:
     """A sphere wholly above the horizon: its projected solid angle is pi (r / d)^2 cos."""
 
     def irradiance(x: FloatArray, y: FloatArray) -> FloatArray:
         d2 = (x - 0.5) ** 2 + (y + 0.4) ** 2 + 2.25
-        return np.asarray(np.pi * 0.64 * 1.5 / d2**1.5)
+        return np.asarray(np.pi * radius**2 * 1.5 / d2**1.5)
 
     return _floor(irradiance)
+
+
+@derivative(
+    "shapes[1].radius", sphere_lamp, "radius", r"$2 \rho L \frac{r}{d^2} \cos\theta$", spp=256
+)
+def sphere_lamp_by_radius() -> Expected:
+    """r^2 by r."""
+    return Expected(sphere_lamp().pixels * 2.0 / 0.8)
 
 
 @case(
@@ -269,13 +370,29 @@ def lamp_back() -> Expected:
     "an environment map over slopes",
     "Ramamoorthi & Hanrahan 2001",
 )
-def harmonic_sky() -> Expected:
+def harmonic_sky(degrees: float = 0.0) -> Expected:
     """A sky of radiance a + b y sends pi a + b n_y 2 pi / 3 to the normal n: the clamped cosine
     scales harmonics of order 1 by 2/3.  Seen on a sphere: n_y = y.  The map's 64 rows are linear
     between their middles, which moves no mean of it by more than 3e-4."""
 
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+
     def irradiance(x: FloatArray, y: FloatArray) -> FloatArray:
-        return np.where(x * x + y * y < 0.9, 1.0 + 0.8 * y * 2.0 / 3.0, np.nan)
+        return np.where(x * x + y * y < 0.9, 1.0 + 0.8 * (c * y - s * x) * 2.0 / 3.0, np.nan)
 
     share = seen_from_above(irradiance, 2.0, 32)
     return Expected(share[..., None] * RHO * np.array([1.0, 0.7, 0.4]), 3e-4)
+
+
+@derivative(
+    "lights[0].transform[0].rotate.degrees", harmonic_sky, "degrees",
+    r"$-\frac{2}{3} \rho b n_x \frac{\pi}{180}$", spp=4096, step=2.0,
+)  # fmt: skip
+def harmonic_sky_by_angle() -> Expected:
+    """A sky that turns about z by an angle brightens along (-sin, cos)."""
+
+    def rate(x: FloatArray, y: FloatArray) -> FloatArray:
+        return np.where(x * x + y * y < 0.9, -0.8 * x * 2.0 / 3.0 * np.radians(1.0), np.nan)
+
+    share = seen_from_above(rate, 2.0, 32)
+    return Expected(share[..., None] * RHO * np.array([1.0, 0.7, 0.4]), 1e-3)

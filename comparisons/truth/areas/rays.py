@@ -2,15 +2,16 @@
 
 import numpy as np
 
-from comparisons.truth.case import Expected, FloatArray, case
+from comparisons.truth.case import Expected, FloatArray, case, derivative
 from comparisons.truth.film import (
     View,
-    coverage,
     drawn_from_above,
     level,
     mix,
     pixel_means,
     seen_from_above,
+    swept,
+    swept_from_above,
     turn,
 )
 
@@ -18,6 +19,7 @@ FIRST = np.array([[-1.0, -0.6, 0.2], [0.8, -0.9, -0.5], [0.1, 0.7, 0.3]])
 SECOND = np.array([[0.9, 0.2, -1.0], [1.6, 0.1, -0.4], [1.3, 1.0, -0.8]])
 WARM, COLD = np.array([1.0, 0.5, 0.2]), np.array([0.2, 0.8, 1.5])
 RHO = np.array([0.8, 0.5, 0.2])
+DUSK = np.array([0.05, 0.1, 0.2])
 
 AREA = r"$L A$, $A$ the area of the projected outline in the pixel"
 
@@ -25,26 +27,52 @@ AREA = r"$L A$, $A$ the area of the projected outline in the pixel"
 SEGMENT = r"$L (\frac{1}{2} + \frac{u \sqrt{1 - u^2} + \arcsin u}{\pi})$"
 
 
-def _triangles(view: View) -> Expected:
+def _triangles(view: View, corners: FloatArray = FIRST) -> Expected:
     """Two triangles that shine, over black."""
-    first, second = view.drawn(FIRST), view.drawn(SECOND)
+    first, second = view.drawn(corners), view.drawn(SECOND)
     return Expected(mix(first, WARM) + mix(second, COLD))
 
 
 @case(AREA, "the pinhole projection, and its axes")
-def perspective() -> Expected:
+def perspective(x: float = 0.1) -> Expected:
     """A pinhole camera maps polygons to polygons: their corners are projected, and the area of the
     outline in each pixel is the share that shines."""
     half = np.tan(np.radians(20.0))
-    return _triangles(View((0.3, 0.4, 4), (0.1, 0, 0), (0, 1, 0), (half, half), (32, 32)))
+    view = View((0.3, 0.4, 4), (0.1, 0, 0), (0, 1, 0), (half, half), (32, 32))
+    return _triangles(view, np.array([*FIRST[:2], [x, *FIRST[2, 1:]]]))
+
+
+SWEPT = r"$L \int (v \cdot n) ds$ over the outline in the pixel, $v$ its velocity on the film"
+
+
+@derivative("shapes[0].v2[0]", perspective, "x", SWEPT, spp=65536, step=1 / 128)
+def perspective_by_corner() -> Expected:
+    """The film's outline moves linearly along the two edges of the corner that moves."""
+    half = np.tan(np.radians(20.0))
+    view = View((0.3, 0.4, 4), (0.1, 0, 0), (0, 1, 0), (half, half), (32, 32))
+    return Expected(view.swept(FIRST, [[0, 0, 0], [0, 0, 0], [1, 0, 0]])[..., None] * WARM)
 
 
 @case(AREA, "the side of the picture that the angle of view spans; pictures that are not square")
-def perspective_fov_y() -> Expected:
+def perspective_fov_y(fov: float = 30.0) -> Expected:
     """As `perspective`; 30 degrees span the 24 rows, so that the 48 columns span twice the
     tangent."""
-    half = np.tan(np.radians(15.0))
+    half = np.tan(np.radians(fov / 2.0))
     return _triangles(View((0, 0, 5), (0.1, 0, 0), (0, 1, 0), (2 * half, half), (48, 24)))
+
+
+@derivative("camera.fov", perspective_fov_y, "fov", SWEPT, spp=16384, step=0.25)
+def perspective_fov_y_by_fov() -> Expected:
+    """All images shrink towards the middle, as one over the tangent of half the angle, whose
+    derivative is 1 + tan^2 over two."""
+    half = np.tan(np.radians(15.0))
+    view = View((0, 0, 5), (0.1, 0, 0), (0, 1, 0), (2 * half, half), (48, 24))
+    rate = -np.radians(0.5) * (1.0 + half**2) / half
+    first, second = (
+        swept(film, rate * (film - [24.0, 12.0]), 48, 24)
+        for film in (view.project(FIRST), view.project(SECOND))
+    )
+    return Expected(first[..., None] * WARM + second[..., None] * COLD)
 
 
 @case(AREA, "the frame of an oblique view with a tilted up")
@@ -86,10 +114,10 @@ def pinhole_blur() -> Expected:
     "the light that a hole lets onto the film",
     "Howell, Menguc & Siegel 2015, appendix C",
 )
-def pinhole_exposure() -> Expected:
+def pinhole_exposure(radius: float = 0.3) -> Expected:
     """A sky of radiance L lights the film through a disk of radius r at distance d as if the disk
     shone: by its form factor at the distance rho from the axis.  The film shows x times that."""
-    r2, place = 0.3**2, level(2.0, 32)
+    r2, place = radius**2, level(2.0, 32)
 
     def exposed(x: FloatArray, y: FloatArray) -> FloatArray:
         across, up = place(x, y)
@@ -100,53 +128,113 @@ def pinhole_exposure() -> Expected:
     return Expected(mix(pixel_means(exposed, 32, 32), WARM * 5.0 * np.pi / 2.0))
 
 
+@derivative(
+    "camera.hole_radius", pinhole_exposure, "radius",
+    r"$x \pi L r (\frac{1}{S} + \frac{(a - r^2) (a + r^2 - 2 \rho^2)}{S^3})$, "
+    r"$S^2 = (a + r^2)^2 - 4 r^2 \rho^2$",
+)  # fmt: skip
+def pinhole_exposure_by_radius() -> Expected:
+    """The quotient rule by r^2, times 2 r.  Rays through the rim add light; none is lost."""
+    place, r2 = level(2.0, 32), 0.3**2
+
+    def rate(x: FloatArray, y: FloatArray) -> FloatArray:
+        across, up = place(x, y)
+        rho2 = across * across + up * up
+        a = 1.0 + rho2
+        root = np.sqrt((a + r2) ** 2 - 4.0 * r2 * rho2)
+        return np.asarray(1.0 / root + (a - r2) * (a + r2 - 2.0 * rho2) / root**3)
+
+    return Expected(mix(pixel_means(rate, 32, 32), WARM * 5.0 * np.pi * 0.3))
+
+
 @case(AREA, "parallel rays, and the scale of their picture")
-def orthographic() -> Expected:
+def orthographic(width: float = 3.4) -> Expected:
     """Corners lose their z."""
-    first, second = (drawn_from_above(p[:, :2], 3.4, 32) for p in (FIRST, SECOND))
+    first, second = (drawn_from_above(p[:, :2], width, 32) for p in (FIRST, SECOND))
     return Expected(mix(first, WARM) + mix(second, COLD))
+
+
+@derivative("camera.width", orthographic, "width", SWEPT, spp=16384, step=1 / 32)
+def orthographic_by_width() -> Expected:
+    """All images shrink towards the middle, as one over the width."""
+    first, second = (swept_from_above(p[:, :2], p[:, :2] / -3.4, 3.4, 32) for p in (FIRST, SECOND))
+    return Expected(first[..., None] * WARM + second[..., None] * COLD)
 
 
 @case(
     r"$L A$, $A$ the area of the outline between the clipping planes",
     "the near and the far clipping plane",
 )
-def clipped() -> Expected:
+def clipped(near: float = 3.4) -> Expected:
     """The plane z = x, seen from z = 4 along -z: depth 4 - x.  Near 3.4 and far 4.75 leave -0.75 <
     x < 0.6, whose images are lines of equal depth."""
-    near, far = 4.0 - np.array([3.4, 4.75])
+    near, far = 4.0 - near, 4.0 - 4.75
     view = View((0, 0, 4), (0, 0, 0), (0, 1, 0), (0.3, 0.3), (32, 32))
     strip = [[far, -5, far], [near, -5, near], [near, 5, near], [far, 5, far]]
     return Expected(mix(view.drawn(strip), WARM))
+
+
+@derivative("camera.near", clipped, "near", SWEPT, spp=4096)
+def clipped_by_near() -> Expected:
+    """The edge at the near plane moves by (-1, 0, -1)."""
+    near, far = 4.0 - 3.4, 4.0 - 4.75
+    view = View((0, 0, 4), (0, 0, 0), (0, 1, 0), (0.3, 0.3), (32, 32))
+    strip = [[far, -5, far], [near, -5, near], [near, 5, near], [far, 5, far]]
+    velocity = [[0, 0, 0], [-1, 0, -1], [-1, 0, -1], [0, 0, 0]]
+    return Expected(view.swept(strip, velocity)[..., None] * WARM)
 
 
 @case(
     r"$L A$, $A$ the area of the ellipse in which the tangents' cone meets the film",
     "spheres: every pixel",
 )
-def sphere_outline() -> Expected:
+def sphere_outline(radius: float = 0.7) -> Expected:
     """Rays that touch a sphere make a cone with the sine r / d.  Off the axis the film cuts it in
     an ellipse."""
     half = np.tan(np.radians(30.0))
     view = View((0, 0, 3), (0, 0, 0), (0, 1, 0), (half, half), (32, 32))
-    return Expected(mix(view.sphere((0.8, 0.5, 0), 0.7), WARM, (0.05, 0.1, 0.2)), 1e-9)
+    return Expected(mix(view.sphere((0.8, 0.5, 0), radius), WARM, DUSK), 1e-9)
+
+
+@derivative("shapes[0].radius", sphere_outline, "radius", SWEPT, spp=4096, step=1 / 64)
+def sphere_outline_by_radius() -> Expected:
+    """The touching rays turn away from the axis; no pixel's inside changes."""
+    half = np.tan(np.radians(30.0))
+    view = View((0, 0, 3), (0, 0, 0), (0, 1, 0), (half, half), (32, 32))
+    rate = view.swept(*view.tangents((0.8, 0.5, 0), 0.7))
+    return Expected(rate[..., None] * (WARM - DUSK), 1e-9)
 
 
 @case(r"$L A$, $A$ the area of the convex hull of eight projected corners", "boxes under rotation")
-def box_outline() -> Expected:
+def box_outline(degrees: float = 25.0) -> Expected:
     """The silhouette of a convex solid is the hull of its corners' images."""
+    view, corners, _ = _turned_box(degrees)
+    return Expected(mix(view.drawn(corners), WARM, DUSK))
+
+
+@derivative(
+    "shapes[0].transform[2].rotate.degrees", box_outline, "degrees", SWEPT, spp=32768, step=0.5
+)
+def box_outline_by_angle() -> Expected:
+    """A corner (x, y, z) that turns about x moves by (0, -z, y) per radian."""
+    view, corners, velocity = _turned_box(25.0)
+    return Expected(view.swept(corners, velocity)[..., None] * (WARM - DUSK))
+
+
+def _turned_box(degrees: float) -> tuple[View, FloatArray, FloatArray]:
+    """The view, the corners on the box's silhouette, and their velocity per degree."""
     from scipy.spatial import ConvexHull
 
-    a, b = np.radians(35.0), np.radians(25.0)
+    a, b = np.radians(35.0), np.radians(degrees)
     about_y = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
     about_x = np.array([[1, 0, 0], [0, np.cos(b), -np.sin(b)], [0, np.sin(b), np.cos(b)]])
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     corners = corners * [0.7, 0.5, 0.4] @ about_y.T @ about_x.T
     half = np.tan(np.radians(20.0))
     view = View((0, 0, 4), (0, 0, 0), (0, 1, 0), (half, half), (32, 32))
-    film = view.project(corners)
-    share = coverage(film[ConvexHull(film).vertices], 32, 32)
-    return Expected(mix(share, WARM, (0.05, 0.1, 0.2)))
+    corners = corners[ConvexHull(view.project(corners)).vertices]
+    x, y, z = corners.T
+    return view, corners, np.radians(1.0) * np.stack([0.0 * x, -z, y], axis=1)
 
 
 @case(
@@ -201,15 +289,30 @@ def sphere_normals() -> Expected:
 
 
 @case(r"$\frac{\rho E}{\pi} \sqrt{1 - (r - R)^2 / a^2}$", "roots and normals of a torus")
-def torus_normals() -> Expected:
+def torus_normals(tube: float = 0.5) -> Expected:
     """A torus seen along its axis: at the distance r from it, the tube's circle has this normal.
     Pixels whose distance from the tube's middle is below 0.8 of its radius."""
 
     def radiance(x: FloatArray, y: FloatArray) -> FloatArray:
-        s = (np.hypot(x, y) - 1.0) / 0.5
+        s = (np.hypot(x, y) - 1.0) / tube
         return _lit(np.where(np.abs(s) < 0.8, np.sqrt(1.0 - np.minimum(s * s, 0.64)), np.nan))
 
     return Expected(seen_from_above(radiance, 3.2, 32, 10), 1e-8)
+
+
+@derivative(
+    "shapes[0].minor_radius", torus_normals, "tube",
+    r"$\frac{\rho E}{\pi} \frac{s^2}{a \sqrt{1 - s^2}}$, $s = \frac{r - R}{a}$",
+)  # fmt: skip
+def torus_normals_by_tube() -> Expected:
+    """s falls as one over a, and the root of 1 - s^2 has the derivative -s by s over the root."""
+
+    def rate(x: FloatArray, y: FloatArray) -> FloatArray:
+        s = (np.hypot(x, y) - 1.0) / 0.5
+        s2 = np.where(np.abs(s) < 0.8, s * s, np.nan)
+        return _lit(s2 / 0.5 / np.sqrt(1.0 - s2))
+
+    return Expected(seen_from_above(rate, 3.2, 32, 10), 1e-7)
 
 
 @case(r"$\frac{\rho E}{\pi \sqrt{1 + R^2 / h^2}}$", "a cone's slope, and its outline")
@@ -246,11 +349,26 @@ def paraboloid_normals() -> Expected:
     "the circle of confusion",
     "Potmesil & Chakravarty 1981",
 )
-def lens_blur() -> Expected:
+def lens_blur(focus: float = 4.0) -> Expected:
     """A lens of radius A in focus at f blurs points at depth z over a disk of radius A |1 - z / f|
     in their plane.  Of it an edge leaves the segment beyond, at u radii from its middle."""
     width = 2 * 6.0 * np.tan(np.radians(15.0))
-    return _beyond_an_edge(width, 0.2 * abs(1.0 - 6.0 / 4.0))
+    return _beyond_an_edge(width, 0.2 * abs(1.0 - 6.0 / focus))
+
+
+@derivative(
+    "camera.focus_distance", lens_blur, "focus",
+    r"$-\frac{A z L}{f^2} [\frac{2}{3 \pi} (1 - u^2)^{3/2}]$ between the pixel's borders, over "
+    r"its width", spp=131072, step=1 / 8
+)  # fmt: skip
+def lens_blur_by_focus() -> Expected:
+    """The segment's share has the derivative 2 sqrt(1 - u^2) / pi by u, and u that of -u over the
+    blur's radius by that radius, A z / f - A: their product is integrated over x exactly."""
+    width = 2 * 6.0 * np.tan(np.radians(15.0))
+    edges = (np.arange(33) / 32 - 0.5) * width
+    u = np.clip((edges - 0.07) / 0.1, -1.0, 1.0)
+    rise = np.diff(2.0 / (3.0 * np.pi) * (1.0 - u * u) ** 1.5) / (width / 32)
+    return Expected(np.tile(rise * -0.2 * 6.0 / 16.0, (32, 1))[..., None] * WARM)
 
 
 def _beyond_an_edge(width: float, radius: float) -> Expected:

@@ -2,8 +2,15 @@
 
 import numpy as np
 
-from comparisons.truth.case import Expected, FloatArray, case
-from comparisons.truth.film import coverage, drawn_from_above, mix, seen_from_above, turn
+from comparisons.truth.case import Expected, FloatArray, case, derivative
+from comparisons.truth.film import (
+    coverage,
+    drawn_from_above,
+    mix,
+    seen_from_above,
+    swept_from_above,
+    turn,
+)
 from comparisons.truth.optics import floor_irradiance, fresnel
 
 WARM, COLD = np.array([1.0, 0.5, 0.2]), np.array([0.05, 0.1, 0.2])
@@ -26,6 +33,9 @@ def _drawn(*signed: tuple[float, FloatArray], width: float = 2.4) -> Expected:
 def drilled_box() -> Expected:
     """A box that a cylinder pierces, seen along it."""
     return _drawn((1.0, 0.9 * SQUARE), (-1.0, _circle(0.55, 0.2, 0.1)))
+
+
+SWEPT = r"$L \int (v \cdot n) ds$ over the outline in the pixel, $v$ its velocity on the film"
 
 
 @case(r"$L A$, $A$ the area of two circles' lens", "the intersection of solids")
@@ -93,11 +103,27 @@ def solid_lens() -> Expected:
     r"$L A$, $A$ the area of the ellipse that a matrix makes of a circle",
     "an instance under a shear",
 )
-def sheared_ball() -> Expected:
+def sheared_ball(entry: float = 0.4) -> Expected:
     """The outline of the ball A s, seen along z, is the ellipse of the first two rows B of A: the
     root of B B^T takes the unit circle there."""
-    rows = np.array([[0.8, 0.2, 0.4], [-0.1, 0.6, 0.3]])
+    rows = np.array([[0.8, 0.2, entry], [-0.1, 0.6, 0.3]])
     return _drawn((1.0, _circle(1.0) @ np.linalg.cholesky(rows @ rows.T).T + [0.1, -0.1]))
+
+
+@derivative(
+    "shapes[0].transform[0].matrix[0][2]", sheared_ball, "entry", SWEPT, spp=8192, step=1 / 32
+)
+def sheared_ball_by_matrix() -> Expected:
+    """The ellipse reaches |B^T n| along its normal n, at the point B B^T n / |B^T n|; by an entry
+    of B that is (B^T n) . (B'^T n) / |B^T n|."""
+    rows, change = np.array([[0.8, 0.2, 0.4], [-0.1, 0.6, 0.3]]), np.zeros((2, 3))
+    change[0, 2] = 1.0
+    n = _circle(1.0)
+    along = n @ rows
+    reach = np.linalg.norm(along, axis=1, keepdims=True)
+    velocity = n * (along * (n @ change)).sum(axis=1, keepdims=True) / reach
+    rate = swept_from_above(along @ rows.T / reach + [0.1, -0.1], velocity, 2.4, 32)
+    return Expected(rate[..., None] * (WARM - COLD), 1e-9)
 
 
 @case(r"$L A$, $A$ the area of turned and scaled copies", "instances")

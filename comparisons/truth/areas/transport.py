@@ -2,25 +2,47 @@
 
 import numpy as np
 
-from comparisons.truth.case import Expected, FloatArray, case
+from comparisons.truth.case import Expected, FloatArray, case, derivative
 from comparisons.truth.film import View, mix, seen_from_above
-from comparisons.truth.optics import floor_irradiance, fresnel
+from comparisons.truth.optics import (
+    UP,
+    floor_irradiance,
+    fresnel,
+    on_floor,
+    polygon_irradiance_rate,
+)
 
 RHO = np.array([0.8, 0.5, 0.2])
 LAMP = np.array([3.0, 2.0, 1.0])
 SHINE = np.array([0.3, 0.5, 1.0])
+SQUARE = np.array([[-0.8, -0.8, 1.5], [0.8, -0.8, 1.5], [0.8, 0.8, 1.5], [-0.8, 0.8, 1.5]])
 
 
 @case(r"$\frac{L}{1 - \rho}$", "a closed room that shines and scatters")
-def closed_room() -> Expected:
+def closed_room(rho: FloatArray = RHO) -> Expected:
     """Every point sees the same radiance B from everywhere: B = L + rho B."""
-    return Expected(np.broadcast_to(SHINE / (1.0 - RHO), (32, 32, 3)).copy())
+    return Expected(np.broadcast_to(SHINE / (1.0 - rho), (32, 32, 3)).copy())
+
+
+@derivative(
+    "materials.matte.reflectance", closed_room, "rho", r"$\frac{L}{(1 - \rho)^2}$", spp=8192
+)  # fmt: skip
+def closed_room_by_reflectance() -> Expected:
+    """B' = B + rho B': the derivative is a radiance as well, of a room that shines with B."""
+    return Expected(np.broadcast_to(SHINE / (1.0 - RHO) ** 2, (32, 32, 3)).copy())
 
 
 @case(r"$L (1 + \rho + \rho^2 + \rho^3)$", "paths by their length")
-def path_lengths() -> Expected:
+def path_lengths(rho: FloatArray = RHO) -> Expected:
     """As `closed_room`, cut after 4 edges."""
-    total = sum(RHO**k for k in range(4))
+    total = sum(rho**k for k in range(4))
+    return Expected(np.broadcast_to(SHINE * total, (32, 32, 3)).copy())
+
+
+@derivative("materials.matte.reflectance", path_lengths, "rho", r"$L (1 + 2 \rho + 3 \rho^2)$")
+def path_lengths_by_reflectance() -> Expected:
+    """A path of k bounces has k reflectances, each of which may move."""
+    total = sum(k * RHO ** (k - 1) for k in range(1, 4))
     return Expected(np.broadcast_to(SHINE * total, (32, 32, 3)).copy())
 
 
@@ -28,14 +50,32 @@ def path_lengths() -> Expected:
     r"$L_1 = L + \rho_1 L_2$, $L_2 = \rho_2 (F L_1 + (1 - F) L_2)$, $F = \frac{r^2}{R^2}$",
     "a sphere in a sphere",
 )
-def sphere_in_sphere() -> Expected:
+def sphere_in_sphere(radius: float = 3.0) -> Expected:
     """The inner sphere sees the outer one alone; of the light that leaves the outer one, the share
     F meets the inner one, by reciprocity of the areas."""
-    rho1, rho2, f = np.array([0.1, 0.4, 0.7]), RHO, 1.0 / 9.0
+    rho1, rho2, f = np.array([0.1, 0.4, 0.7]), RHO, 1.0 / radius**2
     outer = rho2 * f * LAMP / (1.0 - rho2 * (1.0 - f) - rho2 * f * rho1)
+    return Expected(mix(_inner_sphere(), LAMP + rho1 * outer, outer), 1e-9)
+
+
+def _inner_sphere() -> FloatArray:
     half = np.tan(np.radians(35.0))
     view = View((0, 0, 2.5), (0.5, 0.3, 0), (0, 1, 0), (half, half), (32, 32))
-    return Expected(mix(view.sphere((0, 0, 0), 1.0), LAMP + rho1 * outer, outer), 1e-9)
+    return view.sphere((0, 0, 0), 1.0)
+
+
+@derivative(
+    "shapes[1].radius", sphere_in_sphere, "radius",
+    r"$L_2' = -\frac{2 F}{R} \frac{\rho_2 (1 - \rho_2) L}"
+    r"{(1 - \rho_2 (1 - F) - \rho_2 F \rho_1)^2}$, $L_1' = \rho_1 L_2'$",
+    spp=4096, step=1 / 16,
+)  # fmt: skip
+def sphere_in_sphere_by_radius() -> Expected:
+    """The quotient rule by F, which is r^2 / R^2: F' = -2 F / R."""
+    rho1, rho2, f = np.array([0.1, 0.4, 0.7]), RHO, 1.0 / 9.0
+    below = 1.0 - rho2 * (1.0 - f) - rho2 * f * rho1
+    outer = rho2 * (1.0 - rho2) * LAMP / below**2 * -2.0 * f / 3.0
+    return Expected(mix(_inner_sphere(), rho1 * outer, outer), 1e-9)
 
 
 @case(r"$L_1 = L + \rho_1 L_2$, $L_2 = \rho_2 L_1$", "an infinite canyon")
@@ -86,15 +126,33 @@ def wall_to_floor() -> Expected:
 
 
 @case(r"$\rho L (F_{lamp} + \rho_m F_{image})$", "the image of a lamp in a mirror")
-def mirror_image() -> Expected:
+def mirror_image(place: float = 0.5) -> Expected:
     """A mirror at x = -1 makes of the lamp at x = 0.5 one at x = -2.5, dimmer by its reflectance:
     the caustic of a flat mirror."""
-    lamp = np.array([[-0.8, -0.8, 1.5], [0.8, -0.8, 1.5], [0.8, 0.8, 1.5], [-0.8, 0.8, 1.5]])
 
     def share(x: FloatArray, y: FloatArray) -> FloatArray:
-        direct = floor_irradiance(lamp + np.array([0.5, 0.0, 0.0]), x, y)[..., None]
-        image = floor_irradiance(lamp - np.array([2.5, 0.0, 0.0]), x, y)[..., None]
+        direct = floor_irradiance(SQUARE + np.array([place, 0.0, 0.0]), x, y)[..., None]
+        image = floor_irradiance(SQUARE - [2.0 + place, 0.0, 0.0], x, y)[..., None]
         return np.asarray(direct + image * [0.9, 0.8, 0.7])
+
+    return Expected(seen_from_above(share, 1.8, 32) * RHO * LAMP / np.pi)
+
+
+@derivative(
+    "shapes[1].transform[2].translate[0]", mirror_image, "place",
+    r"$\rho L (F_{lamp}' - \rho_m F_{image}')$, by each one's own place", spp=16384, step=1 / 32
+)  # fmt: skip
+def mirror_image_by_place() -> Expected:
+    """As the lamp moves away from the mirror its image moves the other way."""
+
+    def share(x: FloatArray, y: FloatArray) -> FloatArray:
+        direct, image = (
+            polygon_irradiance_rate(
+                SQUARE + np.array([at, 0.0, 0.0]), [1.0, 0.0, 0.0], on_floor(x, y), UP
+            )
+            for at in (0.5, -2.5)
+        )
+        return np.asarray(direct[..., None] - image[..., None] * [0.9, 0.8, 0.7])
 
     return Expected(seen_from_above(share, 1.8, 32) * RHO * LAMP / np.pi)
 
