@@ -21,7 +21,12 @@ from comparisons.statistics.cells import Margins
 from comparisons.statistics.decide import compare
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import Path
-from reference_rt.rendering.derivative import Derivative, derivative, difference
+from reference_rt.rendering.derivative import (
+    REPLICATES,
+    Derivative,
+    derivative,
+    difference,
+)
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.parameters import parameter
 from reference_rt.util.errors import ReferenceRtError
@@ -48,8 +53,8 @@ UNITS = {
 NEAR = 0.01
 """How near a factor must be to one of UNITS, and its standard error to nothing."""
 
-Sizes = Callable[[int], tuple[FloatArray, FloatArray]]
-"""Replicates of both sides with half as many pixels along each side."""
+Sizes = Callable[[], tuple[FloatArray, FloatArray]]
+"""Replicates of ours and of the candidate with half as many pixels along each side."""
 
 
 class Ours:
@@ -59,6 +64,8 @@ class Ours:
         self, scene: Scene, path: str, step: float | None = None, threads: int | None = None
     ) -> None:
         self.scene, self.path, self.step, self.threads = scene, path, step, threads
+        self.times = 1
+        """As many samples as the scene has, times this."""
         self._truncations: list[tuple[int, FloatArray]] = []
         self._said: list[str] = []
 
@@ -76,20 +83,23 @@ class Ours:
 
     def replicates(self, count: int, begun: int = 0) -> FloatArray:
         """Those with the seeds from `begun` on, of the scene's samples each."""
-        found = self._derivative(self.scene, count, begun, self.step)
-        self._truncations.append((count, found.truncation))
-        return found.replicates
+        made = []
+        for k in range(0, count, REPLICATES):  # so many have one estimate of the truncation
+            part = min(REPLICATES, count - k)
+            found = self._derivative(self.scene, part, begun + k, self.step)
+            self._truncations.append((part, found.truncation))
+            made.append(found.replicates)
+        return np.concatenate(made)
 
-    def of(self, scene: Scene, count: int, step: float | None = None) -> FloatArray:
+    def of(self, scene: Scene, count: int, step: float | None = None, seed: int = 0) -> FloatArray:
         """Those of another scene, or with another step."""
-        return self._derivative(scene, count, 0, step or self.step).replicates
+        return self._derivative(scene, count, seed, step or self.step).replicates
 
     def _derivative(self, scene: Scene, count: int, begun: int, step: float | None) -> Derivative:
-        spp = scene.resolved_sampler.spp
         return derivative(
             scene,
             self.path,
-            spp=spp * count,
+            spp=self.times * scene.resolved_sampler.spp * count,
             seed=SEED + begun,
             replicates=count,
             step=step,
@@ -147,9 +157,15 @@ def _inner(pictures: FloatArray, rim: int) -> FloatArray:
 
 def _explained(picture: FloatArray, right: FloatArray, wrong: FloatArray) -> float:
     """The part of the squared difference that goes."""
-    before = float(np.square(wrong.mean(axis=0) - right.mean(axis=0)).sum())
-    after = float(np.square(wrong.mean(axis=0) - picture.mean(axis=0)).sum())
-    return max(0.0, 1.0 - after / before) if before else 0.0
+    before, after = (_square(wrong, picture=x) for x in (right, picture))
+    return min(max(0.0, 1.0 - after / before), 1.0) if before > 0.0 else 0.0
+
+
+def _square(wrong: FloatArray, picture: FloatArray) -> float:
+    """The squared difference without its noise: two halves of the replicates have unrelated
+    noise."""
+    halves = [wrong[k::2].mean(axis=0) - picture[k::2].mean(axis=0) for k in (0, 1)]
+    return float((halves[0] * halves[1]).sum())
 
 
 def _factor(
@@ -157,23 +173,23 @@ def _factor(
 ) -> Cause | None:
     """A factor of all of it."""
     factor, error = factor_of(right, wrong)
-    if not math.isfinite(factor) or error > 0.1 * abs(factor):
+    if not math.isfinite(factor) or error >= 0.1 * abs(factor):
         return None
-    if not _is(factor * right, wrong, margins):
-        return None
-    told = f"the candidate's is {factor:.4g} ± {error:.1g} times the derivative"
+    told = f"it is {factor:.4g} ± {error:.1g} times the derivative"
     explained = _explained(factor * right, right, wrong)
-    if abs(factor + 1.0) < max(NEAR, 3.0 * error):
-        return Cause("the sign", told, explained)
-    if at_half_size is not None and abs(factor - 1.0) > NEAR:
-        small, small_error = factor_of(*at_half_size(len(right)))
-        growth = factor / small
-        if abs(growth - 4.0) < 0.5 + 4.0 * (error / abs(factor) + small_error / abs(small)):
+    if at_half_size is not None and abs(factor - 1.0) > NEAR + 3.0 * error:
+        small, small_error = factor_of(*at_half_size())
+        growth = factor / small if small else math.inf
+        if abs(growth / 4.0 - 1.0) < 3.0 * (error / abs(factor) + small_error / abs(small)):
             return Cause(
                 "a factor that grows with the number of pixels",
-                f"{told}, and {small:.4g} with a quarter of the pixels",
+                f"{told}, and {small:.4g} ± {small_error:.1g} with a quarter of the pixels",
                 explained,
             )
+    if not _is(factor * right, wrong, margins):
+        return None
+    if abs(factor + 1.0) < max(NEAR, 3.0 * error):
+        return Cause("the sign", told, explained)
     for unit, words in UNITS.items():
         if abs(factor / unit - 1.0) < NEAR and error < NEAR * unit:
             return Cause("another unit of the parameter", f"{told}: {words}", explained)
@@ -197,13 +213,6 @@ def factor_of(right: FloatArray, wrong: FloatArray) -> tuple[float, float]:
 def _hypotheses(ours: Ours, right: FloatArray) -> Iterator[_Hypothesis]:
     """The cheapest first."""
     scene, count = ours.scene, len(right)
-    for words, picture in (
-        ("the picture is upside down", right[:, ::-1]),
-        ("the picture is mirrored", right[:, :, ::-1]),
-        ("negative values are cut off", np.maximum(right, 0.0)),
-        ("the size in place of the value", np.abs(right)),
-    ):
-        yield _Hypothesis(words, "so is the derivative, changed so", partial(np.asarray, picture))
     scale = parameter(scene, ours.path).scale
     yield _Hypothesis(
         "edges that move are left out",
@@ -211,6 +220,13 @@ def _hypotheses(ours: Ours, right: FloatArray) -> Iterator[_Hypothesis]:
         "sits on silhouettes, and on the edges of shadows and of lamps",
         partial(ours.of, scene, count, NO_EDGE * scale),
     )
+    for words, picture in (
+        ("the picture is upside down", right[:, ::-1]),
+        ("the picture is mirrored", right[:, :, ::-1]),
+        ("negative values are cut off", np.maximum(right, 0.0)),
+        ("the size in place of the value", np.abs(right)),
+    ):
+        yield _Hypothesis(words, "so is the derivative, changed so", partial(np.asarray, picture))
     fine = lru_cache(partial(_of_quarter_pixels, ours, count))
     for down, across in product((0, 1, -1), repeat=2):
         if down or across:

@@ -17,6 +17,7 @@ import numpy as np
 from comparisons.geometry.flatten import copies_of
 from comparisons.integrators import type_of
 from comparisons.mitsuba.backend import backend, mitsuba
+from comparisons.mitsuba.scene import SPREAD
 from comparisons.renderers import DifferentiatorName, Guiding, NoCounterpartError
 from comparisons.translator import MOST_INSTANCES, to_mitsuba
 from comparisons.translator.native import failing
@@ -78,6 +79,10 @@ DIFFERENTIATORS = tuple(
 """All that there are."""
 
 
+SAMPLER = "multijitter"
+"""Mitsuba's stratified one, which has the least noise of its own."""
+
+
 class Moving:
     """A scene in Mitsuba, one of whose parameters moves.
 
@@ -96,7 +101,7 @@ class Moving:
             raise NoCounterpartError("Mitsuba has no set operations")
         if sum(copy.instance >= 0 for copy in copies) > MOST_INSTANCES:
             raise NoCounterpartError("Mitsuba takes minutes to compile many instances")
-        self._mi_scene, here = _loaded(scene)
+        self._mi_scene, here = _loaded(scene, SAMPLER)
         self._parameters = mitsuba().traverse(self._mi_scene)
         found = difference(scene, path)
         self.path = found.parameter.path
@@ -143,7 +148,7 @@ class Moving:
             params=self._parameters,
             integrator=integrator,
             spp=spp,
-            seed=seed % (1 << 32),
+            seed=SPREAD * seed % (1 << 32),
         )
 
     @contextmanager
@@ -166,9 +171,11 @@ class Moving:
                 self._parameters.update()
 
 
-def _loaded(scene: Scene) -> tuple[Any, dict[str, Any]]:
+def _loaded(scene: Scene, sampler: str | None = None) -> tuple[Any, dict[str, Any]]:
     """Mitsuba's scene, and the dictionary that it is made of."""
     description = to_mitsuba(scene, native=True)
+    if sampler is not None:
+        description["sensor"]["sampler"]["type"] = sampler
     with failing("Mitsuba cannot load the scene"):
         return mitsuba().load_dict(description, optimize=False), description
 

@@ -43,12 +43,14 @@ REPLICATES = 16
 """Independent estimates: a sixteenth of the samples makes the second step, so that a derivative
 costs 1.06 of two pictures, and standard errors have 15 degrees of freedom."""
 
-STEP = 2.0**-8
+STEP = 2.0**-6
 """The default step in parts of the parameter's scale, and a power of two, so that p + h is exact.
-It moves an edge across a picture of 100 pixels by half a pixel.  The truncation of x^n is
-(n - 1)(n - 2) / 6 of 1.5e-5; rounding, some hundred units of 2^-53 over h, is below 1e-11."""
+It moves an edge across a picture of 100 pixels by two.  The truncation of x^n is
+(n - 1)(n - 2) / 6 of 2.4e-4; rounding, some hundred units of 2^-53 over h, is below 1e-11.  By the
+field of view of the Cornell box (32 x 32, 4,096 samples) it makes an error of 0.35 % where noise is
+0.5 %; of a quarter of the step the noise is 1.5 %, and four times the step is 4 % off."""
 
-HALVINGS = 4
+HALVINGS = 6
 """How often the default step is halved to stay between bounds before it becomes one-sided."""
 
 Side = Literal["central", "forward", "backward"]
@@ -228,7 +230,7 @@ def derivative(
         raise scene.error(str(error), "film") from None
     say = progress or (lambda what, fraction: None)
     _ = scene.tables  # of a camera that moves they are shared
-    found = difference(scene, parameter, step)
+    found = difference(_without_roulette(scene), parameter, step)
 
     def pictures(scenes: Sequence[BuiltScene], k: int) -> list[FloatArray]:
         made = []
@@ -243,17 +245,14 @@ def derivative(
             made.append(picture.colour)
         return made
 
-    def summed(made: Sequence[FloatArray], factor: float = 1.0) -> FloatArray:
-        return np.asarray(sum(w * factor * f for w, f in zip(found.weights, made, strict=True)))
-
     estimates = np.empty((count, film.height, film.width, 3))
     brightest = 0.0
     for k in range(count):
         say("render", k / (count + 1))
         made = pictures(found.scenes, k)
         brightest = max(brightest, *(float(np.abs(f).mean()) for f in made))
-        estimates[k] = summed(made)
-    coarse = summed(pictures(found.coarse, 0), 0.5)
+        estimates[k] = _summed(found.weights, made)
+    coarse = 0.5 * _summed(found.weights, pictures(found.coarse, 0))
     truncation = (coarse - estimates[0]) / 3.0
     say("render", 1.0)
     result = Derivative(
@@ -269,6 +268,24 @@ def derivative(
     )
     object.__setattr__(result, "warnings", tuple(_warnings(result, brightest)))
     return result
+
+
+def _summed(weights: Sequence[float], pictures: Sequence[FloatArray]) -> FloatArray:
+    return np.asarray(sum(w * f for w, f in zip(weights, pictures, strict=True)))
+
+
+LONG = 64
+"""Edges of a path before roulette may end it: what comes later is faint."""
+
+
+def _without_roulette(scene: BuiltScene) -> BuiltScene:
+    """The scene with roulette on long paths alone.  Whether it ends a path jumps with the
+    parameter, as an edge does: by the reflectance of a wall of the Cornell box (32 x 32, 1,024
+    samples) the error of the mean is 7.3 times as large with it."""
+    depth = getattr(scene.integrator, "rr_depth", LONG)
+    if depth >= LONG:
+        return scene
+    return scene.changed(integrator=scene.integrator.model_copy(update={"rr_depth": LONG}))
 
 
 # ---- what is said of a derivative ---------------------------------------------------------------
