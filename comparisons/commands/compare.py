@@ -25,11 +25,12 @@ from comparisons.commands.options import (
     out_folder,
     some_of,
 )
+from comparisons.results.differentiators import DifferentiatorName, Guiding
 from comparisons.results.rungs import COMPARED
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.cli.options import AllowMissing, Defaults, by_name
 from reference_rt.cli.quantities import seconds_of
-from reference_rt.util.errors import UsageError
+from reference_rt.util.errors import SceneError, UsageError
 
 if TYPE_CHECKING:
     from comparisons.suites.suite import Changes
@@ -70,6 +71,30 @@ def compare(
     define: Defaults = None,
     allow_missing: AllowMissing = False,
     witness: Witness = None,
+    derivative: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PARAMETER",
+            help="Compare Mitsuba's derivative of the picture by this parameter, such as "
+            "materials.red.reflectance, with differences of ours. `explain --parameters` lists "
+            "them.",
+        ),
+    ] = None,
+    differentiator: Annotated[
+        DifferentiatorName | None,
+        typer.Option(
+            "--derivative-integrator",
+            help="Mitsuba's: prb, prb_basic, prb_projective or direct_projective. (default: prb)",
+        ),
+    ] = None,
+    guiding: Annotated[
+        Guiding | None,
+        typer.Option(help="How it chooses the edges that it samples: none, grid or octree."),
+    ] = None,
+    step: Annotated[
+        float | None,
+        typer.Option(help="Of our differences, in the parameter's unit. (default: 1/64 of it)"),
+    ] = None,
 ) -> None:
     """Render scenes with reference_rt and with Mitsuba, and report whether they agree.
 
@@ -81,6 +106,8 @@ def compare(
     """
     if fixed and time_limit is not None:
         raise UsageError("got --fixed and --time-limit; expected one of them")
+    if derivative is None and (differentiator or guiding or step):
+        raise UsageError("got an option of a derivative; expected --derivative PARAMETER, too")
     limit = None if time_limit is None else seconds_of(time_limit, "--time-limit")
     with compare_extra():
         from comparisons.runs.processes import Children
@@ -90,7 +117,7 @@ def compare(
         if fresh or not (out / "cases").is_dir():  # where there is one, nothing may be left to do
             children.begin(tuple(worker_command(threads)))
         with compare_extra():
-            from comparisons.compare.budget import usual
+            from comparisons.compare.budget import Asked, usual
             from comparisons.compare.looks import SECONDS
             from comparisons.results.case import exit_code
             from comparisons.suites.run import Options, Run, run_cases, summarise
@@ -101,12 +128,30 @@ def compare(
         )
         seconds = SECONDS if limit is None else limit
         budget = usual(spp, replicates, seconds, fixed=fixed, witness=witness)
+        if derivative is not None:
+            asked = Asked(
+                parameter=derivative,
+                integrator=differentiator or "prb",
+                guiding=guiding,
+                step=step,
+            )
+            budget = budget.model_copy(update={"derivative": asked})
         plan = plan_of_files(scenes, changes, budget)
+        if derivative is not None:
+            from reference_rt.scene.parameters import parameter
+
+            for one in plan.work:
+                if not isinstance(one.scene, SceneError):
+                    parameter(one.scene, derivative)
         given = {
             "replicates": replicates,
             "time-limit": time_limit,
             "fixed": fixed or None,
             "witness": witness,
+            "derivative": derivative,
+            "derivative-integrator": differentiator,
+            "guiding": guiding,
+            "step": step,
         }
         work = tuple(w._replace(again=_command(w.path, changes, given)) for w in plan.work)
 
@@ -132,7 +177,7 @@ def _command(path: Path, changes: "Changes", given: Mapping[str, float | str | b
         if value is True
         else f"--{name} {value:g}"
         if isinstance(value, float)
-        else f"--{name} {value}"
+        else f"--{name} {shlex.quote(str(value))}"
         for name, value in options.items()
         if value is not None
     ]

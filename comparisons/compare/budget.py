@@ -5,7 +5,8 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field
 
 from comparisons.compare.looks import FIRST, PARTS, PATIENCE, SECONDS
-from comparisons.renderers import DifferentiatorName, Guiding, ReferenceSampler, WitnessName
+from comparisons.renderers import ReferenceSampler, WitnessName
+from comparisons.results.differentiators import DifferentiatorName, Guiding
 from reference_rt.cli.quantities import seconds_in
 from reference_rt.core.model import Description
 

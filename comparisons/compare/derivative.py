@@ -39,6 +39,9 @@ PILOTS = 4
 MOST_TIMES = 64
 """Times as many samples that the noisier side has at most."""
 
+DEAR = 16
+"""Times as many samples of an integrator whose pictures cost as much with few as with many."""
+
 PILOT_SEED = 1 << 24
 """Of these pictures: far from those of the others."""
 
@@ -117,7 +120,7 @@ class _Theirs:
     def __init__(self, scene: Scene, parameter: str, differentiator: Differentiator) -> None:
         plugin = differentiator.of(scene)
         self.moving = Moving(scene, parameter)
-        self.times = 1
+        self.times = DEAR if differentiator.is_dear else 1
         self._spp = scene.resolved_sampler.spp
         self._integrator = mitsuba().load_dict(plugin)
         self._shape = scene.film.height, scene.film.width, 3
@@ -177,7 +180,7 @@ class _Both:
         if of_theirs and of_ours:
             more = 2.0 ** round(math.log2(of_ours / of_theirs))
             self._ours.times = int(min(max(more, 1.0), MOST_TIMES))
-            self._theirs.times = int(min(max(1.0 / more, 1.0), MOST_TIMES))
+            self._theirs.times *= int(min(max(1.0 / more, 1.0), MOST_TIMES))
 
     def pictures(self) -> tuple[FloatArray, FloatArray]:
         """Mitsuba's, and ours."""

@@ -122,12 +122,6 @@ PLACES = {
 ReferenceSampler = Literal["independent", "multijitter"]
 """Mitsuba's samplers of a comparison, see `comparisons.compare.budget`."""
 
-DifferentiatorName = Literal["prb", "prb_basic", "prb_projective", "direct_projective"]
-"""Mitsuba's integrators that differentiate; the latter two see edges that move."""
-
-Guiding = Literal["none", "grid", "octree"]
-"""How the latter two choose the edges that they sample."""
-
 WitnessName = Literal["cycles", "povray"]
 """Those that are no party to a comparison, and may be asked who is right."""
 

@@ -97,7 +97,9 @@ function paintKind(canvas, kind, picture, look) {
     paint(canvas, picture, Z_SPAN, signed, Number.isNaN);
   } else if (kind === "difference") {
     paint(canvas, picture, look.span / gain || 1, signed, notFinite);
-  } else if (look.signed) {
+  } else if (look.kind === "signed") {
+    paint(canvas, picture, look.white / gain, signed, notFinite);
+  } else if (look.kind === "normals") {
     const shade = (value) => Math.round(127.5 * (1 + Math.min(Math.max(value, -1), 1)));
     paint(canvas, picture, 1, (...values) => values.map(shade), notFinite);
   } else {

@@ -310,7 +310,7 @@ def _thumbnails(case: Case) -> "Thumbnails | None":
     images = case.images
     if images is None or not images.candidate.size or not images.reference.size:
         return None
-    return thumbnails(images)
+    return thumbnails(images, case.is_signed)
 
 
 def _figures(
@@ -328,7 +328,12 @@ def _figures(
         figures.append(("difference", pictures.difference, f"{candidate} − {reference}"))
         if case.images and case.images.error is not None:
             figures.append(("z", pictures.candidate, "difference / standard error"))
-    if mapped and case.images and (found := flip_map(case.images)) is not None:
+    if (
+        mapped
+        and case.images
+        and not case.is_signed
+        and (found := flip_map(case.images)) is not None
+    ):
         figures.append(("flip", found[0], f"FLIP, 0 to {shown(found[1])}"))
     return figures
 

@@ -2,7 +2,7 @@
 
 import base64
 import io
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -52,14 +52,17 @@ class Thumbnails:
     """Radiance difference shown as full red or blue; 0 if the pictures are equal."""
 
 
-def thumbnails(images: Images) -> Thumbnails:
-    white = white_level(images.reference)
+def thumbnails(images: Images, is_signed: bool = False) -> Thumbnails:
+    """is_signed: of values of both signs, whose sizes the white level is of: they are shown from
+    blue to red."""
+    white = white_level(np.abs(images.reference) if is_signed else images.reference)
+    shown = _signed if is_signed else _exposed
     span, difference = 0.0, None
     if images.candidate.shape == images.reference.shape:
         span, difference = _difference(images)
     return Thumbnails(
-        candidate=_exposed(images.candidate, white),
-        reference=_exposed(images.reference, white),
+        candidate=shown(images.candidate, white),
+        reference=shown(images.reference, white),
         difference=difference,
         white=white,
         span=span,
@@ -93,13 +96,18 @@ def _difference(images: Images) -> tuple[float, Thumbnail]:
     sizes = sizes[np.isfinite(sizes)]
     # If fewer than 0.5 % of the pixels differ at all, the percentile is 0: take the largest.
     span = float(np.percentile(sizes, DIFFERENCE_PERCENTILE) or sizes.max()) if sizes.size else 0.0
-    small = _shrunk(difference)
+    nonfinite = count_nonfinite(images.candidate, images.reference)
+    return span, replace(_signed(difference, span), nonfinite=nonfinite)
+
+
+def _signed(image: FloatArray, span: float) -> Thumbnail:
+    """From blue at -span over white to red at span, of the channel farthest from zero."""
+    small = _shrunk(image)
     bad = nonfinite_pixels(small)
     amount = np.clip(_largest(np.where(bad[..., None], 0.0, small)), -span, span) / (span or 1.0)
     end = np.where(amount > 0.0, RED, BLUE)
     pixels = WHITE + np.abs(amount) * (end - np.array(WHITE))
-    nonfinite = count_nonfinite(images.candidate, images.reference)
-    return span, _thumbnail(pixels, bad, difference.shape, nonfinite)
+    return _thumbnail(pixels, bad, image.shape, count_nonfinite(image))
 
 
 def _largest(difference: FloatArray) -> FloatArray:

@@ -74,7 +74,7 @@ class CaseView {
   async show(look) {
     this.pictures ??= await unpack(this.data);
     this.look = look;
-    const own = { ...look, white: this.white, span: this.span, signed: this.layer === "normal" };
+    const own = { ...look, white: this.white, span: this.span, kind: this.kindOfValues() };
     const drawn = this.figures.filter(({ kind, element }) => kind !== "flip" && !element.hidden);
     for (const figure of drawn) {
       paintKind(figure.canvas, figure.kind, this.pictures[figure.kind], own);
@@ -93,8 +93,15 @@ class CaseView {
   async drawInto(element, look) {
     const { candidate } = this.pictures ?? (await unpack(this.data));
     const canvas = document.createElement("canvas");
-    paintKind(canvas, "candidate", candidate, { ...look, white: this.white, span: this.span });
+    const own = { ...look, white: this.white, span: this.span, kind: this.kindOfValues() };
+    paintKind(canvas, "candidate", candidate, own);
     element.replaceChildren(canvas);
+  }
+
+  /** Normals, values of both signs such as derivatives, or "". */
+  kindOfValues() {
+    if (this.layer === "normal") return "normals";
+    return "signed" in this.box.dataset && !this.layer ? "signed" : "";
   }
 
   /** Give the memory back; what is drawn stays. */
@@ -105,6 +112,9 @@ class CaseView {
   exposed({ stops, colours }) {
     const white = this.white / 2 ** stops;
     if (this.layer === "normal") return "Normals: red, green and blue are x, y and z; grey is 0";
+    if (this.kindOfValues()) {
+      return `Red is ${reading(white, 4)}, blue is −${reading(white, 4)} in both pictures`;
+    }
     if (this.layer) return `White is a ${this.layer} of ${reading(white, 4)}`;
     if (colours === "linear") return `Luminance: yellow is ${reading(white, 4)}, purple is 0`;
     const dark = reading(white / 2 ** LOG_STOPS, 4);

@@ -122,6 +122,11 @@ class Case:
     trace: str = ""
     """The command that shows the rays of a pixel, without the pixel."""
 
+    @property
+    def is_signed(self) -> bool:
+        """Whether its pictures are derivatives, of values of both signs."""
+        return any(rung.name == "derivative" for rung in self.rungs)
+
 
 def trace_command(scene: Path, size: str | None, defaults: Mapping[str, str]) -> str:
     """`Case.trace` of a scene's file, at a size and with the defaults of Mitsuba's files."""
