@@ -271,7 +271,7 @@ def ggx_in_light(alpha: float = 0.4) -> Expected:
 @derivative(
     "materials.gold.alpha", ggx_in_light, "alpha",
     r"$f E (\frac{4 t^2}{\alpha^3 + \alpha t^2} - \frac{2}{\alpha} - "
-    r"\sum_{i, o} \frac{\Lambda'}{1 + \Lambda})$, $t$ of the half vector",
+    r"\sum_w \frac{\Lambda'}{1 + \Lambda})$, $t$ of the half vector",
 )  # fmt: skip
 def ggx_in_light_by_alpha() -> Expected:
     """By the logarithms of D and of the maskings 1 / (1 + Lambda), Lambda' = alpha t^2 / (2

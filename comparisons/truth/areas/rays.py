@@ -45,7 +45,7 @@ def perspective(x: float = 0.1) -> Expected:
 SWEPT = r"$L \int (v \cdot n) ds$ over the outline in the pixel, $v$ its velocity on the film"
 
 
-@derivative("shapes[0].v2[0]", perspective, "x", SWEPT, spp=65536, step=1 / 128)
+@derivative("shapes[0].v2[0]", perspective, "x", SWEPT, spp=32768, step=1 / 128)
 def perspective_by_corner() -> Expected:
     """The film's outline moves linearly along the two edges of the corner that moves."""
     half = np.tan(np.radians(20.0))
@@ -358,8 +358,8 @@ def lens_blur(focus: float = 4.0) -> Expected:
 
 @derivative(
     "camera.focus_distance", lens_blur, "focus",
-    r"$-\frac{A z L}{f^2} [\frac{2}{3 \pi} (1 - u^2)^{3/2}]$ between the pixel's borders, over "
-    r"its width", spp=131072, step=1 / 8
+    r"$-\frac{2 A z L}{3 \pi f^2} (\sqrt{1 - u^2})^3$ at the pixel's right border minus that "
+    r"at its left, over its width", spp=131072, step=1 / 8
 )  # fmt: skip
 def lens_blur_by_focus() -> Expected:
     """The segment's share has the derivative 2 sqrt(1 - u^2) / pi by u, and u that of -u over the
