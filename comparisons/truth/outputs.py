@@ -16,7 +16,7 @@ from comparisons.report.templates import write as write_text
 from comparisons.report.thumbnails import BLUE, RED, WHITE, png_url
 from comparisons.results.files import plain, write_json
 from comparisons.statistics.metrics import encode, white_level
-from comparisons.truth.case import AREAS, Case, Expected, FloatArray
+from comparisons.truth.case import AREAS, Case, Derivative, Expected, FloatArray
 from comparisons.truth.judge import LEVEL, Judged
 from reference_rt.util.files import replacing
 
@@ -207,6 +207,9 @@ def _numbers(row: Row) -> Table[Any] | None:
 def markdown(rows: Sequence[Row], provenance: Mapping[str, Any]) -> str:
     """The tables of docs/truth.md: a line for each case, with what docs/make_pictures.py shows."""
     renderers = list(dict.fromkeys(row.renderer for row in rows))
+    if all(isinstance(row.case, Derivative) for row in rows):
+        by_case = [[*some] for _, some in groupby(rows, lambda row: row.case.name)]
+        return "\n".join([*Table(CASES[1:], by_case).markdown(), *_where(provenance)])
     right = {(score.area, score.renderer): score.words for score in scores(rows)}
     areas = [area for area in AREAS if any(row.case.area == area for row in rows)]
     card = [[AREAS[a], *(right.get((a, renderer), "") for renderer in renderers)] for a in areas]
@@ -215,8 +218,12 @@ def markdown(rows: Sequence[Row], provenance: Mapping[str, Any]) -> str:
         of_area = [row for row in rows if row.case.area == area]
         table = Table(CASES, [[*some] for _, some in groupby(of_area, lambda row: row.case.name)])
         text += ["", f"### {AREAS[area].capitalize()}", "", *table.markdown()]
+    return "\n".join([*text, *_where(provenance)])
+
+
+def _where(provenance: Mapping[str, Any]) -> list[str]:
     where = f"{provenance['machine']}, {provenance['cores']} cores, {provenance['date'][:10]}"
-    return "\n".join([*text, "", f"`reference-rt truth`; {where}.", ""])
+    return ["", f"`reference-rt truth`; {where}.", ""]
 
 
 CASES = (
