@@ -209,7 +209,8 @@ def markdown(rows: Sequence[Row], provenance: Mapping[str, Any]) -> str:
     renderers = list(dict.fromkeys(row.renderer for row in rows))
     if all(isinstance(row.case, Derivative) for row in rows):
         by_case = [[*some] for _, some in groupby(rows, lambda row: row.case.name)]
-        return "\n".join([*Table(CASES[1:], by_case).markdown(), *_where(provenance)])
+        where = _where(provenance, "truth --derivatives")
+        return "\n".join([*Table(CASES[1:], by_case).markdown(), *where])
     right = {(score.area, score.renderer): score.words for score in scores(rows)}
     areas = [area for area in AREAS if any(row.case.area == area for row in rows)]
     card = [[AREAS[a], *(right.get((a, renderer), "") for renderer in renderers)] for a in areas]
@@ -221,9 +222,9 @@ def markdown(rows: Sequence[Row], provenance: Mapping[str, Any]) -> str:
     return "\n".join([*text, *_where(provenance)])
 
 
-def _where(provenance: Mapping[str, Any]) -> list[str]:
+def _where(provenance: Mapping[str, Any], command: str = "truth") -> list[str]:
     where = f"{provenance['machine']}, {provenance['cores']} cores, {provenance['date'][:10]}"
-    return ["", f"`reference-rt truth`; {where}.", ""]
+    return ["", f"`reference-rt {command}`; {where}.", ""]
 
 
 CASES = (
