@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from rich.console import Console
 
 from comparisons.report.table import Column, Table, table_of
@@ -314,7 +315,7 @@ def _shown(expected: Expected, mean: FloatArray) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _red_blue(values: FloatArray, stated: FloatArray, span: float) -> FloatArray:
+def _red_blue(values: FloatArray, stated: npt.NDArray[np.bool_], span: float) -> FloatArray:
     """Red above 0 and blue below, of each pixel the channel farthest from 0; from -span to span."""
     worst = np.take_along_axis(values, np.abs(values).argmax(axis=-1)[..., None], axis=-1)
     end = np.where(worst > 0.0, RED, BLUE)
