@@ -143,19 +143,19 @@ def test_an_eye_and_its_target_move_as_all_else_the_other_way(camera: str) -> No
 
 
 def test_standard_errors_and_the_noise_of_the_truncation_are_what_is_said() -> None:
-    """Of 40 derivatives with other seeds.  The variance between the means of whole pictures is that
-    which they state: F(39, 600) is within 0.5 and 1.7 with a chance of 0.999.  The standard error
-    of the truncation over that of the picture is .94, see the module: of 40 by 72 values, most of
-    which are 0, within 3 of the standard errors of 40 alone, 1 / sqrt(80)."""
+    """Of 24 derivatives with other seeds.  The variance between the means of whole pictures is that
+    which they state: F(23, 360) is within 0.35 and 2.2 with a chance of 0.996.  The standard error
+    of the truncation over that of the picture is .94, see the module: of 24 by 72 values, most of
+    which are 0, within 3 of the standard errors of 24 alone, 1 / sqrt(48)."""
     found = [
         derivative(silhouette(), "shapes[0].radius", seed=1000 * seed, spp=32, step=1 / 64)
-        for seed in range(40)
+        for seed in range(24)
     ]
     of = np.array([one.replicates.mean(axis=(1, 2, 3)) for one in found])
-    assert 0.5 < of.mean(axis=1).var(ddof=1) / (of.var(axis=1, ddof=1).mean() / 16) < 1.7
+    assert 0.35 < of.mean(axis=1).var(ddof=1) / (of.var(axis=1, ddof=1).mean() / 16) < 2.2
     truncation = np.var([one.truncation for one in found], axis=0, ddof=1).sum()
     picture = np.var([one.picture for one in found], axis=0, ddof=1).sum()
-    assert math.sqrt(truncation / picture) == pytest.approx(0.94, rel=0.34)
+    assert math.sqrt(truncation / picture) == pytest.approx(0.94, rel=0.43)
 
 
 def test_warnings_say_why_no_statement_is_possible() -> None:
