@@ -100,7 +100,8 @@ def _is_whole(scene: SceneModel, keys: Keys, value: Any) -> bool:
         return False
     # The field of a description that holds it, and the keys within the field.
     part: Any = scene
-    owner, at = part, 0
+    owner: Description = scene
+    at = 0
     for k, key in enumerate(keys):
         if isinstance(part, Description):
             owner, at = part, k
@@ -145,7 +146,8 @@ def _scale(scene: SceneModel, keys: Keys, value: float | tuple[float, ...]) -> f
     if isinstance(value, float) and isinstance(holder, Description):
         return abs(value) or 1.0
     part: Any = scene
-    owner, array = part, None
+    owner: Description = scene
+    array = None
     for key in keys:
         owner = part if isinstance(part, Description) else owner
         array = part if isinstance(part, np.ndarray) and part.ndim == 2 else array
