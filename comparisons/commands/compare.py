@@ -31,6 +31,7 @@ from reference_rt.cli.guarded import guarded, say
 from reference_rt.cli.options import AllowMissing, Defaults, by_name
 from reference_rt.cli.quantities import seconds_of
 from reference_rt.util.errors import SceneError, UsageError
+from reference_rt.util.files import check_writable
 
 if TYPE_CHECKING:
     from comparisons.suites.suite import Changes
@@ -113,6 +114,8 @@ def compare(
         from comparisons.runs.processes import Children
         from comparisons.suites import worker_command
 
+    # As `run_cases` does, which is imported while the worker is: before that begins.
+    check_writable(*(out / name for name in ("results.json", "report.html", "cases/a case")))
     with closing(Children()) as children:
         if fresh or not (out / "cases").is_dir():  # where there is one, nothing may be left to do
             children.begin(tuple(worker_command(threads)))

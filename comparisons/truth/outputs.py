@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from rich.console import Console
 
 from comparisons.report.table import Column, Table, table_of
@@ -16,7 +17,7 @@ from comparisons.report.templates import write as write_text
 from comparisons.report.thumbnails import BLUE, RED, WHITE, png_url
 from comparisons.results.files import plain, write_json
 from comparisons.statistics.metrics import encode, white_level
-from comparisons.truth.case import AREAS, Case, Expected, FloatArray
+from comparisons.truth.case import AREAS, Case, Derivative, Expected, FloatArray
 from comparisons.truth.judge import LEVEL, Judged
 from reference_rt.util.files import replacing
 
@@ -207,6 +208,10 @@ def _numbers(row: Row) -> Table[Any] | None:
 def markdown(rows: Sequence[Row], provenance: Mapping[str, Any]) -> str:
     """The tables of docs/truth.md: a line for each case, with what docs/make_pictures.py shows."""
     renderers = list(dict.fromkeys(row.renderer for row in rows))
+    if all(isinstance(row.case, Derivative) for row in rows):
+        by_case = [[*some] for _, some in groupby(rows, lambda row: row.case.name)]
+        where = _where(provenance, "truth --derivatives")
+        return "\n".join([*Table(CASES[1:], by_case).markdown(), *where])
     right = {(score.area, score.renderer): score.words for score in scores(rows)}
     areas = [area for area in AREAS if any(row.case.area == area for row in rows)]
     card = [[AREAS[a], *(right.get((a, renderer), "") for renderer in renderers)] for a in areas]
@@ -215,8 +220,12 @@ def markdown(rows: Sequence[Row], provenance: Mapping[str, Any]) -> str:
         of_area = [row for row in rows if row.case.area == area]
         table = Table(CASES, [[*some] for _, some in groupby(of_area, lambda row: row.case.name)])
         text += ["", f"### {AREAS[area].capitalize()}", "", *table.markdown()]
+    return "\n".join([*text, *_where(provenance)])
+
+
+def _where(provenance: Mapping[str, Any], command: str = "truth") -> list[str]:
     where = f"{provenance['machine']}, {provenance['cores']} cores, {provenance['date'][:10]}"
-    return "\n".join([*text, "", f"`reference-rt truth`; {where}.", ""])
+    return ["", f"`reference-rt {command}`; {where}.", ""]
 
 
 CASES = (
@@ -306,7 +315,7 @@ def _shown(expected: Expected, mean: FloatArray) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _red_blue(values: FloatArray, stated: FloatArray, span: float) -> FloatArray:
+def _red_blue(values: FloatArray, stated: npt.NDArray[np.bool_], span: float) -> FloatArray:
     """Red above 0 and blue below, of each pixel the channel farthest from 0; from -span to span."""
     worst = np.take_along_axis(values, np.abs(values).argmax(axis=-1)[..., None], axis=-1)
     end = np.where(worst > 0.0, RED, BLUE)

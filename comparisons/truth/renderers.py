@@ -138,9 +138,10 @@ def derivative_rows(
 def with_truncation(expected: Expected, truncation: FloatArray) -> Expected:
     """The formula with the truncation of a difference, of the whole picture, in its bound."""
     stated = expected.stated
-    size = np.abs(expected.pixels[stated]).mean()
-    added = np.abs(truncation[stated].mean(axis=0)).max()
-    return replace(expected, bound=float(expected.bound + added / size))
+    size = np.abs(expected.pixels[stated]).mean(axis=0)
+    added = np.abs(truncation[stated].mean(axis=0))
+    relative = (added[size > 0.0] / size[size > 0.0]).max(initial=0.0)
+    return replace(expected, bound=float(expected.bound + relative))
 
 
 CANDIDATE = "candidate"

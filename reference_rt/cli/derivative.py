@@ -16,12 +16,12 @@ from reference_rt.util.console import ProgressLine
 
 
 def derivative(
-    scene: Scene, parameter: str, outputs: list[Path], threads: int | None, step: float | None
+    scene: Scene, parameter: str, output: Path | None, threads: int | None, step: float | None
 ) -> Derivative:
-    """Compute it, and write the files.  Raises UsageError, SceneError, ImageError."""
+    """Compute it, and write the file.  Raises UsageError, SceneError, ImageError."""
     with ProgressLine() as progress:
         found = differentiated(scene, parameter, threads=threads, step=step, progress=progress)
-    for output in outputs:
+    if output is not None:
         found.save(output)
     return found
 
@@ -51,7 +51,7 @@ def as_json(found: Derivative) -> str:
     return json.dumps(numbers_of(found))
 
 
-def in_words(found: Derivative, outputs: list[Path]) -> str:
+def in_words(found: Derivative, output: Path | None) -> str:
     """The same for people."""
     numbers = numbers_of(found)
     mean, error, truncation = (
@@ -62,7 +62,7 @@ def in_words(found: Derivative, outputs: list[Path]) -> str:
     text = (
         f"by {found.parameter}, step {found.step:g}{side}: mean {mean} ± {error} W/sr/m2 per unit"
     )
-    written = "".join(f"{output}: " for output in outputs)
+    written = "" if output is None else f"{output}: "
     return f"{written}{text}, of which the step makes {truncation}; {found.seconds:.2f} s"
 
 

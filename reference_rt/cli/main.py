@@ -182,12 +182,12 @@ def derivative(
         ),
     ],
     output: Annotated[
-        list[Path] | None,
+        Path | None,
         typer.Option(
             "--output",
             "-o",
             help="An .exr (with standard errors and truncation) or a .png (red above 0, blue "
-            "below); repeatable.",
+            "below).",
         ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON.")] = False,
@@ -214,20 +214,19 @@ def derivative(
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.files import check_writable
 
-    outputs = output or []
-    if not outputs and not as_json:
+    if output is None and not as_json:
         raise UsageError("expected --output, --json or both")
-    for path in outputs:
-        check_suffix(path)
+    if output is not None:
+        check_suffix(output)
     loaded = adjusted(
         Scene.load(scene, by_name(define), allow_missing), spp, size, integrator, seed
     )
-    check_writable(*outputs)
+    check_writable(*([output] if output else []))
     with without_blas():
-        found = derivatives.derivative(loaded, parameter, outputs, threads, step)
+        found = derivatives.derivative(loaded, parameter, output, threads, step)
     for warning in found.warnings:
         say(f"warning: {warning}", err=True)
-    say(derivatives.in_words(found, outputs), err=True)
+    say(derivatives.in_words(found, output), err=True)
     if as_json:
         say(derivatives.as_json(found))
 

@@ -12,6 +12,11 @@ the samples within h of an edge 1 / 2h becomes 1 / 4h, and as many beyond h coun
 its variance is 1 / 18 of that of one replicate's D(h): with REPLICATES of them its standard error
 is .94 of that of the mean.
 
+Russian roulette is a choice that depends on the parameter: a path that survives in one scene only
+is an edge, of much light.  So it begins late here, which changes no mean.  In the Cornell box, by
+reflectances of walls, the noise is a third to a seventh, .89 to .97 of that of Mitsuba's automatic
+differentiation at equal samples.
+
 At a bound, such as a reflectance of 1, the difference is one-sided and of second order as well:
 (-3 f(p) + 4 f(p + h) - f(p + 2h)) / 2h, of three scenes.
 """
@@ -49,6 +54,11 @@ It moves an edge across a picture of 100 pixels by two.  The truncation of x^n i
 (n - 1)(n - 2) / 6 of 2.4e-4; rounding, some hundred units of 2^-53 over h, is below 1e-11.  By the
 field of view of the Cornell box (32 x 32, 4,096 samples) it makes an error of 0.35 % where noise is
 0.5 %; of a quarter of the step the noise is 1.5 %, and four times the step is 4 % off."""
+
+ROULETTE = 16
+"""The number of a path's edges from which roulette may end it, if the scene lets it be so long.  In
+a closed room of albedo .8, .5, .2 paths take 2.5 times as long as from 5, with .43 and .14 of the
+noise in red and green; from 32 on, twice as long again, with .3 of the noise in red alone."""
 
 HALVINGS = 6
 """How often the default step is halved to stay between bounds before it becomes one-sided."""
@@ -216,7 +226,7 @@ def derivative(
         from reference_rt.rendering.scene import Scene
 
         scene = Scene.load(os.fspath(scene))
-    scene = with_settings(scene, spp=spp, size=size, seed=seed)
+    scene = _with_late_roulette(with_settings(scene, spp=spp, size=size, seed=seed))
     sampler = scene.resolved_sampler
     first = getattr(sampler, "seed", None)
     if replicates < 1:
@@ -230,7 +240,7 @@ def derivative(
         raise scene.error(str(error), "film") from None
     say = progress or (lambda what, fraction: None)
     _ = scene.tables  # of a camera that moves they are shared
-    found = difference(_without_roulette(scene), parameter, step)
+    found = difference(_with_late_roulette(scene), parameter, step)
 
     def pictures(scenes: Sequence[BuiltScene], k: int) -> list[FloatArray]:
         made = []
@@ -274,18 +284,12 @@ def _summed(weights: Sequence[float], pictures: Sequence[FloatArray]) -> FloatAr
     return np.asarray(sum(w * f for w, f in zip(weights, pictures, strict=True)))
 
 
-LONG = 64
-"""Edges of a path before roulette may end it: what comes later is faint."""
-
-
-def _without_roulette(scene: BuiltScene) -> BuiltScene:
-    """The scene with roulette on long paths alone.  Whether it ends a path jumps with the
-    parameter, as an edge does: by the reflectance of a wall of the Cornell box (32 x 32, 1,024
-    samples) the error of the mean is 7.3 times as large with it."""
-    depth = getattr(scene.integrator, "rr_depth", LONG)
-    if depth >= LONG:
+def _with_late_roulette(scene: BuiltScene) -> BuiltScene:
+    first = getattr(scene.integrator, "rr_depth", None)
+    if first is None or first >= ROULETTE:
         return scene
-    return scene.changed(integrator=scene.integrator.model_copy(update={"rr_depth": LONG}))
+    integrator = scene.integrator.model_copy(update={"rr_depth": ROULETTE})
+    return scene.changed(integrator=integrator)
 
 
 # ---- what is said of a derivative ---------------------------------------------------------------

@@ -99,8 +99,9 @@ def _is_whole(scene: SceneModel, keys: Keys, value: Any) -> bool:
     if not isinstance(value, tuple) or len(value) < 2 or not all(map(_is_number, value)):
         return False
     # The field of a description that holds it, and the keys within the field.
-    owner, at = scene, 0
     part: Any = scene
+    owner: Description = scene
+    at = 0
     for k, key in enumerate(keys):
         if isinstance(part, Description):
             owner, at = part, k
@@ -108,10 +109,10 @@ def _is_whole(scene: SceneModel, keys: Keys, value: Any) -> bool:
     field, within = str(keys[at]), keys[at + 1 :]
     one = _put(getattr(owner, field), within, lambda numbers: numbers[0])
     try:
-        found = _validator(type(owner), field).validate_python(one)
+        _validator(type(owner), field).validate_python(one)
     except ValidationError:
         return False
-    return isinstance(reduce(_child, within, found), tuple)
+    return True
 
 
 @cache
@@ -144,8 +145,9 @@ def _scale(scene: SceneModel, keys: Keys, value: float | tuple[float, ...]) -> f
     holder = reduce(_child, keys[:-1], scene)
     if isinstance(value, float) and isinstance(holder, Description):
         return abs(value) or 1.0
-    owner, array = scene, None
     part: Any = scene
+    owner: Description = scene
+    array = None
     for key in keys:
         owner = part if isinstance(part, Description) else owner
         array = part if isinstance(part, np.ndarray) and part.ndim == 2 else array

@@ -35,6 +35,7 @@ ARGUMENTS = {
     "methods": [],
     "bench": ["--scenes", str(Path(SCENE).parent)],
     "stability": [],
+    "derivative": [SCENE, "camera.eye[0]"],
     "explain": [SCENE],
     "convert": [SCENE],
     "preview": [SCENE],

@@ -273,7 +273,7 @@ def sphere_lamp(radius: float = 0.8) -> Expected:
 
 
 @derivative(
-    "shapes[1].radius", sphere_lamp, "radius", r"$2 \rho L \frac{r}{d^2} \cos\theta$", spp=256
+    "shapes[1].radius", sphere_lamp, "radius", r"$2 \rho L \frac{r}{d^2} \cos\theta$", spp=1024
 )
 def sphere_lamp_by_radius() -> Expected:
     """r^2 by r."""

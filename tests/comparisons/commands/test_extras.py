@@ -48,10 +48,11 @@ COMMANDS = (
     HIDDEN
     + """
 from command_line import ARGUMENTS, SCENE, invoke
+NO_EXTRA = "render", "derivative", "trace", "warm-up", "preview"
 Found = {}
 for command, needed in [*ARGUMENTS.items(), *((line[0], line[1:]) for line in lines)]:
-    if needed == ARGUMENTS[command] and command in ("render", "trace", "warm-up", "preview"):
-        continue  # they need no extra, and compile kernels
+    if needed == ARGUMENTS[command] and command in NO_EXTRA:
+        continue  # they compile kernels
     more = {"render": ["-o", "x.exr"], "convert": ["-o", "x.xml"]}.get(command, [])
     scene = [SCENE] if command == "render" and SCENE not in needed else []
     result = invoke(command, *scene, *needed, *more, "--size", "4x3")

@@ -35,6 +35,7 @@ FILES = {
     ("render", "output"): ["x.exr"],
     ("render", "preview"): ["x.png"],
     ("render", "checkpoint"): ["x"],
+    ("derivative", "output"): ["x.exr"],
     ("trace", "out"): [""],
     ("fuzz", "out"): ["fuzz.json", "fuzz.html"],
     ("fuzz", "junit"): [""],

@@ -93,6 +93,7 @@ FAULTS = (
     ("wall_under_sky", "scale: [0.75,", "scale: [0.74,"),
     ("sphere_under_sky", "radius: 0.5", "radius: 0.502"),
     ("hole_in_screen", "[0.4, 0.4, 1]", "[0.4, 0.41, 1]"),
+    ("disk_under_sky", "scale: 0.5", "scale: 0.505"),
     ("narrow_gap", "translate: [30,", "translate: [30.01,"),
     # transport
     ("closed_room", "type: path", "type: path, max_depth: 12"),

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders import SCENES
 
 from reference_rt import Scene, UsageError, derivative, read_image, render
 from reference_rt.rendering import derivative as module
@@ -141,28 +142,20 @@ def test_an_eye_and_its_target_move_as_all_else_the_other_way(camera: str) -> No
     np.testing.assert_allclose(by_eye, -by_shape.replicates, atol=1e-9)
 
 
-def test_standard_errors_say_how_far_it_scatters() -> None:
-    """Of 40 derivatives with other seeds, of the whole picture: the variance between them is that
-    which they state.  F(39, 600) is within 0.5 and 1.7 with a chance of 0.999."""
-    means, stated = [], []
-    for seed in range(40):
-        found = derivative(silhouette(), "shapes[0].radius", seed=1000 * seed, spp=32, step=1 / 64)
-        of = found.replicates.mean(axis=(1, 2, 3))
-        means.append(of.mean())
-        stated.append(of.var(ddof=1) / 16)
-    assert 0.5 < np.var(means, ddof=1) / np.mean(stated) < 1.7
-
-
-def test_the_noise_of_the_truncation_is_that_of_edges() -> None:
-    """Its standard error over that of the picture is .94: see the module.  Of 40, within 3 of its
-    own standard errors of 1 / sqrt(80)."""
+def test_standard_errors_and_the_noise_of_the_truncation_are_what_is_said() -> None:
+    """Of 24 derivatives with other seeds.  The variance between the means of whole pictures is that
+    which they state: F(23, 360) is within 0.35 and 2.2 with a chance of 0.996.  The standard error
+    of the truncation over that of the picture is .94, see the module: of 24 by 72 values, most of
+    which are 0, within 3 of the standard errors of 24 alone, 1 / sqrt(48)."""
     found = [
         derivative(silhouette(), "shapes[0].radius", seed=1000 * seed, spp=32, step=1 / 64)
-        for seed in range(40)
+        for seed in range(24)
     ]
+    of = np.array([one.replicates.mean(axis=(1, 2, 3)) for one in found])
+    assert 0.35 < of.mean(axis=1).var(ddof=1) / (of.var(axis=1, ddof=1).mean() / 16) < 2.2
     truncation = np.var([one.truncation for one in found], axis=0, ddof=1).sum()
     picture = np.var([one.picture for one in found], axis=0, ddof=1).sum()
-    assert math.sqrt(truncation / picture) == pytest.approx(0.94, rel=0.34)
+    assert math.sqrt(truncation / picture) == pytest.approx(0.94, rel=0.43)
 
 
 def test_warnings_say_why_no_statement_is_possible() -> None:
@@ -211,3 +204,17 @@ def test_files(tmp_path: Any) -> None:
     assert (middle[found.picture[..., 0] == 0.0] == 1.0).all()
     with pytest.raises(UsageError, match=r"expected \.exr or \.png"):
         found.save(tmp_path / "d.jpg")
+
+
+def test_roulette_begins_late(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where paths are long it makes the noise less than half, .14 with many samples; a scene's own
+    later beginning stays."""
+    scene = Scene.load(SCENES / "truth" / "closed_room.yaml")
+    late = derivative(scene, "materials.matte.reflectance", size=(4, 4), spp=64)
+    monkeypatch.setattr(module, "ROULETTE", 5)
+    early = derivative(scene, "materials.matte.reflectance", size=(4, 4), spp=64)
+    green = 1
+    assert (late.standard_error < 0.5 * early.standard_error)[..., green].mean() > 0.8
+    own = scene.changed(integrator={"type": "path", "rr_depth": 30})
+    found = derivative(own, "materials.matte.reflectance", size=(1, 1), spp=2)
+    assert found.scene.integrator.rr_depth == 30

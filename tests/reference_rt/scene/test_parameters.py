@@ -86,7 +86,7 @@ def test_every_real_number_of_every_type_moves(part: str, kind: type) -> None:
 
 def test_a_colour_moves_as_a_whole_and_by_its_numbers_and_a_vector_by_its_numbers() -> None:
     scene = Scene.parse(
-        "materials: {red.hot: {type: diffuse, reflectance: 0.25}}\n"
+        "materials: {red: {type: mirror}, red.hot: {type: diffuse, reflectance: 0.25}}\n"
         "shapes: [{type: sphere, material: red.hot, transform: [{scale: 2}]}]\n"
     )
     assert parameter(scene, "materials.red.hot.reflectance").value == (0.25,) * 3
