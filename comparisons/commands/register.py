@@ -3,6 +3,7 @@
 import typer
 
 from comparisons.commands.compare import compare, convert, report, suite
+from comparisons.commands.derivatives import derivatives
 from comparisons.commands.gate import accept, gate
 from comparisons.commands.speed import bench, converge, methods
 from comparisons.commands.trials import fuzz, selftest, stability
@@ -13,7 +14,7 @@ def register(app: typer.Typer) -> None:
     """Add the commands; called through the entry-point group `reference_rt.commands`."""
     commands = (
         *(compare, suite, gate, accept, report, selftest),
-        *(converge, methods, bench, stability, convert, fuzz, truth),
+        *(converge, methods, bench, stability, convert, fuzz, truth, derivatives),
     )
     for command in commands:
         app.command()(command)

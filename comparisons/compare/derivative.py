@@ -73,8 +73,9 @@ def derivative_case(
         say=say,
     )
     found = looked.judged
-    rungs = [RungResult("derivative", found.status, found.reason, found.numbers)]
     wrong, right = both.pictures()
+    numbers = found.numbers | {"candidate_error": _error(wrong, right)}
+    rungs = [RungResult("derivative", found.status, found.reason, numbers)]
     cause = None
     if found.status == "differ":
         say("looks for a cause")
@@ -100,6 +101,16 @@ def derivative_case(
         sides=sides,
         cause=cause,
     )
+
+
+def _error(wrong: FloatArray, right: FloatArray) -> float | None:
+    """The standard error of the candidate's image mean, over the derivative's size, in the noisiest
+    channel; None where nothing changes."""
+    size = side_of(right, signed=True).size.mean(axis=(0, 1))
+    means = wrong.mean(axis=(1, 2))
+    errors = means.std(axis=0, ddof=1) / math.sqrt(len(means))
+    seen = size > 0.0
+    return float((errors[seen] / size[seen]).max()) if seen.any() else None
 
 
 def _at_half_size(scene: Scene, budget: Budget) -> tuple[FloatArray, FloatArray]:

@@ -240,7 +240,7 @@ def derivative(
         raise scene.error(str(error), "film") from None
     say = progress or (lambda what, fraction: None)
     _ = scene.tables  # of a camera that moves they are shared
-    found = difference(_with_late_roulette(scene), parameter, step)
+    found = difference(scene, parameter, step)
 
     def pictures(scenes: Sequence[BuiltScene], k: int) -> list[FloatArray]:
         made = []
