@@ -1,6 +1,11 @@
-"""`reference-rt derivatives`: which of Mitsuba's derivatives are right, by which parameter."""
+"""`reference-rt derivatives`: which of Mitsuba's derivatives are right, by which parameter; and
+`gate --derivative`."""
 
+import shlex
+import sys
+from collections.abc import Sequence
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, cast, get_args
 
@@ -18,6 +23,7 @@ from comparisons.commands.options import (
 )
 from comparisons.results.differentiators import DifferentiatorName, Guiding
 from reference_rt.cli.guarded import guarded, say
+from reference_rt.util.errors import UsageError, printable
 
 
 @guarded
@@ -82,3 +88,56 @@ def derivatives(
     writes.finish(lambda: "\n".join(suite.table(run.cases).markdown()))
     undecided = [case for case in run.cases if case.verdict in ("inconclusive", "invalid")]
     raise typer.Exit(exit_code(undecided, run.missing) if undecided or run.missing else 0)
+
+
+def derivative_gate(
+    candidates: Sequence[Path],
+    parameter: str,
+    scene: Path | None,
+    reference: Sequence[Path],
+    layer: str,
+    out: Path,
+    *,
+    spp: int | None,
+    size: str | None,
+    seed: int | None,
+    limit: float,
+    step: float | None,
+    threads: int | None,
+) -> None:
+    """`gate --derivative PARAMETER`: derivative pictures against differences of ours, or against
+    one picture that is exact."""
+    with compare_extra("the gate"):
+        from comparisons.commands.outputs import Outputs
+        from comparisons.gate import outputs
+        from comparisons.gate.derivative import Asked, gate_derivative
+        from comparisons.gate.pictures_in import read_candidate, read_candidates
+        from comparisons.results.headline import headline
+    from reference_rt.cli.options import adjusted
+    from reference_rt.rendering.scene import Scene
+
+    if not candidates:
+        raise UsageError("--derivative: expected candidates, two or more")
+    if len(reference) > 1 or (scene is None) == (not reference):
+        raise UsageError("--derivative: expected --scene, or one --reference, which is exact")
+    Outputs(out, ("results.json", "report.html")).prepare()
+    pictures = [p.radiance for path in candidates for p in read_candidates(path, layer)]
+    described = None if scene is None else adjusted(Scene.load(scene), spp, size, None, seed)
+    asked = Asked(
+        scene=described,
+        parameter=parameter if scene else "",
+        closed=read_candidate(reference[0]).radiance if reference else None,
+        step=step,
+        limit=limit,
+        threads=threads,
+        name=printable(scene.stem if scene else reference[0].stem),
+    )
+    case = gate_derivative(pictures, asked)
+    case = replace(case, again=shlex.join(["reference-rt", *sys.argv[1:]]))
+    facts = {"limit": limit, "candidates": [str(path) for path in candidates]}
+    results, report = outputs.write(case, out, facts)
+    say(f"{case.scene}: {case.verdict}: {headline(case)}")
+    if case.cause is not None:
+        say(f"  {case.cause.name}: {case.cause.evidence}")
+    say(f"{results}, {report}", err=True)
+    raise typer.Exit(outputs.code_of(case))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from comparisons.commands.derivatives import derivative_gate
 from comparisons.commands.options import (
     Baselines,
     Fixed,
@@ -145,6 +146,18 @@ def gate(
         ),
     ] = "",
     witness: Witness = None,
+    derivative: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PARAMETER",
+            help="The candidates are derivatives by this parameter of --scene, such as "
+            "materials.red.reflectance; or, in any word, of one --reference, which is exact.",
+        ),
+    ] = None,
+    step: Annotated[
+        float | None,
+        typer.Option(help="Of our differences, in the unit of --derivative. (default: 1/64 of it)"),
+    ] = None,
     rim: Annotated[
         int,
         typer.Option(
@@ -222,6 +235,13 @@ def gate(
         numbers = {"replicates": replicates, "spp": spp, "seed": seed}
         truth_gate(truth, candidates or (), command, layer, out, suffix=suffix,
                    seconds=seconds, **numbers)  # fmt: skip
+    if derivative is not None:
+        derivative_gate(
+            candidates or (), derivative, scene, reference or (), layer, out,
+            spp=spp, size=size, seed=seed, limit=limit, step=step, threads=threads,
+        )  # fmt: skip
+    if step is not None:
+        raise UsageError("--step: only applies to --derivative; expected that too")
     described = (
         None
         if scene is None

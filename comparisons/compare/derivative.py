@@ -22,7 +22,7 @@ from comparisons.compare.looks import FIRST, Pool, mean_picture, most_kept, unti
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.renderers import NoCounterpartError
 from comparisons.results.case import Case, Images, RungResult, decide
-from comparisons.statistics import replicates_asked, standard_error
+from comparisons.statistics import Known, replicates_asked, standard_error
 from comparisons.statistics.cells import Margins
 from comparisons.statistics.decide import compare
 from comparisons.statistics.sides import side_of
@@ -210,16 +210,25 @@ class _Both:
 
     def look(self, level: float) -> RungResult:
         """The statistics of what there is."""
-        found, (theirs, ours) = self.margins(), self.pictures()
-        if not theirs.any() and not ours.any():
-            reason = "no pixel changes on either side"
-            return RungResult("derivative", "not-comparable", reason)
-        limit = max(self._limit, 2.0 * found.image)
-        tested = compare(theirs, ours, limit=limit, margins=found, level=level, signed=True)
-        if tested.status == "agree" and limit > self._limit:
-            reason = f"what our step adds is not known better than to {limit:.2%}; {tested.reason}"
-            return replace(tested, status="inconclusive", reason=reason)
-        return tested
+        theirs, ours = self.pictures()
+        return judged(theirs, ours, self._limit, self.margins(), level)
+
+
+def judged(
+    wrong: FloatArray, right: FloatArray | Known, limit: float, allowed: Margins, level: float = 1.0
+) -> RungResult:
+    """The rung: the statistics of derivatives (replicates, height, width, 3);  limit, level: as of
+    `statistics.compare`."""
+    exact = right.mean if isinstance(right, Known) else right
+    if not wrong.any() and not exact.any():
+        return RungResult("derivative", "not-comparable", "no pixel changes on either side")
+    seen = max(limit, 2.0 * allowed.image)
+    found = compare(wrong, right, limit=seen, margins=allowed, level=level, signed=True)
+    found = replace(found, name="derivative")
+    if found.status == "agree" and seen > limit:
+        reason = f"what the step adds is not known better than to {seen:.2%}; {found.reason}"
+        return replace(found, status="inconclusive", reason=reason)
+    return found
 
 
 def margins(truncation: FloatArray, size: FloatArray) -> Margins:

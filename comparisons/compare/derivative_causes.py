@@ -118,16 +118,21 @@ class _Hypothesis(NamedTuple):
 
 
 def likeliest(
-    ours: Ours, right: FloatArray, wrong: FloatArray, margins: Margins, at_half_size: Sizes | None
+    ours: Ours | None,
+    right: FloatArray,
+    wrong: FloatArray,
+    margins: Margins,
+    at_half_size: Sizes | None,
 ) -> Cause | None:
     """The first hypothesis that leaves no difference; None if none does.
 
-    right, wrong: replicates of both sides;  at_half_size: None where the candidate cannot be
+    ours: None where there is no scene, and only factors are tried;  right, wrong: replicates of
+    both sides;  at_half_size: None where the candidate cannot be
     rendered again.
     """
     if (found := _factor(right, wrong, margins, at_half_size)) is not None:
         return found
-    for one in _hypotheses(ours, right):
+    for one in () if ours is None else _hypotheses(ours, right):
         try:
             picture = one.make()
         except ReferenceRtError:  # a scene that lacks the parameter, or whose film is too small

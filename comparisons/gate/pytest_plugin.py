@@ -1,14 +1,19 @@
-"""pytest plugin: the fixture `image_gate`, which checks a picture in one line of a test.
+"""pytest plugin: the fixtures `image_gate` and `derivative_gate`, which check a picture, and the
+derivative of one, in one line of a test.
 
     def test_cornell_box(image_gate):
         image_gate(my_renderer("scenes/cornell_box.yaml"), scene="scenes/cornell_box.yaml")
+
+    def test_its_derivative(derivative_gate):
+        derivative_gate(my_gradients(), primal=my_picture, at=0.5)
 
 It imports nothing but pytest until it is used.
 """
 
 import hashlib
+import importlib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -44,13 +49,96 @@ def image_gate(request: pytest.FixtureRequest) -> "ImageGate":
     return ImageGate(request.node, request.config)
 
 
-class ImageGate:
+@pytest.fixture
+def derivative_gate(request: pytest.FixtureRequest) -> "DerivativeGate":
+    """Compares derivatives of pictures: see `DerivativeGate.__call__`."""
+    return DerivativeGate(request.node, request.config)
+
+
+class Gate:
     """The gate for one test; each call has a folder of its own."""
+
+    fixture = "gate"
 
     def __init__(self, node: pytest.Item, config: pytest.Config) -> None:
         self._node, self._root, self._calls = node, config.rootpath, 0
         self._out = self._root / str(config.getoption("--image-gate-out"))
         self._baselines = self._root / str(config.getoption("--image-gate-baselines"))
+
+    def _judge(
+        self,
+        candidate: Any,
+        judged: "Callable[[list[Picture], str], Case]",
+        baseline: str = "",
+    ) -> "Case":
+        """Fail the test unless the case passes that `judged` makes of the pictures, by its name."""
+        __tracebackhide__ = True
+        self._calls += 1
+        missing, failed = "", ""
+        try:
+            importlib.import_module("comparisons.gate.request")
+            from reference_rt.util.errors import ReferenceRtError
+        except ModuleNotFoundError as error:
+            from reference_rt.util.extras import needs
+
+            missing = needs(self.fixture, "compare", error.name)
+        # Failing outside of `except`: pytest would show the handled error, with all its frames.
+        if missing:
+            pytest.fail(missing)
+
+        given: list[tuple[Picture, Path | None]] = []
+        try:
+            folder = self._folder()
+            given = _pictures(candidate, folder)
+            name = self._node.nodeid + (f" [{self._calls}]" if self._calls > 1 else "")
+            case = judged([picture for picture, _ in given], name)
+            passed = self._write(case, folder, baseline)
+        except ReferenceRtError as error:
+            failed = f"{self.fixture}: {error}"
+        if failed:
+            kept, unkept = _kept(given)
+            pytest.fail("\n".join([failed, *kept, *unkept]))
+        self._node.user_properties.append((self.fixture, f"{case.verdict}: {case.reason}"))
+        if not passed:
+            _, unkept = _kept(given)
+            told = _message(case, _relative(folder, self._root), self.fixture)
+            pytest.fail("\n".join([told, *unkept]))
+        return case
+
+    def _folder(self) -> Path:
+        """The folder of this call, the same in each run; outputs of an earlier run are removed.
+        Raises ImageError where it cannot be written."""
+        from reference_rt.util.files import check_writable, discard
+
+        nodeid = self._node.nodeid
+        plain = re.sub(r"[^A-Za-z0-9._-]+", "-", nodeid.rpartition("/")[2]).strip("-.")
+        # Names that differ only in replaced characters must not share a folder.
+        unique = hashlib.sha256(nodeid.encode()).hexdigest()[:8]
+        folder = self._out / f"{plain[:80]}-{unique}-{self._calls}"
+        files = [folder / n for n in ("results.json", "report.html", "case.json", "pictures.exr")]
+        check_writable(*files)
+        for file in files:
+            discard(file)
+        for old in folder.glob("candidate-*.exr"):
+            discard(old)
+        return folder
+
+    def _write(self, case: "Case", folder: Path, baseline: str) -> bool:
+        """Write results.json, for a failure also the page and the pictures; whether it passes."""
+        from comparisons.gate import outputs
+        from comparisons.results.stored_case import write_case
+
+        passed = outputs.code_of(case) == 0
+        outputs.write(case, folder, {"baseline": baseline} if baseline else {}, page=not passed)
+        if not passed:
+            write_case(folder, case)
+        return passed
+
+
+class ImageGate(Gate):
+    """The gate for pictures."""
+
+    fixture = "image_gate"
 
     def __call__(
         self,
@@ -84,26 +172,13 @@ class ImageGate:
         `comparisons.results.case.Case`.
         """
         __tracebackhide__ = True
-        self._calls += 1
-        missing, failed = "", ""
-        try:
+
+        def judged(pictures: "list[Picture]", name: str) -> "Case":
             from comparisons.gate.pictures_in import pictures_of
             from comparisons.gate.request import Request, gated
             from reference_rt.rendering.scene import Scene
-            from reference_rt.util.errors import ReferenceRtError
-        except ModuleNotFoundError as error:
-            from reference_rt.util.extras import needs
 
-            missing = needs("image_gate", "compare", error.name)
-        # Failing outside of `except`: pytest would show the handled error, with all its frames.
-        if missing:
-            pytest.fail(missing)
-
-        given: list[tuple[Picture, Path | None]] = []
-        try:
-            folder = self._folder()
-            given = _pictures(candidate, folder)
-            judge = Request(
+            request = Request(
                 scene=None if scene is None else Scene.load(self._root / scene, defaults),
                 references=() if reference is None else pictures_of(reference),
                 variance=None if variance is None else Path(variance),
@@ -114,49 +189,62 @@ class ImageGate:
                 tolerance=tolerance,
                 tone_curve=tone_curve,
                 rim=rim,
-                name=self._node.nodeid + (f" [{self._calls}]" if self._calls > 1 else ""),
+                name=name,
             )
-            case = gated(judge, [picture for picture, _ in given])
-            passed = self._write(case, folder, baseline)
-        except ReferenceRtError as error:
-            failed = f"image_gate: {error}"
-        if failed:
-            kept, unkept = _kept(given)
-            pytest.fail("\n".join([failed, *kept, *unkept]))
-        self._node.user_properties.append(("image_gate", f"{case.verdict}: {case.reason}"))
-        if not passed:
-            _, unkept = _kept(given)
-            pytest.fail("\n".join([_message(case, _relative(folder, self._root)), *unkept]))
-        return case
+            return gated(request, pictures)
 
-    def _folder(self) -> Path:
-        """The folder of this call, the same in each run; outputs of an earlier run are removed.
-        Raises ImageError where it cannot be written."""
-        from reference_rt.util.files import check_writable, discard
+        return self._judge(candidate, judged, baseline)
 
-        nodeid = self._node.nodeid
-        plain = re.sub(r"[^A-Za-z0-9._-]+", "-", nodeid.rpartition("/")[2]).strip("-.")
-        # Names that differ only in replaced characters must not share a folder.
-        unique = hashlib.sha256(nodeid.encode()).hexdigest()[:8]
-        folder = self._out / f"{plain[:80]}-{unique}-{self._calls}"
-        files = [folder / n for n in ("results.json", "report.html", "case.json", "pictures.exr")]
-        check_writable(*files)
-        for file in files:
-            discard(file)
-        for old in folder.glob("candidate-*.exr"):
-            discard(old)
-        return folder
 
-    def _write(self, case: "Case", folder: Path, baseline: str) -> bool:
-        """Write results.json, for a failure also the page and the pictures; whether it passes."""
-        from comparisons.gate import outputs
-        from comparisons.results.stored_case import write_case
+class DerivativeGate(Gate):
+    """The gate for derivatives."""
 
-        passed = outputs.code_of(case) == 0
-        outputs.write(case, folder, {"baseline": baseline} if baseline else {}, page=not passed)
-        if not passed:
-            write_case(folder, case)
-        return passed
+    fixture = "derivative_gate"
+
+    def __call__(
+        self,
+        candidate: Any,
+        *,
+        scene: str | Path | None = None,
+        parameter: str = "",
+        closed: Any = None,
+        primal: "Callable[[float, int], Any] | None" = None,
+        at: float | None = None,
+        step: float | None = None,
+        limit: float = 0.005,
+    ) -> "Case":
+        """Fail the test unless `candidate` is the derivative of a picture by a parameter.
+
+        candidate: derivatives (replicates, height, width, 3), two or more, or files of these, in
+        W/sr/m2 per unit of the parameter.  They are compared with one of these: differences of our
+        pictures of a scene, a file relative to the root folder, by a parameter of it, which is a
+        path such as materials.red.reflectance;  closed: the exact derivative (height, width, 3);
+        primal: the renderer's own picture (height, width, 3), a function of the parameter's value
+        and of a seed, which is differenced about `at`.  step: of the differences;  limit: the
+        smallest bias of the image mean, over the derivative's size, that must be detectable.
+
+        Derivatives that are too noisy to tell fail too.  Returns the
+        `comparisons.results.case.Case`.
+        """
+        __tracebackhide__ = True
+
+        def judged(pictures: "list[Picture]", name: str) -> "Case":
+            from comparisons.gate.derivative import Asked, gate_derivative
+            from reference_rt.rendering.scene import Scene
+
+            asked = Asked(
+                scene=None if scene is None else Scene.load(self._root / scene),
+                parameter=parameter,
+                closed=closed,
+                primal=primal,
+                at=at,
+                step=step,
+                limit=limit,
+                name=name,
+            )
+            return gate_derivative([picture.radiance for picture in pictures], asked)
+
+        return self._judge(candidate, judged)
 
 
 def _pictures(given: Any, folder: Path) -> "list[tuple[Picture, Path | None]]":
@@ -204,12 +292,12 @@ def _relative(path: Path, root: Path) -> Path:
     return path.relative_to(root) if path.is_relative_to(root) else path
 
 
-def _message(case: "Case", folder: Path) -> str:
+def _message(case: "Case", folder: Path, fixture: str) -> str:
     """The message of a failed test: the headline, cause, reason, numbers, and paths of the
     outputs."""
     from comparisons.results.headline import headline
 
-    lines = [f"image_gate: {case.verdict}: {headline(case)}"]
+    lines = [f"{fixture}: {case.verdict}: {headline(case)}"]
     if case.cause is not None:
         lines.append(f"{case.cause.name}: {case.cause.evidence}")
     lines.append(case.reason)
