@@ -11,7 +11,7 @@
 - A scene: Scene, Film, json_schema; SceneError, SceneWarning
 - Its parts: a class for each type of shape (Sphere, Mesh, ...), solid (Union, ...), material
   (Diffuse, ...), texture, light, camera, integrator, sampler and filter
-- Pictures: render, Picture, read_image, ImageError
+- Pictures: render, Picture, read_image, ImageError; by a parameter: derivative, Derivative
 - Queries: query (array queries, the methods of Scene), transform (affine maps), textbook (the
   textbook's intersection methods), build_tables, SceneTables
 - Other errors: ReferenceRtError, ReferenceUnavailableError, UsageError

@@ -194,7 +194,7 @@ def disk_under_sky(radius: float = 0.5) -> Expected:
 @derivative(
     "shapes[1].transform[0].scale", disk_under_sky, "radius",
     r"$-\rho L a (\frac{1}{S} + \frac{(z - 2 a^2) (z - 2 r^2)}{S^3})$, $z = h^2 + r^2 + a^2$, "
-    r"$S^2 = z^2 - 4 a^2 r^2$", spp=32768, step=1 / 32
+    r"$S^2 = z^2 - 4 a^2 r^2$", spp=8192, step=1 / 32
 )  # fmt: skip
 def disk_under_sky_by_radius() -> Expected:
     """Only the disk's edge changes what the floor sees: the sky's radiance and the disk's are
@@ -204,12 +204,12 @@ def disk_under_sky_by_radius() -> Expected:
 
 def _below_disk(irradiance: Callable[[FloatArray], FloatArray]) -> Expected:
     half = np.tan(np.radians(30.0))
-    view = View((0, 0, 0.9), (0, 0, 0), (0, 1, 0), (half, half), (16, 16))
+    view = View((0, 0, 0.9), (0, 0, 0), (0, 1, 0), (half, half), (32, 32))
 
     def radiance(x: FloatArray, y: FloatArray) -> FloatArray:
         return irradiance(0.81 * (1.0 / view.rays(x, y)[..., 2] ** 2 - 1.0))
 
-    return Expected(pixel_means(radiance, 16, 16) * 0.8 / np.pi)
+    return Expected(pixel_means(radiance, 32, 32) * 0.8 / np.pi)
 
 
 @case(r"$\rho L (1 - F_{screen} + F_{hole})$, form factors by Lambert", "the sky through a hole")
