@@ -171,6 +171,10 @@ class Moving:
                     self._parameters[key] = _plus(self._at[key], speed, theta)
                 self._parameters.update()
                 yield theta
+            except Exception as error:
+                if type(error) is not Exception:  # as its integrators raise what they refuse
+                    raise
+                raise NoCounterpartError(f"Mitsuba refuses: {error}") from None
             finally:
                 # A scene that stays attached spoils the derivatives of the next one.
                 for key, value in self._at.items():

@@ -109,7 +109,34 @@ def our_derivative(case: Derivative, scene: Scene, threads: int | None = None) -
     return derivative(scene, case.parameter, spp=case.spp, step=case.step, threads=threads)
 
 
-DIFFERENTIATED: dict[str, Differentiated] = {"ours": our_derivative}
+@dataclass(frozen=True)
+class _Exact:
+    """Replicates that no step adds anything to."""
+
+    replicates: FloatArray
+
+    @property
+    def truncation(self) -> FloatArray:
+        return np.zeros(self.replicates.shape[1:])
+
+
+def mitsubas_derivative(case: Derivative, scene: Scene, threads: int | None = None) -> Estimate:
+    """By forward mode of `prb_projective`, which sees edges that move, without guiding: of its two
+    ways one is wrong (`grid`), and one takes seconds for a picture (`octree`)."""
+    from comparisons.mitsuba.backend import mitsuba
+    from comparisons.translator.derivative import Differentiator, Moving
+
+    plugin = Differentiator("prb_projective", "none").of(scene)
+    moving = Moving(scene, case.parameter)
+    integrator = mitsuba().load_dict(plugin)
+    spp = max(1, (case.spp or scene.resolved_sampler.spp) // REPLICATES)
+    return _Exact(np.stack([moving.forward(integrator, spp, k) for k in range(REPLICATES)]))
+
+
+DIFFERENTIATED: dict[str, Differentiated] = {
+    "ours": our_derivative,
+    "mitsuba": mitsubas_derivative,
+}
 
 
 def derivative_rows(
