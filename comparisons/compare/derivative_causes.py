@@ -53,6 +53,10 @@ UNITS = {
 NEAR = 0.01
 """How near a factor must be to one of UNITS, and its standard error to nothing."""
 
+MOST = 16
+"""Replicates of a hypothesis, of the scene's samples each: it need not be seen as exactly as the
+difference."""
+
 Sizes = Callable[[], tuple[FloatArray, FloatArray]]
 """Replicates of ours and of the candidate with half as many pixels along each side."""
 
@@ -65,7 +69,8 @@ class Ours:
     ) -> None:
         self.scene, self.path, self.step, self.threads = scene, path, step, threads
         self.times = 1
-        """As many samples as the scene has, times this."""
+        """As many samples as the scene has, times this, in what is compared; hypotheses and pilots
+        have the scene's."""
         self._truncations: list[tuple[int, FloatArray]] = []
         self._said: list[str] = []
 
@@ -86,20 +91,22 @@ class Ours:
         made = []
         for k in range(0, count, REPLICATES):  # so many have one estimate of the truncation
             part = min(REPLICATES, count - k)
-            found = self._derivative(self.scene, part, begun + k, self.step)
+            found = self._derivative(self.scene, part, begun + k, self.step, self.times)
             self._truncations.append((part, found.truncation))
             made.append(found.replicates)
         return np.concatenate(made)
 
     def of(self, scene: Scene, count: int, step: float | None = None, seed: int = 0) -> FloatArray:
         """Those of another scene, or with another step."""
-        return self._derivative(scene, count, seed, step or self.step).replicates
+        return self._derivative(scene, count, seed, step or self.step, 1).replicates
 
-    def _derivative(self, scene: Scene, count: int, begun: int, step: float | None) -> Derivative:
+    def _derivative(
+        self, scene: Scene, count: int, begun: int, step: float | None, times: int
+    ) -> Derivative:
         return derivative(
             scene,
             self.path,
-            spp=self.times * scene.resolved_sampler.spp * count,
+            spp=times * scene.resolved_sampler.spp * count,
             seed=SEED + begun,
             replicates=count,
             step=step,
@@ -217,7 +224,7 @@ def factor_of(right: FloatArray, wrong: FloatArray) -> tuple[float, float]:
 
 def _hypotheses(ours: Ours, right: FloatArray) -> Iterator[_Hypothesis]:
     """The cheapest first."""
-    scene, count = ours.scene, len(right)
+    scene, count = ours.scene, min(len(right), MOST)
     scale = parameter(scene, ours.path).scale
     yield _Hypothesis(
         "edges that move are left out",
