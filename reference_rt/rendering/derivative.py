@@ -223,9 +223,7 @@ def derivative(
     """
     began = time.perf_counter()
     if not isinstance(scene, BuiltScene):
-        from reference_rt.rendering.scene import Scene
-
-        scene = Scene.load(os.fspath(scene))
+        scene = BuiltScene.load(os.fspath(scene))
     scene = _with_late_roulette(with_settings(scene, spp=spp, size=size, seed=seed))
     sampler = scene.resolved_sampler
     first = getattr(sampler, "seed", None)
