@@ -94,7 +94,7 @@ def compare(
     ] = None,
     step: Annotated[
         float | None,
-        typer.Option(help="Of our differences, in the parameter's unit. (default: 1/64 of it)"),
+        typer.Option(help="Of our differences, in the parameter's unit. (default: 1/256 of it)"),
     ] = None,
 ) -> None:
     """Render scenes with reference_rt and with Mitsuba, and report whether they agree.
