@@ -12,6 +12,10 @@
 
 `gate` takes the pictures of another renderer, and needs no Mitsuba; see
 `comparisons.gate.request.gate`.
+
+    case = comparisons.gate_derivative(derivatives, primal=my_picture, at=0.5)
+
+`gate_derivative` takes derivatives of pictures; see `comparisons.gate.derivative`.
 """
 
 import importlib
@@ -19,7 +23,9 @@ from typing import Any
 
 
 def __getattr__(name: str) -> Any:
-    """Import `compare` and `gate` when they are first used: importing Mitsuba takes a second."""
+    """Import what is named when it is first used: importing Mitsuba takes a second."""
+    if name == "gate_derivative":
+        return importlib.import_module("comparisons.gate.derivative").gate_derivative
     if name not in ("compare", "gate"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return importlib.import_module(f"comparisons.{name}")

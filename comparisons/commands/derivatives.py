@@ -110,7 +110,7 @@ def derivative_gate(
     with compare_extra("the gate"):
         from comparisons.commands.outputs import Outputs
         from comparisons.gate import outputs
-        from comparisons.gate.derivative import Asked, gate_derivative
+        from comparisons.gate.derivative import Asked, case_of
         from comparisons.gate.pictures_in import read_candidate, read_candidates
         from comparisons.results.headline import headline
     from reference_rt.cli.options import adjusted
@@ -132,7 +132,7 @@ def derivative_gate(
         threads=threads,
         name=printable(scene.stem if scene else reference[0].stem),
     )
-    case = gate_derivative(pictures, asked)
+    case = case_of(pictures, asked)
     case = replace(case, again=shlex.join(["reference-rt", *sys.argv[1:]]))
     facts = {"limit": limit, "candidates": [str(path) for path in candidates]}
     results, report = outputs.write(case, out, facts)

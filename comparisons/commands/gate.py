@@ -156,7 +156,7 @@ def gate(
     ] = None,
     step: Annotated[
         float | None,
-        typer.Option(help="Of our differences, in the unit of --derivative. (default: 1/256 of it)"),
+        typer.Option(help="Of our differences, in its unit. (default: 1/256 of it)"),
     ] = None,
     rim: Annotated[
         int,

@@ -1,6 +1,7 @@
 """Derivative pictures of any differentiable renderer, against differences of ours, a closed form,
 or differences of the renderer's own pictures."""
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -9,6 +10,7 @@ import numpy as np
 
 from comparisons.compare.derivative import judged, margins
 from comparisons.compare.derivative_causes import Ours, likeliest
+from comparisons.compare.notebook import NotebookCase
 from comparisons.gate.pictures_in import Picture, pictures_of
 from comparisons.gate.reference import check_sizes, size_of
 from comparisons.results.case import Case, Images, RungResult, decide
@@ -16,16 +18,13 @@ from comparisons.statistics import Known, standard_error
 from comparisons.statistics.cells import Margins
 from comparisons.statistics.sides import side_of
 from reference_rt.core.arrays import FloatArray
-from reference_rt.rendering.derivative import REPLICATES
+from reference_rt.rendering.derivative import REPLICATES, STEP
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ImageError, UsageError
 
 Primal = Callable[[float, int], Any]
 """A renderer's own picture (height, width, 3), by the parameter's value and a seed.  The same seed
 at two values must mean the same random numbers: else the difference is of noise."""
-
-PRIMAL_STEP = 2.0**-6
-"""Of differences of the renderer's own pictures, in parts of the value, as of ours."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,7 @@ class _Right:
     ours: Ours | None = field(default=None, compare=False)
 
 
-def gate_derivative(candidates: Any, asked: Asked) -> Case:
+def case_of(candidates: Any, asked: Asked) -> Case:
     """The verdict on derivative pictures.
 
     candidates: (replicates, height, width, 3), or files, or a list of these, in W/sr/m2 per unit of
@@ -114,6 +113,36 @@ def gate_derivative(candidates: Any, asked: Asked) -> Case:
     )
 
 
+def gate_derivative(
+    pictures: Any,
+    *,
+    scene: Scene | str | os.PathLike[str] | None = None,
+    parameter: str = "",
+    closed: FloatArray | None = None,
+    primal: Primal | None = None,
+    at: float | None = None,
+    step: float | None = None,
+    limit: float = 0.005,
+    threads: int | None = None,
+) -> NotebookCase:
+    """Judge derivatives of pictures by another renderer; Mitsuba takes no part.
+
+    pictures: derivatives (replicates, height, width, 3), two or more, or files of these, in
+    W/sr/m2 per unit of the parameter.  They are compared with differences of our pictures of
+    `scene`, or a scene's file, by `parameter`, a path such as materials.red.reflectance; or with
+    `closed`, the exact derivative (height, width, 3); or with differences of the renderer's own
+    pictures about `at`: primal(value, seed) gives one (height, width, 3), with the same random
+    numbers for the same seed.  step: of the differences, in the parameter's unit;  limit: the
+    smallest bias of the image mean, over the derivative's size, that must be detectable.
+
+    The case has `verdict`, `reason`, `cause` and `write_page`.  Raises ImageError, SceneError,
+    UsageError.
+    """
+    known = scene if scene is None or isinstance(scene, Scene) else Scene.load(os.fspath(scene))
+    asked = Asked(known, parameter, closed, primal, at, step, limit, threads)
+    return NotebookCase.of(case_of(pictures, asked))
+
+
 def _right(asked: Asked, candidates: Sequence[Picture]) -> _Right:
     """Raises SceneError, UsageError, ImageError."""
     if asked.closed is not None:
@@ -133,7 +162,7 @@ def _of_primal(asked: Asked) -> _Right:
     """Central differences of the caller's pictures, and of one pair at twice the step."""
     assert asked.primal is not None
     assert asked.at is not None
-    step = asked.step or PRIMAL_STEP * (abs(asked.at) or 1.0)
+    step = asked.step or STEP * (abs(asked.at) or 1.0)
 
     def difference(seed: int, h: float) -> FloatArray:
         pair = [np.asarray(asked.primal(asked.at + x, seed), np.float64) for x in (h, -h)]

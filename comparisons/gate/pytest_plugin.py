@@ -229,7 +229,7 @@ class DerivativeGate(Gate):
         __tracebackhide__ = True
 
         def judged(pictures: "list[Picture]", name: str) -> "Case":
-            from comparisons.gate.derivative import Asked, gate_derivative
+            from comparisons.gate.derivative import Asked, case_of
             from reference_rt.rendering.scene import Scene
 
             asked = Asked(
@@ -242,7 +242,7 @@ class DerivativeGate(Gate):
                 limit=limit,
                 name=name,
             )
-            return gate_derivative([picture.radiance for picture in pictures], asked)
+            return case_of([picture.radiance for picture in pictures], asked)
 
         return self._judge(candidate, judged)
 

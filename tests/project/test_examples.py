@@ -68,6 +68,12 @@ def test_two_samplers(run):
         assert float(sobol.strip("%")) < float(independent.strip("%"))
 
 
+def test_gradient(run):
+    right, wrong = run("gradient").splitlines()
+    assert "whole: agree" in right
+    assert "without the distance: differ" in wrong
+
+
 def test_lens(run):
     near, exact = re.findall(r"= (\d\.\d+); by .* (\d\.\d+)", run("lens"))[0]
     assert abs(float(near) - float(exact)) < 1e-3
