@@ -12,15 +12,15 @@ import numpy as np
 
 from comparisons import gate_derivative
 
-SIZE, SPP, HEIGHT = 16, 16, 1.5
+SIZE, SPP, HEIGHT = 16, 64, 1.5
 ALBEDO, INTENSITY = 0.7, np.array([8.0, 6.0, 3.0])
 
 
 def distances(height: float, seed: int) -> np.ndarray:
     """From the lamp to random points of each pixel of the floor, (SPP, SIZE, SIZE)."""
     rng = np.random.default_rng(seed)
-    y, x = np.mgrid[0:SIZE, 0:SIZE] + rng.random((SPP, 2, SIZE, SIZE)).swapaxes(0, 1)
-    across, along = (4.0 * v / SIZE - 2.0 for v in (x, y))
+    y, x = np.mgrid[0:SIZE, 0:SIZE]
+    across, along = (4.0 * (v + rng.random((SPP, SIZE, SIZE))) / SIZE - 2.0 for v in (x, y))
     return np.sqrt(across**2 + along**2 + height**2)
 
 

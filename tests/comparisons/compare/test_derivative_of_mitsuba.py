@@ -1,0 +1,165 @@
+"""Mitsuba's derivatives: which of its numbers move with a parameter of ours, and the verdicts."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import invoke
+
+from comparisons.compare.budget import Asked, usual
+from comparisons.compare.compare import Subject, compare_scene
+from comparisons.mitsuba.backend import LLVM, backend, mitsuba
+from comparisons.renderers import NoCounterpartError
+from comparisons.suites import derivatives as suite
+from comparisons.translator.derivative import DIFFERENTIATORS, Differentiator, Moving
+from reference_rt import Scene
+
+ROOT = Path(__file__).parents[3]
+
+needs_llvm = pytest.mark.skipif(backend().variant != LLVM, reason="no LLVM for Mitsuba")
+
+DISK = """
+film: {width: 8, height: 8}
+camera: {type: perspective, eye: [0, 0, 0.9], target: [0, 0, 0], up: [0, 1, 0], fov: 60}
+integrator: {type: direct}
+sampler: {type: sobol, spp: 64}
+materials:
+  floor: {type: diffuse, reflectance: 0.8}
+  black: {type: diffuse, reflectance: 0}
+shapes:
+  - {type: rectangle, material: floor, transform: [{scale: 50}]}
+  - {type: disk, material: black, transform: [{scale: 0.5}, {translate: [0, 0, 1]}]}
+lights: [{type: constant, radiance: 1}]
+"""
+"""A floor under a black disk, which hides a part of the sky."""
+
+
+def case(parameter: str, text: str = DISK, limit: float = 0.05, **asked):
+    mitsuba()
+    budget = usual(64, 8, 20, limit=limit, derivative=Asked(parameter=parameter, **asked))
+    return compare_scene(Subject(Scene.parse(text)), budget, lambda line: None)
+
+
+@needs_llvm
+def test_a_reflectance_agrees_in_both_modes():
+    found = case("materials.floor.reflectance")
+    assert found.verdict == "agree"
+    assert [rung.status for rung in found.rungs] == ["agree", "agree"]
+    assert found.is_signed
+
+
+@needs_llvm
+def test_edges_that_move_are_left_out_by_prb():
+    found = case("shapes[1].transform[0].scale")
+    assert found.verdict == "differ"
+    assert found.cause is not None
+    assert found.cause.name == "edges that move are left out"
+
+
+@needs_llvm
+def test_a_fault_in_what_moves_is_seen(monkeypatch):
+    """Of what the translation gives: 2 % faster, and the wrong way."""
+    true = Moving.__init__
+
+    def planted(factor):
+        def faulty(self, scene, path):
+            true(self, scene, path)
+            self._speeds = {key: factor * speed for key, speed in self._speeds.items()}
+
+        monkeypatch.setattr(Moving, "__init__", faulty)
+        return case("materials.floor.reflectance", limit=0.005)
+
+    assert planted(1.02).cause.name == "a constant factor"
+    assert planted(-1.0).cause.name == "the sign"
+
+
+@needs_llvm
+def test_modes_that_differ_are_seen(monkeypatch):
+    true = Moving.reverse
+    monkeypatch.setattr(Moving, "reverse", lambda self, *given: 1.001 * true(self, *given))
+    found = case("materials.floor.reflectance")
+    assert found.verdict == "differ"
+    assert found.reason.startswith("adjoint: the two modes differ")
+
+
+SPEEDS = {
+    "materials.floor.reflectance": {"shape_0.bsdf.reflectance.value": [1, 1, 1]},
+    "materials.floor.reflectance[1]": {"shape_0.bsdf.reflectance.value": [0, 1, 0]},
+    "lights[0].radiance": {"light_0.radiance.value": [1, 1, 1]},
+    "shapes[1].transform[1].translate[2]": {
+        "shape_1.to_world": [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0]
+    },
+    "shapes[1].transform[0].scale": {
+        "shape_1.to_world": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0]
+    },
+}
+"""Mitsuba's numbers that move, per unit of ours."""
+
+
+@needs_llvm
+@pytest.mark.parametrize("path", SPEEDS)
+def test_numbers_of_mitsuba_move_as_ours(path):
+    """float32 rounds numbers up to 50 to 2^-19, and a step is 2^-9 at least: 2^-10 of a unit."""
+    mitsuba()
+    moving = Moving(Scene.parse(DISK), path)
+    assert set(moving.moved) == set(SPEEDS[path])
+    for key, speed in SPEEDS[path].items():
+        np.testing.assert_allclose(np.ravel(moving._speeds[key]), speed, atol=2.0**-10)
+
+
+@needs_llvm
+@pytest.mark.parametrize(
+    ("path", "old", "new", "reason"),
+    [
+        ("camera.fov", "", "", "Mitsuba has no derivative by sensor.x_fov"),
+        ("camera.eye[0]", "{type: direct}", "{type: ray_cast}", "pictures by 'ray_cast'"),
+        ("camera.eye[0]", "{type: direct}", "{type: whitted}", "pictures by 'whitted'"),
+    ],
+)
+def test_what_mitsuba_lacks_is_said(path, old, new, reason):
+    found = case(path, DISK.replace(old, new) if old else DISK)
+    assert found.verdict == "not-comparable"
+    assert reason in found.reason
+
+
+def test_direct_projective_takes_direct_light_alone():
+    deep = Scene.parse(DISK.replace("{type: direct}", "{type: path, max_depth: 5}"))
+    with pytest.raises(NoCounterpartError, match="direct light alone"):
+        Differentiator("direct_projective").of(deep)
+    with pytest.raises(NoCounterpartError, match="samples no edges"):
+        Differentiator("prb", "grid").of(deep)
+    assert len(DIFFERENTIATORS) == 10
+
+
+def test_every_parameter_of_the_suite_is_one():
+    asked = suite.load()
+    planned = suite.plan(asked, ROOT / "scenes", DIFFERENTIATORS[:1])
+    assert len(planned.work) == sum(map(len, asked.parameters.values())) >= 40
+    assert len({work.name for work in planned.work}) == len(planned.work)
+
+
+@needs_llvm
+def test_the_command(tmp_path):
+    """The case, its page, and a parameter that is none, before any work."""
+    path = tmp_path / "disk.yaml"
+    path.write_text(DISK)
+    options = [
+        "compare",
+        str(path),
+        "--spp",
+        "64",
+        "--time-limit",
+        "5s",
+        "-o",
+        str(tmp_path / "out"),
+    ]
+    asked = ["--derivative", "shapes[1].transform[0].scale"]
+    assert invoke(*options, *asked).exit_code == 1
+    (stored,) = json.loads((tmp_path / "out/results.json").read_text())["cases"]
+    assert stored["cause"]["name"] == "edges that move are left out"
+    assert "blue is −" in (tmp_path / "out/report.html").read_text()
+    refused = invoke(*options, "--derivative", "shapes[1].radius")
+    assert refused.exit_code == 2
+    assert "expected such as" in refused.stderr
+    assert invoke(*options, "--guiding", "none").exit_code == 2
