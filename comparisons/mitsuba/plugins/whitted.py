@@ -288,15 +288,16 @@ def register(mi: Any) -> None:
                 self.scene = None
 
         def prepare(self, scene: PlainScene) -> None:
-            """Collect the lights, once per scene."""
+            """Collect the lights, once per scene.  Scalar variants may come here in several
+            threads at once: the scene is what says that all is there, and comes last."""
             if self.scene is not scene.mi_scene:
-                self.scene = scene.mi_scene
                 self.lights = light_points(mi, scene, self.unlit, self.boxes)
                 delta = mi.EmitterFlags.Delta
                 self.points = [e for e in scene.emitters() if mi.has_flag(e.flags(), delta)]
                 self.cylinders = scene.cylinders()
                 self.perfect = [k for k in self.components if self.has_perfect(scene, k)]
                 self.reach = scene.reach()
+                self.scene = scene.mi_scene
 
         def sample(
             self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True
