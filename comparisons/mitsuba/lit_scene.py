@@ -9,6 +9,7 @@ all crossings of each ray in float64.
 Works in scalar variants and in wide ones, where all rays are traced together.
 """
 
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 from comparisons.geometry import affine
@@ -36,8 +37,10 @@ class LitScene(PlainScene):
     mi_scene: Mitsuba's scene without the solids, which has the camera and all sampled lights.
     """
 
-    def __init__(self, mi_scene: Any, solids: tuple[SolidCounterpart, ...]) -> None:
-        super().__init__(mitsuba(), mi_scene)
+    def __init__(
+        self, mi_scene: Any, solids: tuple[SolidCounterpart, ...], planes: Collection[str] = ()
+    ) -> None:
+        super().__init__(mitsuba(), mi_scene, planes)
         self._solids = [_Solid(solid) for solid in solids]
 
     def ray_test(self, ray: Any, active: Any = True) -> Any:

@@ -53,8 +53,8 @@ class Outcome(NamedTuple):
     unexplained: indices of those that differ;  ours, theirs (m, 3): their values in W/sr/m²;
     explained: indices of those that the arbiter explains;  unaimed: of those among them whose
     shadow rays miss the lamp, or meet another surface in its place, by geometry;  max_error,
-    max_ratio: the largest error, and error over bound, of the rest;  ratio, cosine (m,): of rays that differ and
-    are lit on both sides, our value over Mitsuba's, and the cosine at the surface.
+    max_ratio: the largest error, and error over bound, of the rest;  ratio, cosine (m,): of rays
+    that differ and are lit on both sides, our value over Mitsuba's, and the cosine at the surface.
     """
 
     rays: int

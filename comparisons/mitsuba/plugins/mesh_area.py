@@ -62,7 +62,8 @@ def register(mi: Any) -> None:
                     name: (mi.UInt32 if name == "faces" else mi.Float)(array.ravel())
                     for name, array in arrays.items()
                 }
-            self.flips, self.arrays, self.area = shape.has_flipped_normals(), arrays, float(areas.sum())
+            self.flips = shape.has_flipped_normals()
+            self.arrays, self.area = arrays, float(areas.sum())
             self.triangles = mi.DiscreteDistribution(areas.astype(np.float32))
 
         def row(self, kind: Any, name: str, index: Any, active: Any) -> Any:

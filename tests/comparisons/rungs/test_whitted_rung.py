@@ -273,3 +273,49 @@ lights: [{type: point, position: [1, 3, 4], intensity: 9}]
     with scalar():
         found = whitted(scene, scene.tables, load(scene))
     assert found.status in ("agree", "reference-limited"), found.reason
+
+
+FLATTENED = """
+camera: {type: pinhole, eye: [-0.8, 4.8, 2.2], target: [0.2, 0.3, -0.3], film_width: 1.05,
+  film_distance: 1}
+film: {width: 16, height: 12}
+shapes:
+  - type: cylinder
+    z_min: -0.3
+    z_max: 1.2
+    radius: 0.8
+    transform:
+      - matrix: [[0.93, -0.68, -0.2, 0], [0.12, 0.43, -0.24, 0.1], [-0.38, -0.41, 1.23, -0.1]]
+      - {rotate: {axis: [0, 0, 1], degrees: -129}}
+      - {translate: [0.2, 1.7, 0.2]}
+lights: [{type: point, position: [-1.5, 5.5, 0.7], intensity: 11}]
+"""
+"""A sheared cylinder is an instance in Mitsuba, whose rays must not meet the cylinder again."""
+
+
+BESIDE_A_WALL = """
+camera: {type: orthographic, eye: [-3, 0, 0.3], target: [-0.001, 0, 0], up: [0, 0, 1],
+  width: 4.0e-4}
+film: {width: 20, height: 15}
+integrator: {type: whitted}
+materials: {floor: {type: mirror}, wall: {type: diffuse}}
+shapes:
+  - {type: rectangle, material: floor}
+  - {type: rectangle, material: wall, transform: [{scale: 0.004}, {rotate: {axis: [0, 1, 0],
+     degrees: -90}}]}
+  - {type: plane, transform: [{translate: [0, 0, -1]}]}
+lights: [{type: point, position: [-2, 0.3, 1], intensity: 9}, {type: constant, radiance: 0.1}]
+"""
+"""Rays that leave the mirror at a slope of a tenth meet a wall within 0.003, which some pass if
+they start Mitsuba's ray epsilon off it.  The plane is a mesh a million large."""
+
+
+@pytest.mark.parametrize("scene", [FLATTENED, BESIDE_A_WALL], ids=["flattened", "beside a wall"])
+def test_where_rays_start(scene: str) -> None:
+    """No pixel needs the arbiter, which would not know of an edge there."""
+    parsed = Scene.parse(scene)
+    with scalar():
+        found = whitted(parsed, parsed.tables, load(parsed), 200)
+    assert found.status == "agree", found.reason
+    assert found.numbers["explained"] == 0
+    assert found.numbers["lit"] > 15
