@@ -60,6 +60,7 @@ class LitScene(PlainScene):
             if dr.any(met):
                 si = solid.interaction(ray, crossing, si)
                 of_solid |= met
+        dr.eval(si, of_solid)
         return si, of_solid
 
     def all_scenes(self) -> list[Any]:
@@ -109,7 +110,10 @@ class _Solid:
         whole: list[Any] = [
             dr.select(each, column, 0.0) for column in (ray.o, ray.d, mi.Float(limit))
         ]
-        rows: Any = dr.compress(active & each)
+        active &= each
+        # In one go: each column alone would take a kernel that traces all that led to it again.
+        dr.eval(whole, active)
+        rows: Any = dr.compress(active)
         none = dr.full(mi.UInt32, NONE, n)
         result = _Found(none, dr.zeros(mi.Float, n), dr.zeros(mi.Mask, n))
         if dr.width(rows) == 0:
