@@ -79,7 +79,12 @@ def whitted(
     }
     numbers["tells"] = arbiter.is_enough(numbers["lit_right"], numbers["lit"])
     numbers["explained_elsewhere"] = too_many_elsewhere(
-        scene, tables, counterpart, rays.rows(outliers[settled & ~of_lamps]), len(rays.o)
+        scene,
+        tables,
+        counterpart,
+        rays.rows(outliers[settled & ~of_lamps]),
+        len(rays.o),
+        trees.following,
     )
     if len(unexplained):
         numbers["elsewhere"] = elsewhere(scene, tables, counterpart, rays.rows(unexplained))
@@ -133,6 +138,11 @@ class Trees:
     def of_ours(self, rays: Rays) -> FloatArray:
         """Our radiance (n, 3)."""
         return self._ours_along(rays.o, rays.d)
+
+    def following(self, rays: Rays) -> tuple[IntArray, Rays]:
+        """All rays of Mitsuba's trees of some rays, and the row of each: see `resolution`."""
+        nodes = self._theirs_at.nodes(rays)
+        return nodes.row, nodes.rays
 
     def compare(self, rays: Rays) -> Compared:
         """Trace the trees of rays that are exact in float32."""
