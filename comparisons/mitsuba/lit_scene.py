@@ -180,6 +180,8 @@ class _Solid:
         mi = mitsuba()
         for k, operand in enumerate(self.operands):
             mine = crossing.operand == k
+            if not dr.any(mine):
+                continue
             start = dr.select(mine, crossing.start, 0.0)
             near = mi.Ray3f(ray.o + ray.d * start, ray.d, ray.time, ray.wavelengths)
             other = operand.mi_scene.ray_intersect(near, mine)
