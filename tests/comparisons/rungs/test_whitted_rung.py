@@ -319,3 +319,28 @@ def test_where_rays_start(scene: str) -> None:
     assert found.status == "agree", found.reason
     assert found.numbers["explained"] == 0
     assert found.numbers["lit"] > 15
+
+
+ON_THE_FLOOR = """
+camera: {type: perspective, eye: [2.2, 2.6, 5.4], target: [0, 0.5, 0], fov: 20}
+film: {width: 24, height: 18}
+integrator: {type: whitted}
+materials: {glass: {type: dielectric}, felt: {type: diffuse, reflectance: [0.1, 0.4, 0.2]}}
+shapes:
+  - {type: plane, material: felt, transform: [{rotate: {axis: [1, 0, 0], degrees: -90}}]}
+  - {type: box, material: glass, transform: [{scale: 0.7}, {rotate: {axis: [0, 1, 0],
+     degrees: 25}}, {translate: [0, 0.7, 0]}]}
+lights: [{type: point, position: [-2, 5, 4], intensity: 60}, {type: constant, radiance: 0.4}]
+"""
+
+
+def test_glass_that_stands_on_the_floor() -> None:
+    """Of a ray that leaves the glass at the bottom float32 decides whether it meets the floor: the
+    arbiter's rays show it, and the tree says why."""
+    scene = Scene.parse(ON_THE_FLOOR)
+    with scalar():
+        found = whitted(scene, scene.tables, load(scene), 200)
+        wrong = load(Scene.parse(ON_THE_FLOOR.replace("[0.1, 0.4, 0.2]", "[0.1, 0.4, 0.3]")))
+        faulty = whitted(scene, scene.tables, wrong, 200)
+    assert found.status in ("agree", "reference-limited"), found.reason
+    assert faulty.status == "differ"
