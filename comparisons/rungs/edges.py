@@ -252,9 +252,10 @@ def edges_rung(
     wrong[tips], outside[tips] = False, 0.0
     looks = (edges.look, *edges.beside)
     if edges.samples is not None and edges.beside:
-        k = np.flatnonzero(wrong)
-        k = k[are_seen(looks, law.beyond, edges.samples, (row[k], column[k]), values[k])]
-        wrong[k], outside[k] = False, 0.0
+        rest = np.flatnonzero(wrong)
+        at_rest = row[rest], column[rest]
+        rest = rest[are_seen(looks, law.beyond, edges.samples, at_rest, values[rest])]
+        wrong[rest], outside[rest] = False, 0.0
     numbers = {
         "pixels": differs.size,
         "chosen": int(chosen.sum()),
