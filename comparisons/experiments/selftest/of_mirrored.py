@@ -137,7 +137,10 @@ OF_TREES = (
     ),
     Mistake(
         "colours of earlier mirrors forgotten", "whitted_depth",
-        {TREE: (("mirrored = weight * branch.reflectance", "mirrored = branch.reflectance"),)},
+        {TREE: (
+            ("mirrored = weight * branch.reflectance", "mirrored = branch.reflectance"),
+            ("refracted = weight * branch.transmittance", "refracted = branch.transmittance"),
+        )},
         {PLUGIN: ((SAMPLED, "            weight = value\n"),)},
         in_lectures=True,
     ),
