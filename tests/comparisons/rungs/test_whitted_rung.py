@@ -344,3 +344,26 @@ def test_glass_that_stands_on_the_floor() -> None:
         faulty = whitted(scene, scene.tables, wrong, 200)
     assert found.status in ("agree", "reference-limited"), found.reason
     assert faulty.status == "differ"
+
+
+def test_a_lamp_folded_back_on_itself() -> None:
+    """Two of its triangles lie in one place, with their fronts on either side: the arbiter finds
+    Mitsuba's values beside a pixel because of that, not because of a fault."""
+    scene = Scene.parse("""
+camera: {type: perspective, eye: [2, 1, 3], target: [0, 0, -0.5]}
+film: {width: 24, height: 18}
+integrator: {type: whitted}
+materials: {lamp: {type: emissive, radiance: 3}}
+shapes:
+  - {type: rectangle, transform: [{scale: 9}, {translate: [0, 0, -2]}]}
+  - type: mesh
+    material: lamp
+    transform: [{rotate: {axis: [1, 2, 0.3], degrees: 137}}, {translate: [0.1, 0.2, 0.7]}]
+    vertices: [[1, 0, -0.4], [0, 1, -0.0858], [-1, 0, 0.228], [0, -1, 0.542], [1.3, 0, -0.4],
+     [-0.3, 1, -0.0858], [-0.7, 0, 0.228], [-0.3, -1, 0.542]]
+    faces: [[0, 1, 4], [1, 2, 5], [2, 3, 6], [1, 5, 4], [2, 6, 5], [3, 7, 6]]
+lights: [{type: point, position: [2, 3, 4], intensity: 9}]
+""")
+    with scalar():
+        found = whitted(scene, scene.tables, load(scene), 100)
+    assert found.status in ("agree", "reference-limited"), found.reason
