@@ -151,7 +151,9 @@ class Effect:
             mitsuba().load_dict({**described, "starts_close": close}) for close in (True, False)
         ]
         for integrator in self._integrators:
-            integrator.lit = partial(LitScene, solids=counterpart.solids)
+            integrator.lit = partial(
+                LitScene, solids=counterpart.solids, planes=counterpart.planes()
+            )
         self._sum = np.zeros((pairs, scene.film.height, scene.film.width, 3))
 
     def render(self) -> None:

@@ -30,7 +30,7 @@ from comparisons.results.case import Case, Cause, FloatArray, RungResult
 from comparisons.results.headline import UP_TO
 from comparisons.rungs.edges import DARK, TOLERANCE, Edges
 from comparisons.rungs.footprints import look_at
-from comparisons.rungs.own_samples import other_trees, samples_of
+from comparisons.rungs.own_samples import other_trees, samples_of, uncut
 from comparisons.rungs.witness import Witness, witness_of
 from comparisons.statistics import Margins
 from reference_rt.rendering.render import Progress
@@ -235,7 +235,13 @@ class Judge:
         look = look_at(scene, request.threads) if scene and self.linear.noise_free else None
         if look is not None and scene is not None and curve is None:
             others = partial(other_trees, scene, request.threads) if not request.rim else None
-            edges = Edges(look, request.tolerance, samples=samples_of(scene), others=others)
+            edges = Edges(
+                look,
+                request.tolerance,
+                samples=samples_of(scene),
+                beside=uncut(scene, request.threads),
+                others=others,
+            )
         elif look is not None and curve is not None:
             steep, floor = curve.errors(self.linear.pictures[0], DARK)
             edges = Edges(look, request.tolerance * steep, curve, floor)

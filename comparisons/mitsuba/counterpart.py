@@ -62,7 +62,7 @@ class Counterpart:
     @cached_property
     def lit(self) -> LitScene:
         """Mitsuba's scene with the solids."""
-        return LitScene(self.mi_scene, self.solids)
+        return LitScene(self.mi_scene, self.solids, self.planes())
 
     @property
     def no_light_reason(self) -> str:
@@ -111,6 +111,13 @@ class Counterpart:
             for operand in solid.operands:
                 mi_shapes += operand.mi_shapes.values()
         return mi_shapes
+
+    def planes(self) -> frozenset[str]:
+        """The ids of finite meshes that stand in for infinite planes."""
+        scenes = [self.mi_shapes, *(o.mi_shapes for s in self.solids for o in s.operands)]
+        return frozenset(
+            name for named in scenes for name, shape in named.items() if shape.plugin.extent
+        )
 
     def has_planes(self) -> bool:
         """Whether finite meshes stand in for infinite planes."""

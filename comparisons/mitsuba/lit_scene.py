@@ -9,6 +9,7 @@ all crossings of each ray in float64.
 Works in scalar variants and in wide ones, where all rays are traced together.
 """
 
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 from comparisons.geometry import affine
@@ -36,8 +37,10 @@ class LitScene(PlainScene):
     mi_scene: Mitsuba's scene without the solids, which has the camera and all sampled lights.
     """
 
-    def __init__(self, mi_scene: Any, solids: tuple[SolidCounterpart, ...]) -> None:
-        super().__init__(mitsuba(), mi_scene)
+    def __init__(
+        self, mi_scene: Any, solids: tuple[SolidCounterpart, ...], planes: Collection[str] = ()
+    ) -> None:
+        super().__init__(mitsuba(), mi_scene, planes)
         self._solids = [_Solid(solid) for solid in solids]
 
     def ray_test(self, ray: Any, active: Any = True) -> Any:
@@ -57,6 +60,7 @@ class LitScene(PlainScene):
             if dr.any(met):
                 si = solid.interaction(ray, crossing, si)
                 of_solid |= met
+        dr.eval(si, of_solid)
         return si, of_solid
 
     def all_scenes(self) -> list[Any]:
@@ -106,7 +110,10 @@ class _Solid:
         whole: list[Any] = [
             dr.select(each, column, 0.0) for column in (ray.o, ray.d, mi.Float(limit))
         ]
-        rows: Any = dr.compress(active & each)
+        active &= each
+        # In one go: each column alone would take a kernel that traces all that led to it again.
+        dr.eval(whole, active)
+        rows: Any = dr.compress(active)
         none = dr.full(mi.UInt32, NONE, n)
         result = _Found(none, dr.zeros(mi.Float, n), dr.zeros(mi.Mask, n))
         if dr.width(rows) == 0:
@@ -173,6 +180,8 @@ class _Solid:
         mi = mitsuba()
         for k, operand in enumerate(self.operands):
             mine = crossing.operand == k
+            if not dr.any(mine):
+                continue
             start = dr.select(mine, crossing.start, 0.0)
             near = mi.Ray3f(ray.o + ray.d * start, ray.d, ray.time, ray.wavelengths)
             other = operand.mi_scene.ray_intersect(near, mine)

@@ -51,9 +51,10 @@ class Outcome(NamedTuple):
     rays: how many were compared;  lit: how many of these on either side, and `right` of them alike
     (`arbiter.tells`);
     unexplained: indices of those that differ;  ours, theirs (m, 3): their values in W/sr/m²;
-    explained: indices of those that the arbiter explains;  max_error, max_ratio: the largest
-    error, and error over bound, of the rest;  ratio, cosine (m,): of rays that differ and
-    are lit on both sides, our value over Mitsuba's, and the cosine at the surface.
+    explained: indices of those that the arbiter explains;  unaimed: of those among them whose
+    shadow rays miss the lamp, or meet another surface in its place, by geometry;  max_error,
+    max_ratio: the largest error, and error over bound, of the rest;  ratio, cosine (m,): of rays
+    that differ and are lit on both sides, our value over Mitsuba's, and the cosine at the surface.
     """
 
     rays: int
@@ -227,9 +228,10 @@ def _compare(
     allowed = 2.0 * bound[wrong]
     some = context.of(wrong)
     settled |= is_beside(some, light, u, theirs[wrong], allowed, scale[wrong])
-    if kind_of(context, light) == AREA:
-        settled |= is_doubled(context.sizes, tables, some.hits.p, target[wrong])
     past = _leads_past(some, target[wrong], lamp[wrong], radius[wrong])
+    if kind_of(context, light) == AREA:
+        doubled = is_doubled(context.sizes, tables, some.hits.p, target[wrong])
+        settled, past = settled | doubled, past | doubled
     right, shines = error <= bound, is_lit | theirs.any(axis=1)
     left = wrong[~settled]
     lit = left[value[left].any(axis=1) & theirs[left].any(axis=1)]

@@ -30,7 +30,7 @@ A `Look` takes points (..., 2), in pixels to the right and down from the picture
 and returns radiance before the curve.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,7 +40,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from comparisons.results.case import FloatArray, RungResult
 from comparisons.rungs.footprints import Look
 from comparisons.rungs.own_samples import SNAP as OWN_SNAP
-from comparisons.rungs.own_samples import WIDENED, permitted, strays
+from comparisons.rungs.own_samples import are_seen, permitted, strays
 from comparisons.statistics.cells import CHANNELS
 from reference_rt.rendering.image import srgb
 from reference_rt.textures.image_file import linear
@@ -128,18 +128,23 @@ Curve = Callable[[FloatArray], FloatArray]
 class Edges(NamedTuple):
     """What a gate knows of the footprints of pixels;  tolerance: relative error of a value, after
     the tone curve;  floor (3,): the values to which it is relative at least, where there is one;
-    samples (k, 2): the places of the reference's in a pixel, where they are known;  others:
-    pictures of mistaken trees, by name, which are rendered if they are needed."""
+    samples (k, 2): the places of the reference's in a pixel, where they are known;  beside: what
+    pixels of these samples see that may also be right (`own_samples.uncut`);  others: pictures of
+    mistaken trees, by name, which are rendered if they are needed."""
 
     look: Look
     tolerance: float = TOLERANCE
     curve: Curve | None = None
     floor: FloatArray | None = None
     samples: FloatArray | None = None
+    beside: Sequence[Look] = ()
     others: Callable[[], list[tuple[str, FloatArray]]] | None = None
 
     def without_rim(self, pixels: int) -> "Edges":
-        return self._replace(look=lambda points: self.look(points + pixels))
+        def moved(look: Look) -> Look:
+            return lambda points: look(points + pixels)
+
+        return self._replace(look=moved(self.look), beside=tuple(map(moved, self.beside)))
 
 
 class _Law(NamedTuple):
@@ -245,6 +250,12 @@ def edges_rung(
     tips = tips[: len(tips) if len(tips) <= MOST_TIPS else 0]
     tips = tips[_are_tips(edges.look, law, row[tips], column[tips], values[tips])]
     wrong[tips], outside[tips] = False, 0.0
+    looks = (edges.look, *edges.beside)
+    if edges.samples is not None and edges.beside:
+        rest = np.flatnonzero(wrong)
+        at_rest = row[rest], column[rest]
+        rest = rest[are_seen(looks, law.beyond, edges.samples, at_rest, values[rest])]
+        wrong[rest], outside[rest] = False, 0.0
     numbers = {
         "pixels": differs.size,
         "chosen": int(chosen.sum()),
@@ -269,9 +280,8 @@ def edges_rung(
     if edges.samples is not None and law.curve is None and differs.any():
         step = np.zeros_like(differs)
         step[row, column] = seen.step
-        widely = law._replace(tolerance=WIDENED * law.tolerance).beyond
         both = candidate, reference
-        found = strays(edges.look, law.beyond, widely, edges.samples, both, differs, step)
+        found = strays(looks, law.beyond, edges.samples, both, differs, step)
         if found is not None and len(found[0]) > permitted(differs.size):
             numbers["strays"] = len(found[0])
             numbers["stray"] = (int(found[1][0]), int(found[0][0]))

@@ -9,10 +9,10 @@ from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.referee.sizes import ShapeSizes
 from comparisons.results.case import RungResult
 from comparisons.rungs.rays import arbiter
-from comparisons.rungs.rays.coincidence import on_two_surfaces
+from comparisons.rungs.rays.coincidence import is_doubled, on_two_surfaces
 from comparisons.rungs.rays.lamp_images import changes_of_lamps
 from comparisons.rungs.rays.light_context import LightContext
-from comparisons.rungs.rays.light_error import cut_off
+from comparisons.rungs.rays.light_error import MIDDLE, cut_off
 from comparisons.rungs.rays.neighbours import explained_by_neighbours
 from comparisons.rungs.rays.plugin_trees import PluginTrees
 from comparisons.rungs.rays.rays import Rays, described, pixel_rays
@@ -22,7 +22,7 @@ from comparisons.translator.accuracy import accuracy
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators import Whitted
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.lights import ENVIRONMENT
+from reference_rt.lights import AREA, ENVIRONMENT
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
 
@@ -78,8 +78,14 @@ def whitted(
         "lit_right": int(np.count_nonzero(told)),
     }
     numbers["tells"] = arbiter.is_enough(numbers["lit_right"], numbers["lit"])
+    asked = outliers[settled & ~of_lamps]
     numbers["explained_elsewhere"] = too_many_elsewhere(
-        scene, tables, counterpart, rays.rows(outliers[settled & ~of_lamps]), len(rays.o)
+        scene,
+        tables,
+        counterpart,
+        rays.rows(asked[~trees.see_doubled_lamps(rays.rows(asked))]),
+        len(rays.o),
+        trees.following,
     )
     if len(unexplained):
         numbers["elsewhere"] = elsewhere(scene, tables, counterpart, rays.rows(unexplained))
@@ -133,6 +139,24 @@ class Trees:
     def of_ours(self, rays: Rays) -> FloatArray:
         """Our radiance (n, 3)."""
         return self._ours_along(rays.o, rays.d)
+
+    def see_doubled_lamps(self, rays: Rays) -> arbiter.BoolArray:
+        """(n,): whether another surface lies in the place of the middle of a lamp, within float32's
+        error, as seen from the rays' first hits.  No light is asked."""
+        choice, doubled = self._tables.lights.choice, np.zeros(len(rays.o), bool)
+        if choice is None:
+            return doubled
+        for light in np.flatnonzero((choice.kind == AREA) & (choice.probability > 0.0)).tolist():
+            ours = query.direct_light(self._tables, *rays, light, MIDDLE)
+            seen = np.flatnonzero(ours.pdf > 0.0)
+            p = query.intersect(self._tables, *rays.rows(seen)).p
+            doubled[seen] |= is_doubled(self._sizes, self._tables, p, ours.target[seen])
+        return doubled
+
+    def following(self, rays: Rays) -> tuple[IntArray, Rays]:
+        """All rays of Mitsuba's trees of some rays, and the row of each: see `resolution`."""
+        nodes = self._theirs_at.nodes(rays)
+        return nodes.row, nodes.rays
 
     def compare(self, rays: Rays) -> Compared:
         """Trace the trees of rays that are exact in float32."""

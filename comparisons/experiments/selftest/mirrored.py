@@ -6,6 +6,9 @@ must, whose formula shares nothing with either.
 
 Each mistake is planted in a process of its own, in the sources as they are imported.  A mistake in
 a kernel compiles kernels of the scene.
+
+POV-Ray does not vote on the pictures of most cases of truth, which have lamps of size or are path
+traced: `lectures.yaml` is a scene on which it does.
 """
 
 import ast
@@ -37,6 +40,9 @@ FILES = ("mirrored.json", "mirrored.md")
 BUDGET = Budget(spp=32, replicates=8, pixels=1024, light_pixels=256)
 """For scenes of truth, which have 32 x 32 pixels."""
 
+LECTURES = Path(__file__).with_name("lectures.yaml")
+"""What the lectures draw by Whitted's ray tracing, all of which POV-Ray has."""
+
 WITNESSES = ("files", "solids", "sampling", "exact arithmetic", "witness")
 """Rungs that ask somebody else than our renderer and Mitsuba's side."""
 
@@ -46,7 +52,8 @@ REAL = 1e-3
 
 @dataclass(frozen=True)
 class Seen:
-    """What a mistake on both sides does.
+    """What a mistake on both sides does, in the scene of its case of truth and, with a witness, in
+    LECTURES, if what is mistaken is there.
 
     change: of the pixel of our picture that changes most, over the mean;  alike: the verdict of the
     rungs that compare both sides, which is "differ" where they are not the same mistake;  by: the
@@ -92,6 +99,7 @@ def seen(mistake: Mistake, scenes: Path, witness: WitnessName | None, threads: i
         },
         "case": mistake.case,
         "scenes": str(scenes),
+        "shown": str(LECTURES) if mistake.in_lectures and witness is not None else None,
         "witness": witness,
         "threads": threads,
     }
@@ -103,17 +111,18 @@ def seen(mistake: Mistake, scenes: Path, witness: WitnessName | None, threads: i
             own["REFERENCE_RT_CACHE"] = str(folder)
         found = run_worker(worker, task, own, MOST_SECONDS)
     change = np.abs(np.reshape(found["picture"], right.shape) - right).max() / right.mean()
-    statuses = {
-        "exact arithmetic" if BY_EXACT_ARITHMETIC in reason else name: status
+    statuses = [
+        ("exact arithmetic" if BY_EXACT_ARITHMETIC in reason else name, status)
         for name, status, reason in found["rungs"]
-    }
-    told = [status for name, status in statuses.items() if name not in WITNESSES]
+    ]
+    told = [status for name, status in statuses if name not in WITNESSES]
+    caught = {name for name, status in statuses if status in CAUGHT}
     return Seen(
         mistake.name,
         mistake.case,
         float(change),
         next((status for status in CAUGHT if status in told), "agree"),
-        tuple(name for name in WITNESSES if statuses.get(name) in CAUGHT),
+        tuple(name for name in WITNESSES if name in caught),
         found["verdict"],
         found["truth"],
         found["percent"],

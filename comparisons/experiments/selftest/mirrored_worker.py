@@ -1,8 +1,9 @@
 """Compares and judges one scene of truth where both sides have the same mistake: run as a program.
 
 Standard input, a JSON object.  planted: by a module's name, pairs of texts, of which the second
-replaces the first, which occurs once in its source;  case: of truth;  scenes: its folder;  witness:
-a third renderer's name, or null;  threads.  Standard output: an `Answer`.
+replaces the first, which occurs once in its source;  case: of truth;  scenes: its folder;  shown:
+the path of another scene, or null;  witness: a third renderer's name, or null;  threads.  Standard
+output: what `answer` returns.
 
 The sources are changed as they are imported, so nothing of ours is imported before.
 """
@@ -57,7 +58,8 @@ def plant(planted: Planted) -> None:
 
 
 def answer(task: Mapping[str, Any]) -> dict[str, Any]:
-    """What the rungs say, what truth says, and our picture."""
+    """What the rungs say, of the case's scene and then of the other one, what truth says, and our
+    picture."""
     from comparisons import rungs as ladder
     from comparisons.compare.compare import Subject, compare_scene
     from comparisons.experiments.selftest.mirrored import BUDGET
@@ -73,11 +75,14 @@ def answer(task: Mapping[str, Any]) -> dict[str, Any]:
     # These are asked apart: above a rung that differs the two sides are not compared.
     apart = ("files", "solids")
     rest = tuple(name for name in COMPARED if name not in apart)
-    case = compare_scene(Subject(scene), budget, lambda step: None, task["threads"], rest)
-    rungs = (ladder.files(scene), ladder.solids(scene, budget.pixels), *case.rungs)
+    found, verdicts = [], []
+    for subject in (scene, *([load(Path(task["shown"]))] if task["shown"] else [])):
+        case = compare_scene(Subject(subject), budget, lambda step: None, task["threads"], rest)
+        found += [ladder.files(subject), ladder.solids(subject, budget.pixels), *case.rungs]
+        verdicts.append(case.verdict)
     return {
-        "rungs": [(rung.name, rung.status, rung.reason) for rung in rungs],
-        "verdict": case.verdict,
+        "rungs": [(rung.name, rung.status, rung.reason) for rung in found],
+        "verdict": "differ" if "differ" in verdicts else verdicts[0],
         "truth": truth.verdict,
         "percent": truth.percent,
         "reason": truth.reason,

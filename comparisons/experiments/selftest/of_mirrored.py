@@ -14,12 +14,14 @@ Changes = Mapping[str, tuple[tuple[str, str], ...]]
 @dataclass(frozen=True)
 class Mistake:
     """case: the case of truth whose scene has it;  ours: in `reference_rt`, theirs: in
-    `comparisons`, the changes that both make."""
+    `comparisons`, the changes that both make;  in_lectures: whether the scene `lectures.yaml`,
+    which POV-Ray can draw, has it too, where it does not vote on the case's."""
 
     name: str
     case: str
     ours: Changes
     theirs: Changes
+    in_lectures: bool = False
 
 
 # ---- solids --------------------------------------------------------------------------------------
@@ -103,11 +105,13 @@ OF_TREES = (
         "one mirroring fewer", "whitted_depth",
         {TREE: ((DEPTH, DEPTH.replace("max_depth,", "max_depth - 1,")),)},
         {PLUGIN: ((READ, READ + " - 1"),)},
+        in_lectures=True,
     ),
     Mistake(
         "one mirroring more", "whitted_depth",
         {TREE: ((DEPTH, DEPTH.replace("max_depth,", "max_depth + 1,")),)},
         {PLUGIN: ((READ, READ + " + 1"),)},
+        in_lectures=True,
     ),
     Mistake(
         "ambient light not weighted by mirrors", "whitted_ambient",
@@ -133,8 +137,12 @@ OF_TREES = (
     ),
     Mistake(
         "colours of earlier mirrors forgotten", "whitted_depth",
-        {TREE: (("mirrored = weight * branch.reflectance", "mirrored = branch.reflectance"),)},
+        {TREE: (
+            ("mirrored = weight * branch.reflectance", "mirrored = branch.reflectance"),
+            ("refracted = weight * branch.transmittance", "refracted = branch.transmittance"),
+        )},
         {PLUGIN: ((SAMPLED, "            weight = value\n"),)},
+        in_lectures=True,
     ),
     Mistake(
         "indices of glass exchanged", "whitted_in_glass",
@@ -145,11 +153,29 @@ OF_TREES = (
                    "            names = (\"int_ior\", \"ext_ior\")\n"
                    "            values |= {a: values[b] for a, b in zip(names, names[::-1])}\n"
                    "        return {\"type\": self.plugin, **values}"),)},
+        in_lectures=True,
     ),
     Mistake(
         "1/eta² of refracted radiance forgotten", "whitted_in_glass",
         {GLASS: (("t = passing / (refraction.eta * refraction.eta)", "t = passing"),)},
         {PLUGIN: ((SAMPLED, "            weight = weight * value * dr.square(sample.eta)\n"),)},
+    ),
+    Mistake(
+        "total reflection lost", "whitted_in_glass",
+        {GLASS: (("colour_at(dielectrics.reflectance, i, at) * f,",
+                  "colour_at(dielectrics.reflectance, i, at) * (f if f < 1.0 else 0.0),"),)},
+        {PLUGIN: ((SAMPLED,
+                   "            mirrors = mi.has_flag(sample.sampled_type, "
+                   "mi.BSDFFlags.DeltaReflection)\n"
+                   "            is_total = mirrors & (dr.min(value) >= 1.0)\n"
+                   "            weight = dr.select(is_total, 0.0, weight * value)\n"),)},
+        in_lectures=True,
+    ),
+    Mistake(
+        "lamps twice", "whitted_lit_mirror",
+        {TREE: (("total = total + weight * light", "total = total + weight * (light * 2.0)"),)},
+        {PLUGIN: (("total += weight * self.direct_light(",
+                   "total += 2.0 * weight * self.direct_light("),)},
     ),
 )  # fmt: skip
 
@@ -165,6 +191,7 @@ OF_SHADING = (
         "Phong's exponent halved", "phong_in_light",
         {PHONG: (("np.array([self.exponent])", "np.array([0.5 * self.exponent])"),)},
         {OWN_PHONG: (("self.exponent = float(", "self.exponent = 0.5 * float("),)},
+        in_lectures=True,
     ),
     Mistake(
         "the highlight times the cosine", "whitted_quadric",
@@ -175,6 +202,14 @@ OF_SHADING = (
         "Blinn's half vector for Phong's mirrored direction", "phong_in_light",
         {PHONG: (("np.array([int(self.half_vector)])", "np.array([int(not self.half_vector)])"),)},
         {OWN_PHONG: (("self.half_vector = bool(", "self.half_vector = not bool("),)},
+        in_lectures=True,
+    ),
+    Mistake(
+        "the half vector's cosine with the light", "blinn_in_light",
+        {PHONG: (("power(min(h.z, 1.0), p)", "power(min(dot(wi, h), 1.0), p)"),)},
+        {OWN_PHONG: (("cosine = dr.normalize(wi + wo).z if",
+                      "cosine = dr.dot(dr.normalize(wi + wo), wo) if"),)},
+        in_lectures=True,
     ),
     Mistake(
         "k_s and k_d exchanged", "whitted_lit_mirror",
@@ -210,7 +245,7 @@ OF_SHADING = (
 # ---- shapes that Mitsuba lacks -------------------------------------------------------------------
 
 
-QUADRIC = "shapes/curved/quadric.py"
+QUADRIC, QUADRICS = "shapes/curved/quadric.py", "shapes/curved/quadrics.py"
 TORUS, POLYGON = "shapes/curved/torus.py", "shapes/flat/polygon.py"
 OWN_QUADRIC, OWN_TORUS = "shapes/quadric.py", "shapes/torus.py"
 OWN_TUBE, OWN_POLYGON = "shapes/tubes.py", "shapes/polygon.py"
@@ -252,6 +287,16 @@ OF_SHAPES = (
                         "    return matrix, 0.5 * np.array([g, h, i])"),)},
     ),
     Mistake(
+        "a quadric's normal without its mixed terms, about the centre", "whitted_quadric",
+        {QUADRICS: (("    g = gradient(quadrics.coefficients[i], q)\n",
+                     "    k = quadrics.coefficients[i]\n"
+                     "    g = Vec3(2.0 * k[0] * q.x + k[6], 2.0 * k[1] * q.y + k[7],\n"
+                     "             2.0 * k[2] * q.z + k[8])\n"),)},
+        {OWN_QUADRIC: ((OWN_GRADIENT,
+                        "lambda p: np.asarray(2.0 * np.diag(matrix) * "
+                        "(p + 0.5 * np.linalg.solve(matrix, linear)))"),)},
+    ),
+    Mistake(
         "a quadric's front where f < 0", "whitted_quadric",
         {QUADRIC: ((FORM, FORM.replace("Fraction(x)", "-Fraction(x)")),)},
         {OWN_QUADRIC: ((OWN_GRADIENT, OWN_GRADIENT.replace("(2.0 *",
@@ -286,6 +331,11 @@ OF_MATERIALS = (
                  "self.r = smooth_reflectance(1.0 / self.eta)"),)},
     ),
     Mistake(
+        "a coat's 1/eta² forgotten", "plastic_furnace",
+        {PLASTIC: (("(t_i * shares.t_o / (eta * eta) *", "(t_i * shares.t_o *"),)},
+        {COAT: (("(math.pi * self.eta * self.eta)", "math.pi"),)},
+    ),
+    Mistake(
         "the base's colour at the first bounce below a coat alone", "plastic_furnace",
         {PLASTIC: (("np.array([int(self.nonlinear)])", "np.array([0])"),)},
         {COAT: (("self.nonlinear = properties[\"nonlinear\"]",
@@ -310,6 +360,7 @@ OF_MATERIALS = (
         )},
         {OWN_PHONG: (("            return 1.0 - weight, weight",
                       "            return weight, 1.0 - weight"),)},
+        in_lectures=True,
     ),
 )  # fmt: skip
 

@@ -1,6 +1,6 @@
 """What plugins share: the base class of BSDFs, parameters, and a scene as integrators call it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
@@ -41,10 +41,12 @@ class PlainScene:
 
     An integrator that Mitsuba's scene has must not keep this: references in a circle through
     Mitsuba are never freed, and Dr.Jit compiles code for all shapes and materials that exist.
+
+    planes: the ids of meshes that stand in for infinite planes.
     """
 
-    def __init__(self, mi: Any, mi_scene: Any) -> None:
-        self.mi, self.mi_scene = mi, mi_scene
+    def __init__(self, mi: Any, mi_scene: Any, planes: Collection[str] = ()) -> None:
+        self.mi, self.mi_scene, self.planes = mi, mi_scene, frozenset(planes)
 
     def ray_intersect(self, ray: Any, active: Any = True) -> Any:
         """The first surface interaction along rays with unit directions."""
@@ -75,13 +77,10 @@ class PlainScene:
         """All shapes, those of the operands too."""
         return [shape for mi_scene in self.all_scenes() for shape in mi_scene.shapes()]
 
-    def cylinders(self) -> list[Any]:
-        """The cylinders, whose hits are the least accurate: see `whitted.clearance`."""
-        return [shape for shape in self.shapes() if shape.class_name() == "Cylinder"]
-
     def reach(self) -> float:
-        """The largest coordinate on any shape."""
-        boxes = [mi_scene.bbox() for mi_scene in self.all_scenes()]
+        """The largest coordinate on any shape but `planes`, whose triangles are as large as they
+        are far away: see `whitted.clearance`."""
+        boxes = [shape.bbox() for shape in self.shapes() if shape.id() not in self.planes]
         ends = np.abs([np.array(end, np.float64) for box in boxes for end in (box.min, box.max)])
         return float(np.max(ends[np.isfinite(ends)], initial=0.0))
 

@@ -39,27 +39,31 @@ def register(mi: Any) -> None:
         def prepare(self) -> None:
             """The mesh's arrays, and the distribution of the triangles' areas, once the mesh is
             known.  Of a mesh that a file describes Python sees a shape alone, without what meshes
-            have."""
+            have.
+
+            Scalar variants render in several threads, which may all come here at once: nothing is
+            seen of it until it is whole, `triangles` last.
+            """
             if self.triangles is not None:
                 return
             # Not kept: the mesh has the emitter, and a circle through Mitsuba is never freed.
             shape = self.get_shape()
             values = mi.traverse(shape)
-            self.flips = shape.has_flipped_normals()
-            self.arrays = {"faces": np.array(values["faces"]).reshape(-1, 3)}
+            arrays = {"faces": np.array(values["faces"]).reshape(-1, 3)}
             for name, size in (("positions", 3), ("normals", 3), ("texcoords", 2)):
                 numbers = np.array(values[f"vertex_{name}"], np.float64).reshape(-1, size)
                 if len(numbers):
-                    self.arrays[name] = numbers
-            corners = self.arrays["positions"][self.arrays["faces"]]
+                    arrays[name] = numbers
+            corners = arrays["positions"][arrays["faces"]]
             sides = corners[:, 1:] - corners[:, :1]
             areas = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-            self.area = float(areas.sum())
             if base.is_wide(mi):
                 self.buffers = {
                     name: (mi.UInt32 if name == "faces" else mi.Float)(array.ravel())
-                    for name, array in self.arrays.items()
+                    for name, array in arrays.items()
                 }
+            self.flips = shape.has_flipped_normals()
+            self.arrays, self.area = arrays, float(areas.sum())
             self.triangles = mi.DiscreteDistribution(areas.astype(np.float32))
 
         def row(self, kind: Any, name: str, index: Any, active: Any) -> Any:

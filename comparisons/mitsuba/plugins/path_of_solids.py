@@ -60,7 +60,7 @@ def register(mi: Any) -> None:
             """
             lit = self.lit(scene)
             if self.close:
-                self.height = partial(clearance, mi, reach=lit.reach(), cylinders=lit.cylinders())
+                self.height = partial(clearance, mi, reach=lit.reach(), has_planes=bool(lit.planes))
             ray, active = mi.Ray3f(ray), mi.Mask(active)
             total, throughput, eta = mi.Color3f(0.0), mi.Color3f(1.0), mi.Float(1.0)
             before, bsdf_pdf, valid = dr.zeros(mi.Interaction3f), mi.Float(0.0), None

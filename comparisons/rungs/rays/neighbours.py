@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 
 from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
+from comparisons.mitsuba.plugins.whitted import reach_of_planes
 from comparisons.rungs.rays.arbiter import NEIGHBOURS, RADII, BoolArray, directions
 from comparisons.rungs.rays.light_context import DISTANT
 from comparisons.rungs.rays.light_error import MIDDLE
@@ -17,6 +18,7 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.lights import ENVIRONMENT
 from reference_rt.rendering import query
 from reference_rt.scene.build import build_tables
+from reference_rt.shapes import Cylinder
 
 MOST_OUTLIERS = (200, 32)
 """Most pixels that are arbitrated by our tracer and by Mitsuba: each takes 193 ray trees for each
@@ -37,14 +39,18 @@ def _radii(context: TreeContext, rays: Rays) -> list[FloatArray]:
     the scene's size.  It moves the shadows of a lamp by as much over the lamp's cosine."""
     sizes, depth = context.sizes, max(context.integrator.max_depth, 1)
     frame, lit = sizes.frame, context.counterpart.lit
+    finite = np.full(len(rays.o), lit.reach() / frame.scale)
     hits = query.intersect(context.tables, rays.o, rays.d)
     reach = np.full(len(hits.t), sizes.reach.max(initial=0.0))  # later hits are anywhere
     rounding = frame.delta(rays.o, hits.p, reach)
     epsilon = frame.epsilon(hits.p)
-    height = np.minimum(epsilon, ROUNDINGS * UNIT_ROUNDOFF * lit.reach() / frame.scale)
+    if lit.planes:
+        size = frame.largest(hits.p) * frame.scale
+        finite = np.maximum(finite, reach_of_planes(size) / frame.scale)
+    height = np.minimum(epsilon, ROUNDINGS * UNIT_ROUNDOFF * finite)
     shadows = np.minimum(height / _least_cosine(context, rays, hits), depth * epsilon)
     radii = [rounding, depth * rounding, rounding + shadows]
-    if lit.cylinders():
+    if any(isinstance(leaf.shape, Cylinder) for leaf in sizes.leaves):
         radii += [epsilon, depth * epsilon]
     return radii
 

@@ -8,7 +8,7 @@ start behind its own surface and hit it again.  Prediction: our own tracer, star
 heights, hits another surface than from the exact point, or two that coincide.  Measurement:
 Mitsuba's tracer, started as Mitsuba does, hits another surface."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -135,25 +135,34 @@ def _levels(
         yield _Level(rows, Rays(o, d), hits, hits)
 
 
+Following = Callable[[Rays], tuple[IntArray, Rays]]
+"""All rays (k,) of the trees of some rays, and of which of these each is, (k,)."""
+
+
 def beyond_precision(
-    scene: Scene, tables: SceneTables, counterpart: Counterpart, rays: Rays, seed: int = 0
+    scene: Scene,
+    tables: SceneTables,
+    counterpart: Counterpart,
+    rays: Rays,
+    seed: int = 0,
+    following: Following | None = None,
 ) -> BoolArray:
     """(n,): of which rays Mitsuba's precision may change what they show, by geometry alone.
 
     Either float32 may move the ray over an edge: rays next to it hit another surface.  Or a ray
-    that leaves its hit, or one behind transparent surfaces, may hit a wrong one.  Both are foretold
-    by our tracer and by the reference's errors: no light is asked, so that a fault of light makes
-    no ray seem to be beyond them.
+    that leaves its hit, or one behind transparent surfaces, may hit a wrong one.  Or a ray of its
+    tree, where `following` knows them, is moved over an edge, or hits two surfaces in one place.
+    All are foretold by our tracer and by the reference's errors: no light is asked, so that a fault
+    of light makes no ray seem to be beyond them.
     """
     sizes = ShapeSizes(scene, counterpart.frame)
-    ours = query.intersect(tables, rays.o, rays.d)
-    reach = np.full(len(rays.o), sizes.reach.max(initial=0.0))
-    there = np.where(ours.shape[:, None] >= 0, ours.p, rays.o)
-    radius = sizes.frame.delta(rays.o, there, reach) + counterpart.off_by(ours.shape, "sag")
-    beyond = np.zeros(len(rays.o), bool)
-    for move in arbiter.directions(AROUND):
-        moved = query.intersect(tables, rays.o + radius[:, None] * move, rays.d)
-        beyond |= _differs(ours, moved, STEEPEST * radius)
+    ours, beyond = _at_edges(tables, counterpart, sizes, rays)
+    if following is not None and len(rays.o):
+        rows, further = following(rays)
+        hits, unsure = _at_edges(tables, counterpart, sizes, further)
+        e = sizes.frame.delta(further.o, hits.p, sizes.reach_of(hits.shape))
+        unsure |= _doubled(tables, sizes, hits, further.d, e)
+        beyond |= np.bincount(rows[unsure], minlength=len(beyond)) > 0
     hit = np.flatnonzero(ours.shape >= 0)
     some, hits = rays.rows(hit), rows_of(ours, hit)
     for level in _levels(scene, tables, sizes, some, hits, hits):
@@ -164,8 +173,28 @@ def beyond_precision(
     return beyond
 
 
+def _at_edges(
+    tables: SceneTables, counterpart: Counterpart, sizes: ShapeSizes, rays: Rays
+) -> tuple[Intersections, BoolArray]:
+    """Our hits of n rays, and which rays hit another surface when float32 moves them, (n,)."""
+    ours = query.intersect(tables, rays.o, rays.d)
+    reach = np.full(len(rays.o), sizes.reach.max(initial=0.0))
+    there = np.where(ours.shape[:, None] >= 0, ours.p, rays.o)
+    radius = sizes.frame.delta(rays.o, there, reach) + counterpart.off_by(ours.shape, "sag")
+    at_edge = np.zeros(len(rays.o), bool)
+    for move in arbiter.directions(AROUND):
+        moved = query.intersect(tables, rays.o + radius[:, None] * move, rays.d)
+        at_edge |= _differs(ours, moved, STEEPEST * radius)
+    return ours, at_edge
+
+
 def too_many_elsewhere(
-    scene: Scene, tables: SceneTables, counterpart: Counterpart, rays: Rays, total: int
+    scene: Scene,
+    tables: SceneTables,
+    counterpart: Counterpart,
+    rays: Rays,
+    total: int,
+    following: Following | None = None,
 ) -> int:
     """Of rays that the arbiter explains, among `total`: how many Mitsuba's precision does not
     concern, if that is more than such rays may be; else 0.
@@ -177,7 +206,7 @@ def too_many_elsewhere(
     asked = rays.rows(np.flatnonzero(counterpart.off_by(hits.shape, "sag") == 0.0))
     if not arbiter.too_many(len(asked.o), total):
         return 0
-    count = elsewhere(scene, tables, counterpart, asked)
+    count = elsewhere(scene, tables, counterpart, asked, following)
     return count if arbiter.too_many(count, min(total, MOST_ASKED)) else 0
 
 
@@ -186,11 +215,18 @@ NOT_BEYOND = "too many of their rays are not beyond Mitsuba's precision by their
 not because of an edge or of a surface that a ray may miss."""
 
 
-def elsewhere(scene: Scene, tables: SceneTables, counterpart: Counterpart, rays: Rays) -> int:
+def elsewhere(
+    scene: Scene,
+    tables: SceneTables,
+    counterpart: Counterpart,
+    rays: Rays,
+    following: Following | None = None,
+) -> int:
     """How many of the rays, of at most MOST_ASKED, Mitsuba's precision does not concern."""
     step = -(-len(rays.o) // MOST_ASKED)
     some = rays.rows(np.arange(0, len(rays.o), max(step, 1)))
-    return int(np.count_nonzero(~beyond_precision(scene, tables, counterpart, some)))
+    beyond = beyond_precision(scene, tables, counterpart, some, following=following)
+    return int(np.count_nonzero(~beyond))
 
 
 def _left_behind(

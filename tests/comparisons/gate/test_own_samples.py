@@ -14,7 +14,13 @@ from comparisons.gate.request import gate
 from comparisons.results.case import RungResult
 from comparisons.rungs.edges import Edges, edges_rung
 from comparisons.rungs.footprints import look_at
-from comparisons.rungs.own_samples import other_trees, permitted, samples_of, strays
+from comparisons.rungs.own_samples import (
+    other_trees,
+    permitted,
+    samples_of,
+    strays,
+    uncut,
+)
 from comparisons.translator import load
 from reference_rt.cameras.film import Film
 from reference_rt.core.arrays import FloatArray
@@ -30,7 +36,7 @@ SCENES = Path(__file__).parents[3] / "scenes"
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    return Scene.load(SCENES / "spheres_whitted.yaml").changed(film=Film(width=160, height=100))
+    return Scene.load(SCENES / "spheres_whitted.yaml").changed(film=Film(width=80, height=50))
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +57,12 @@ def judged(scene: Scene, found: FloatArray, right: FloatArray, shown: bool = Fal
     return edges_rung(
         found,
         right,
-        Edges(look, samples=samples_of(scene), others=lambda: other_trees(scene)),
+        Edges(
+            look,
+            samples=samples_of(scene),
+            beside=uncut(scene),
+            others=lambda: other_trees(scene),
+        ),
         shown,
     )
 
@@ -73,18 +84,35 @@ def test_trees_of_another_depth_differ(scene: Scene, reference: FloatArray, deep
     assert (found.numbers["inside_wrong"], found.numbers["edge_wrong"]) == (0, 0)
 
 
-def test_right_pictures_agree(scene: Scene, reference: FloatArray) -> None:
-    """Of half floats, of 8 bits, of float32, and with other samples."""
-    assert judged(scene, half(reference), reference).status == "agree"
-    assert judged(scene, codes(reference), reference, shown=True).status == "agree"
-    theirs = mitsuba_whitted(scene, scene.tables, load(scene))
-    assert np.any(theirs != reference)
-    found = judged(scene, theirs, reference)
-    assert found.status == "agree", found.reason
-    more = picture(scene.changed(sampler=Grid(spp=16)))
-    found = judged(scene, more, reference)
+@pytest.mark.parametrize("kind", ["half floats", "codes", "float32", "16 samples"])
+def test_right_pictures_agree(scene: Scene, reference: FloatArray, kind: str) -> None:
+    if kind == "float32":
+        shown = mitsuba_whitted(scene, scene.tables, load(scene))
+        assert np.any(shown != reference)
+    elif kind == "16 samples":
+        shown = picture(scene.changed(sampler=Grid(spp=16)))
+    else:
+        shown = (half if kind == "half floats" else codes)(reference)
+    found = judged(scene, shown, reference, shown=kind == "codes")
     assert found.status == "agree", found.reason
     assert found.numbers["strays"] == 0
+
+
+def test_rays_that_contribute_too_little_for_us(scene: Scene) -> None:
+    """Which another renderer follows, all of them or some."""
+    ours, every = (
+        scene.changed(integrator=Whitted(max_depth=8, min_contribution=least))
+        for least in (5e-4, 0.0)
+    )
+    right, whole = picture(ours), picture(every)
+    for shown in (whole, 0.5 * (whole + right)):
+        rung = judged(ours, half(shown), right)
+        assert rung.status == "agree", rung.reason
+        assert rung.numbers["strays"] == 0
+    look = look_at(ours)
+    assert look is not None
+    alone = edges_rung(half(whole), right, Edges(look, samples=samples_of(scene)), False)
+    assert alone.numbers["strays"] > permitted(right[..., 0].size)
 
 
 def test_through_the_gate(scene: Scene) -> None:
@@ -122,7 +150,7 @@ def of_triangles(scene: Triangles, found: FloatArray) -> tuple[np.ndarray, np.nd
     differs = np.asarray(beyond(found, right, right).any(axis=-1), np.bool_)
     corners = np.stack([np.roll(right, k, axis=axis) for k in (-1, 1) for axis in (0, 1)])
     step = np.asarray((np.ptp(corners, axis=0) > 0.05).any(axis=-1), np.bool_)
-    return strays(scene.look, beyond, beyond, np.array([[0.5, 0.5]]), (found, right), differs, step)
+    return strays([scene.look], beyond, np.array([[0.5, 0.5]]), (found, right), differs, step)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -161,7 +189,7 @@ def test_too_few_pixels_that_tell() -> None:
     differs = np.zeros((4, 5), bool)
     differs[1, 1] = True
     assert (
-        strays(look, beyond, beyond, np.array([[0.5, 0.5]]), (flat * 1.1, flat), differs, ~differs)
+        strays([look], beyond, np.array([[0.5, 0.5]]), (flat * 1.1, flat), differs, ~differs)
         is None
     )
 

@@ -134,10 +134,18 @@ IN_ONE_PLACE = {
     transform: [{rotate: {axis: [1, 2, 0], degrees: 100}}]
     vertices: [[-1, -1, 0], [1, -1, 0], [0, 1, 0], [0, 0, 1.0e-12]]
     faces: [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]""",
+    "a lamp folded back on itself": """
+  - {type: rectangle, transform: [{scale: 9}, {translate: [0, 0, -2]}]}
+  - type: mesh
+    material: lamp
+    transform: [{rotate: {axis: [1, 2, 0.3], degrees: 137}}, {translate: [0.1, 0.2, 0.7]}]
+    vertices: [[1, 0, -0.4], [0, 1, -0.0858], [-1, 0, 0.228], [0, -1, 0.542], [1.3, 0, -0.4],
+     [-0.3, 1, -0.0858], [-0.7, 0, 0.228], [-0.3, -1, 0.542]]
+    faces: [[0, 1, 4], [1, 2, 5], [2, 3, 6], [1, 5, 4], [2, 6, 5], [3, 7, 6]]""",
 }
 
 
-@pytest.mark.cases(1)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("which", IN_ONE_PLACE)
 def test_surfaces_in_one_place(which: str) -> None:
     """Of which each renderer may report another one, or another side."""

@@ -273,3 +273,97 @@ lights: [{type: point, position: [1, 3, 4], intensity: 9}]
     with scalar():
         found = whitted(scene, scene.tables, load(scene))
     assert found.status in ("agree", "reference-limited"), found.reason
+
+
+FLATTENED = """
+camera: {type: pinhole, eye: [-0.8, 4.8, 2.2], target: [0.2, 0.3, -0.3], film_width: 1.05,
+  film_distance: 1}
+film: {width: 16, height: 12}
+shapes:
+  - type: cylinder
+    z_min: -0.3
+    z_max: 1.2
+    radius: 0.8
+    transform:
+      - matrix: [[0.93, -0.68, -0.2, 0], [0.12, 0.43, -0.24, 0.1], [-0.38, -0.41, 1.23, -0.1]]
+      - {rotate: {axis: [0, 0, 1], degrees: -129}}
+      - {translate: [0.2, 1.7, 0.2]}
+lights: [{type: point, position: [-1.5, 5.5, 0.7], intensity: 11}]
+"""
+"""A sheared cylinder is an instance in Mitsuba, whose rays must not meet the cylinder again."""
+
+
+BESIDE_A_WALL = """
+camera: {type: orthographic, eye: [-3, 0, 0.3], target: [-0.001, 0, 0], up: [0, 0, 1],
+  width: 4.0e-4}
+film: {width: 20, height: 15}
+integrator: {type: whitted}
+materials: {floor: {type: mirror}, wall: {type: diffuse}}
+shapes:
+  - {type: rectangle, material: floor}
+  - {type: rectangle, material: wall, transform: [{scale: 0.004}, {rotate: {axis: [0, 1, 0],
+     degrees: -90}}]}
+  - {type: plane, transform: [{translate: [0, 0, -1]}]}
+lights: [{type: point, position: [-2, 0.3, 1], intensity: 9}, {type: constant, radiance: 0.1}]
+"""
+"""Rays that leave the mirror at a slope of a tenth meet a wall within 0.003, which some pass if
+they start Mitsuba's ray epsilon off it.  The plane is a mesh a million large."""
+
+
+@pytest.mark.parametrize("scene", [FLATTENED, BESIDE_A_WALL], ids=["flattened", "beside a wall"])
+def test_where_rays_start(scene: str) -> None:
+    """No pixel needs the arbiter, which would not know of an edge there."""
+    parsed = Scene.parse(scene)
+    with scalar():
+        found = whitted(parsed, parsed.tables, load(parsed), 200)
+    assert found.status == "agree", found.reason
+    assert found.numbers["explained"] == 0
+    assert found.numbers["lit"] > 15
+
+
+ON_THE_FLOOR = """
+camera: {type: perspective, eye: [2.2, 2.6, 5.4], target: [0, 0.5, 0], fov: 20}
+film: {width: 24, height: 18}
+integrator: {type: whitted}
+materials: {glass: {type: dielectric}, felt: {type: diffuse, reflectance: [0.1, 0.4, 0.2]}}
+shapes:
+  - {type: plane, material: felt, transform: [{rotate: {axis: [1, 0, 0], degrees: -90}}]}
+  - {type: box, material: glass, transform: [{scale: 0.7}, {rotate: {axis: [0, 1, 0],
+     degrees: 25}}, {translate: [0, 0.7, 0]}]}
+lights: [{type: point, position: [-2, 5, 4], intensity: 60}, {type: constant, radiance: 0.4}]
+"""
+
+
+def test_glass_that_stands_on_the_floor() -> None:
+    """Of a ray that leaves the glass at the bottom float32 decides whether it meets the floor: the
+    arbiter's rays show it, and the tree says why."""
+    scene = Scene.parse(ON_THE_FLOOR)
+    with scalar():
+        found = whitted(scene, scene.tables, load(scene), 200)
+        wrong = load(Scene.parse(ON_THE_FLOOR.replace("[0.1, 0.4, 0.2]", "[0.1, 0.4, 0.3]")))
+        faulty = whitted(scene, scene.tables, wrong, 200)
+    assert found.status in ("agree", "reference-limited"), found.reason
+    assert faulty.status == "differ"
+
+
+def test_a_lamp_folded_back_on_itself() -> None:
+    """Two of its triangles lie in one place, with their fronts on either side: the arbiter finds
+    Mitsuba's values beside a pixel because of that, not because of a fault."""
+    scene = Scene.parse("""
+camera: {type: perspective, eye: [2, 1, 3], target: [0, 0, -0.5]}
+film: {width: 24, height: 18}
+integrator: {type: whitted}
+materials: {lamp: {type: emissive, radiance: 3}}
+shapes:
+  - {type: rectangle, transform: [{scale: 9}, {translate: [0, 0, -2]}]}
+  - type: mesh
+    material: lamp
+    transform: [{rotate: {axis: [1, 2, 0.3], degrees: 137}}, {translate: [0.1, 0.2, 0.7]}]
+    vertices: [[1, 0, -0.4], [0, 1, -0.0858], [-1, 0, 0.228], [0, -1, 0.542], [1.3, 0, -0.4],
+     [-0.3, 1, -0.0858], [-0.7, 0, 0.228], [-0.3, -1, 0.542]]
+    faces: [[0, 1, 4], [1, 2, 5], [2, 3, 6], [1, 5, 4], [2, 6, 5], [3, 7, 6]]
+lights: [{type: point, position: [2, 3, 4], intensity: 9}]
+""")
+    with scalar():
+        found = whitted(scene, scene.tables, load(scene), 100)
+    assert found.status in ("agree", "reference-limited"), found.reason
