@@ -239,6 +239,11 @@ def _hypotheses(ours: Ours, right: FloatArray) -> Iterator[_Hypothesis]:
         ("the size in place of the value", np.abs(right)),
     ):
         yield _Hypothesis(words, "so is the derivative, changed so", partial(np.asarray, picture))
+    yield _Hypothesis(
+        "it is 0",
+        "so is nothing: the candidate does not see the parameter move",
+        partial(np.zeros, right.shape),
+    )
     fine = lru_cache(partial(_of_quarter_pixels, ours, count))
     for down, across in product((0, 1, -1), repeat=2):
         if down or across:

@@ -66,6 +66,7 @@ FAULTS = {
     "upside down": ("the picture is upside down", ALBEDO, lambda x: x[:, ::-1]),
     "mirrored": ("the picture is mirrored", ALBEDO, lambda x: x[:, :, ::-1]),
     "the size": ("the size in place of the value", RADIUS, np.abs),
+    "nothing": ("it is 0", ALBEDO, np.zeros_like),
     "channels exchanged": ("?", ALBEDO, lambda x: x[..., ::-1]),
     "a corner is lost": ("?", ALBEDO, lambda x: np.where(np.arange(12)[:, None] < 5, 0.0, x)),
 }

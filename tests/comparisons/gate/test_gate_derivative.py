@@ -109,5 +109,5 @@ def test_the_fixture(derivative_gate, right, tmp_path, monkeypatch):
     monkeypatch.setattr(derivative_gate, "_out", tmp_path)
     found = np.stack([12.0 * own_picture(1.0, seed) for seed in range(50, 66)])
     derivative_gate(found, primal=own_picture, at=2.0, limit=0.02)
-    with pytest.raises(pytest.fail.Exception, match="derivative_gate: differ.*the sign"):
+    with pytest.raises(pytest.fail.Exception, match=r"derivative_gate: differ.*the sign"):
         derivative_gate(-found, primal=own_picture, at=2.0)
