@@ -57,10 +57,12 @@ def derivative_case(
     sides = (f"Mitsuba's ({differentiator.words})", "ours")
     try:
         theirs = _Theirs(scene, asked.parameter, differentiator)
+        adjoint = theirs.adjoint()  # Mitsuba refuses before any work of ours
     except NoCounterpartError as error:
         rung = RungResult("derivative", "not-comparable", str(error))
         verdict, reason = decide([rung], None)
         return Case(scene.name, verdict, reason, (rung,), None, {}, sides=sides)
+    say(f"adjoint: {adjoint.status}")
     ours = Ours(scene, asked.parameter, asked.step, threads)
     both = _Both(theirs, ours, budget.limit)
     looked = until_decided(
@@ -81,8 +83,7 @@ def derivative_case(
         say("looks for a cause")
         half = partial(_at_half_size, scene, budget)
         cause = likeliest(ours, right, wrong, both.margins(), half)
-    rungs.append(theirs.adjoint())
-    say(f"adjoint: {rungs[-1].status}")
+    rungs.append(adjoint)
     verdict, reason = decide(rungs, None)
     notes = (
         f"derivatives by {theirs.moving.path}, in W/sr/m2 per unit of it; in Mitsuba "

@@ -21,7 +21,7 @@ from comparisons.mitsuba.scene import SPREAD
 from comparisons.renderers import NoCounterpartError
 from comparisons.results.differentiators import DifferentiatorName, Guiding
 from comparisons.translator import MOST_INSTANCES, to_mitsuba
-from comparisons.translator.native import failing
+from comparisons.translator.native import MOST_TOLD, failing
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.derivative import difference
 from reference_rt.rendering.scene import Scene
@@ -129,7 +129,7 @@ class Moving:
 
     def forward(self, integrator: Any, spp: int, seed: int) -> FloatArray:
         """The derivative's picture (height, width, 3), by our parameter.  Raises
-        ReferenceUnavailableError if Mitsuba refuses."""
+        NoCounterpartError if Mitsuba refuses."""
         import drjit as dr
 
         with self._attached() as theta:
@@ -165,21 +165,21 @@ class Moving:
 
         theta = mitsuba().Float(0.0)
         dr.enable_grad(theta)
-        with failing(f"Mitsuba has no derivative by {self.path}"):
-            try:
-                for key, speed in self._speeds.items():
-                    self._parameters[key] = _plus(self._at[key], speed, theta)
-                self._parameters.update()
-                yield theta
-            except Exception as error:
-                if type(error) is not Exception:  # as its integrators raise what they refuse
-                    raise
-                raise NoCounterpartError(f"Mitsuba refuses: {error}") from None
-            finally:
-                # A scene that stays attached spoils the derivatives of the next one.
-                for key, value in self._at.items():
-                    self._parameters[key] = value
-                self._parameters.update()
+        try:
+            for key, speed in self._speeds.items():
+                self._parameters[key] = _plus(self._at[key], speed, theta)
+            self._parameters.update()
+            yield theta
+        except Exception as error:
+            if not isinstance(error, RuntimeError | MemoryError) and type(error) is not Exception:
+                raise  # no refusal of Mitsuba's integrators, which raise these
+            told = " ".join(str(error.__cause__ or error).split())[:MOST_TOLD]
+            raise NoCounterpartError(f"Mitsuba refuses: {told}") from None
+        finally:
+            # A scene that stays attached spoils the derivatives of the next one.
+            for key, value in self._at.items():
+                self._parameters[key] = value
+            self._parameters.update()
 
 
 def _loaded(scene: Scene, sampler: str | None = None) -> tuple[Any, dict[str, Any]]:

@@ -113,6 +113,12 @@ def test_numbers_of_mitsuba_move_as_ours(path):
     ("path", "old", "new", "reason"),
     [
         ("camera.fov", "", "", "Mitsuba has no derivative by sensor.x_fov"),
+        (
+            "materials.black.k",
+            "{type: diffuse, reflectance: 0}",
+            "{type: conductor, eta: 0.2, k: 3}",
+            "not attached to the AD graph",
+        ),
         ("camera.eye[0]", "{type: direct}", "{type: ray_cast}", "pictures by 'ray_cast'"),
         ("camera.eye[0]", "{type: direct}", "{type: whitted}", "pictures by 'whitted'"),
     ],
