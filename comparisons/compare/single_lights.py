@@ -16,7 +16,7 @@ SAMPLES = 64
 
 DARK = (0.0, 0.0, 0.0)
 
-OUT = Point(position=(0.0, 0.0, 0.0), intensity=0.0)
+OUT = Point(position=(0.0, 0.0, 0.0), intensity=(0.0, 0.0, 0.0))
 """A light that is out."""
 
 

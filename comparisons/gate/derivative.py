@@ -160,12 +160,13 @@ def _right(asked: Asked, candidates: Sequence[Picture]) -> _Right:
 
 def _of_primal(asked: Asked) -> _Right:
     """Central differences of the caller's pictures, and of one pair at twice the step."""
-    assert asked.primal is not None
-    assert asked.at is not None
-    step = asked.step or STEP * (abs(asked.at) or 1.0)
+    primal, at = asked.primal, asked.at
+    assert primal is not None
+    assert at is not None
+    step = asked.step or STEP * (abs(at) or 1.0)
 
     def difference(seed: int, h: float) -> FloatArray:
-        pair = [np.asarray(asked.primal(asked.at + x, seed), np.float64) for x in (h, -h)]
+        pair = [np.asarray(primal(at + x, seed), np.float64) for x in (h, -h)]
         for picture in pair:
             if picture.ndim != 3 or picture.shape[-1] != 3 or picture.shape != pair[0].shape:
                 raise ImageError(f"primal: got the shape {picture.shape}; expected (h, w, 3)")

@@ -203,8 +203,8 @@ def _summed(
         raise NoCounterpartError("the step changes what Mitsuba's scene is made of")
     speeds: dict[str, FloatArray] = {}
     for key in names:
-        values = [_numbers(one[key]) for one in listed]
-        if key in UNMOVED or values[0] is None:
+        values = [found for one in listed if (found := _numbers(one[key])) is not None]
+        if key in UNMOVED or not values:
             continue
         if any(value.shape != values[0].shape for value in values):
             raise NoCounterpartError(f"the step changes how many numbers {key} has")
