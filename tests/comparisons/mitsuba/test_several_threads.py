@@ -3,17 +3,25 @@ threads, of which one may be stopped at any line while another one goes on."""
 
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any
 
 import pytest
 
-from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.plugins.base import PlainScene
 
 LAMP = {"type": "mesh_area", "radiance": {"type": "rgb", "value": 1.0}}
 SCENE = {"type": "scene", "lamp": {"type": "cube", "emitter": LAMP}}
+
+
+@pytest.fixture(autouse=True)
+def scalar_variant() -> Iterator[None]:
+    """In the others Dr.Jit compiles code for all emitters that exist: one that a stopped thread's
+    frames keep, whose mesh is gone, would end a later test's process."""
+    with scalar():
+        yield
 
 
 class _StoppedError(Exception):
