@@ -21,7 +21,7 @@ from comparisons.compare.derivative_causes import Ours, likeliest
 from comparisons.compare.looks import FIRST, Pool, mean_picture, most_kept, until_decided
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.renderers import NoCounterpartError
-from comparisons.results.case import Case, Images, RungResult, decide
+from comparisons.results.case import Case, Cause, Images, RungResult, decide
 from comparisons.statistics import Known, replicates_asked, standard_error
 from comparisons.statistics.cells import Margins
 from comparisons.statistics.decide import compare
@@ -38,6 +38,9 @@ PILOTS = 4
 
 MOST_TIMES = 64
 """Times as many samples that the noisier side has at most."""
+
+NEAR = 4.0
+"""Standard deviations of a sum that counts as right."""
 
 DEAR = 16
 """Times as many samples of an integrator whose pictures cost as much with few as with many."""
@@ -84,6 +87,8 @@ def derivative_case(
         half = partial(_at_half_size, scene, budget)
         cause = likeliest(ours, right, wrong, both.margins(), half)
     rungs.append(adjoint)
+    if adjoint.status == "differ":
+        cause = _wrong_mode(adjoint, right) or cause
     verdict, reason = decide(rungs, None)
     notes = (
         f"derivatives by {theirs.moving.path}, in W/sr/m2 per unit of it; in Mitsuba "
@@ -145,7 +150,7 @@ class _Theirs:
         """The rung: the sum of the derivative's pixels with random weights, by both modes with the
         same seed.  They differ by the rounding of float32 alone, of as many terms as a picture has
         samples, whose errors are unrelated: the root of their number times half a unit."""
-        weights = np.random.default_rng(0).random(self._shape)
+        weights = _weights(self._shape)
         spp = self.times * self._spp
         picture = self.picture(0)
         forward = float((weights * picture).sum())
@@ -157,6 +162,25 @@ class _Theirs:
         if not abs(forward - reverse) <= bound:
             return RungResult("adjoint", "differ", f"the two modes differ: {told}", numbers)
         return RungResult("adjoint", "agree", f"{told} and random numbers", numbers)
+
+
+def _weights(shape: tuple[int, ...]) -> FloatArray:
+    """Random ones from 0 to 1, always the same."""
+    return np.random.default_rng(0).random(shape)
+
+
+def _wrong_mode(adjoint: RungResult, right: FloatArray) -> Cause | None:
+    """Which of the two modes ours say is wrong: the one whose sum is not theirs, if the other one's
+    is.  Each of Mitsuba's is of one picture: about as noisy as one of ours."""
+    sums = (_weights(right.shape[1:]) * right).sum(axis=(1, 2, 3))
+    mean, noise = float(sums.mean()), float(sums.std(ddof=1)) * math.sqrt(1.0 + 1.0 / len(sums))
+    apart = {mode: abs(adjoint.numbers[mode] - mean) for mode in ("forward", "reverse")}
+    near = [mode for mode, distance in apart.items() if distance <= NEAR * noise]
+    if len(near) != 1:
+        return None
+    (wrong,) = apart.keys() - near
+    told = f"with the same weights ours is {mean:.7g} ± {noise:.2g}, as {near[0]} mode says"
+    return Cause(f"{wrong} mode is wrong", told, 1.0)
 
 
 class _Both:

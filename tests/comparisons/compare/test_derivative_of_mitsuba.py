@@ -81,6 +81,17 @@ def test_modes_that_differ_are_seen(monkeypatch):
     found = case("materials.floor.reflectance")
     assert found.verdict == "differ"
     assert found.reason.startswith("adjoint: the two modes differ")
+    assert found.cause is None
+
+
+@needs_llvm
+@pytest.mark.parametrize("mode", ["forward", "reverse"])
+def test_which_mode_is_wrong_is_said(monkeypatch, mode):
+    true = getattr(Moving, mode)
+    monkeypatch.setattr(Moving, mode, lambda self, *given: 0.5 * true(self, *given))
+    found = case("materials.floor.reflectance")
+    assert found.verdict == "differ"
+    assert found.cause.name == f"{mode} mode is wrong"
 
 
 SPEEDS = {
