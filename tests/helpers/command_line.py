@@ -36,6 +36,7 @@ ARGUMENTS = {
     "bench": ["--scenes", str(Path(SCENE).parent)],
     "stability": [],
     "derivative": [SCENE, "camera.eye[0]"],
+    "derivatives": ["--scenes", str(Path(SCENE).parent)],
     "explain": [SCENE],
     "convert": [SCENE],
     "preview": [SCENE],

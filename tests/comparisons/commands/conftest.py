@@ -8,6 +8,7 @@ import pytest
 from command_line import WorkBegan
 
 import comparisons.mitsuba.backend
+import comparisons.translator.derivative  # which would keep what stands for `mitsuba` below
 import reference_rt.rendering.executor
 import reference_rt.scene.build
 

@@ -60,6 +60,8 @@ FILES = {
     ],
     ("stability", "markdown"): [""],
     ("stability", "plots"): ["x"],
+    ("derivatives", "out"): ["results.json", "report.html", "cases/x"],
+    ("derivatives", "markdown"): [""],
     ("truth", "out"): ["results.json", "report.html"],
     ("truth", "markdown"): [""],
 }  # fmt: skip

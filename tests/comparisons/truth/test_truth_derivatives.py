@@ -9,6 +9,7 @@ import pytest
 from command_line import invoke
 from matplotlib.mathtext import MathTextParser
 
+from comparisons.mitsuba.backend import LLVM, backend
 from comparisons.truth.case import AREAS, Derivative, chosen, derivatives
 from comparisons.truth.judge import judge
 from comparisons.truth.outputs import plain_formula
@@ -114,14 +115,19 @@ def test_another_renderers_derivative_is_judged_by_the_same_rows():
 
 
 def test_the_command(tmp_path):
-    done = invoke("truth", "--derivatives", "spot_*", "point*", "-o", tmp_path, "--scenes", SCENES)
+    """Mitsuba has no derivative by the place of a lamp, and in forward mode a spot's cutoff is
+    mixed with its beam (findings/mitsuba-forward-mode-loses.sh): that does not fail the run."""
+    names = ("spot_*", "point*", "diffuse_furnace*")
+    done = invoke("truth", "--derivatives", *names, "-o", tmp_path, "--scenes", SCENES)
     assert done.exit_code == 0, done.output
     rows = json.loads((tmp_path / "results.json").read_text())["rows"]
-    assert {row["case"]: row["status"] for row in rows} == {
-        "point_over_floor_by_height": "right",
-        "spot_falloff_by_cutoff": "right",
-    }
     assert {row["renderer"] for row in rows} == {*DIFFERENTIATED}
+    found = {(row["case"], row["renderer"]): row["status"] for row in rows}
+    assert {status for (_, who), status in found.items() if who == "ours"} == {"right"}
+    if backend().variant == LLVM:
+        assert found["diffuse_furnace_by_reflectance", "mitsuba"] == "right"
+        assert found["spot_falloff_by_cutoff", "mitsuba"] == "off"
+        assert found["point_over_floor_by_height", "mitsuba"] == "not comparable"
     page = (tmp_path / "report.html").read_text()
     assert "`point_over_floor` by `lights[0].position[2]`" in page
 
