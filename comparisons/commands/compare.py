@@ -107,6 +107,8 @@ def compare(
     """
     if fixed and time_limit is not None:
         raise UsageError("got --fixed and --time-limit; expected one of them")
+    if derivative is not None and witness is not None:
+        raise UsageError("got --derivative and --witness, which judges pictures; expected one")
     if derivative is None and (differentiator or guiding or step):
         raise UsageError("got an option of a derivative; expected --derivative PARAMETER, too")
     limit = None if time_limit is None else seconds_of(time_limit, "--time-limit")

@@ -74,12 +74,12 @@ def derivatives(
     ]
     asked = suite.load()
     planned = suite.plan(asked, scenes, chosen, names or ())
-    writes = Outputs(out, (), markdown=(markdown, suite.NAME))
+    written = ("results.json", "report.html")
+    writes = Outputs(out, written, ("cases",), markdown=(markdown, suite.NAME))
     writes.check()
 
     def tell(run: Run) -> None:
         summarise(run.cases, run.walls, run.not_run, run.missing, every=True)
-        say(f"{options.results}, {options.report}", err=True)
 
     with closing(Pool(workers or 1)) as pool:
         options = Options(out, workers=pool, threads=threads, fresh=fresh, tell=tell)
@@ -100,7 +100,6 @@ def derivative_gate(
     *,
     spp: int | None,
     size: str | None,
-    seed: int | None,
     limit: float,
     step: float | None,
     threads: int | None,
@@ -122,7 +121,7 @@ def derivative_gate(
         raise UsageError("--derivative: expected --scene, or one --reference, which is exact")
     Outputs(out, ("results.json", "report.html")).prepare()
     pictures = [p.radiance for path in candidates for p in read_candidates(path, layer)]
-    described = None if scene is None else adjusted(Scene.load(scene), spp, size, None, seed)
+    described = None if scene is None else adjusted(Scene.load(scene), spp, size)
     asked = Asked(
         scene=described,
         parameter=parameter if scene else "",

@@ -219,26 +219,25 @@ def gate(
         raise UsageError("--size: only applies to --scene; expected that too")
     if scene is None and not driven and spp is not None:
         raise UsageError("--spp: only applies to --scene or --command; expected one of them")
-    if truth is not None:
-        others: dict[str, Any] = {
-            "scene": scene,
-            "reference": reference,
-            "variance": variance,
-            "size": size,
-        }
-        others |= {"baseline": baseline, "fixed": fixed, "noise-free": noise_free, "rim": rim}
-        others |= {"witness": witness, "browser": browser, "allow-missing": allow_missing}
-        others |= {"tone-curve": tone_curve}
+    if truth is not None or derivative is not None:
+        alone = "--truth" if derivative is None else "--derivative"
+        others: dict[str, Any] = {"scene": scene, "reference": reference, "size": size}
+        if derivative is not None:
+            others = {"truth": truth, "command": command, "reference-layer": reference_layer}
+        others |= {"variance": variance, "baseline": baseline, "fixed": fixed, "rim": rim}
+        others |= {"noise-free": noise_free, "witness": witness, "browser": browser}
+        others |= {"allow-missing": allow_missing, "tone-curve": tone_curve}
         for name, value in {**others, "junit": junit, "github": github, "define": define}.items():
             if value:
-                raise UsageError(f"--{name}: does not apply to --truth; expected one of them")
+                raise UsageError(f"--{name}: does not apply to {alone}; expected one of them")
+    if truth is not None:
         numbers = {"replicates": replicates, "spp": spp, "seed": seed}
         truth_gate(truth, candidates or (), command, layer, out, suffix=suffix,
                    seconds=seconds, **numbers)  # fmt: skip
     if derivative is not None:
         derivative_gate(
             candidates or (), derivative, scene, reference or (), layer, out,
-            spp=spp, size=size, seed=seed, limit=limit, step=step, threads=threads,
+            spp=spp, size=size, limit=limit, step=step, threads=threads,
         )  # fmt: skip
     if step is not None:
         raise UsageError("--step: only applies to --derivative; expected that too")

@@ -27,11 +27,9 @@ from comparisons.statistics.cells import Margins
 from comparisons.statistics.decide import compare
 from comparisons.statistics.sides import side_of
 from comparisons.translator.derivative import Differentiator, Moving
+from comparisons.translator.reference import inexact
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
-
-SECONDS = 120.0
-"""For replicates where the budget has no limit of time."""
 
 PILOTS = 4
 """Pictures of each side that show which is noisier, and are not used again."""
@@ -68,16 +66,20 @@ def derivative_case(
     say(f"adjoint: {adjoint.status}")
     ours = Ours(scene, asked.parameter, asked.step, threads)
     both = _Both(theirs, ours, budget.limit)
-    looked = until_decided(
-        both.grow,
-        both.look,
-        seconds=budget.seconds or SECONDS,
-        first=max(FIRST, budget.replicates),
-        most=both.most,
-        asked=both.asked,
-        say=say,
-    )
-    found = looked.judged
+    if budget.seconds is None:
+        both.grow(budget.replicates)
+        found = both.look(1.0)
+    else:
+        looked = until_decided(
+            both.grow,
+            both.look,
+            seconds=budget.seconds,
+            first=max(FIRST, budget.replicates),
+            most=both.most,
+            asked=both.asked,
+            say=say,
+        )
+        found = looked.judged
     wrong, right = both.pictures()
     numbers = found.numbers | {"candidate_error": _error(wrong, right)}
     rungs = [RungResult("derivative", found.status, found.reason, numbers)]
@@ -94,6 +96,10 @@ def derivative_case(
         f"derivatives by {theirs.moving.path}, in W/sr/m2 per unit of it; in Mitsuba "
         f"{', '.join(theirs.moving.moved)} move with it",
         *ours.notes(),
+        *(
+            f"Mitsuba's own {plugin} is differentiated, while a comparison of pictures says: {note}"
+            for plugin, note in dict.fromkeys(inexact(scene))
+        ),
     )
     return Case(
         scene=scene.name,

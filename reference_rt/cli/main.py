@@ -18,7 +18,10 @@ from reference_rt.cli.guarded import guarded, is_output_lost, lost_output, say
 from reference_rt.cli.options import (
     AllowMissing,
     Defaults,
+    IntegratorName,
     SceneArgument,
+    Seed,
+    Size,
     adjusted,
     by_name,
     without_blas,
@@ -80,11 +83,9 @@ def render(
         Path, typer.Option("--output", "-o", help="An .exr (all layers) or .png file.")
     ],
     spp: Annotated[int | None, typer.Option(help="Samples per pixel.")] = None,
-    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
-    integrator: Annotated[
-        str | None, typer.Option(help="ray_cast, whitted, direct or path.")
-    ] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the random numbers.")] = None,
+    size: Size = None,
+    integrator: IntegratorName = None,
+    seed: Seed = None,
     threads: Threads = None,
     define: Defaults = None,
     allow_missing: AllowMissing = False,
@@ -142,7 +143,7 @@ def preview(
     target_error: Annotated[
         str, typer.Option(help="End at this relative standard error of the picture.")
     ] = "1%",
-    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
+    size: Size = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Default: all cores.")] = None,
     watch: Annotated[
         bool,
@@ -196,11 +197,9 @@ def derivative(
         typer.Option(help="In the parameter's unit. (default: 1/256 of its scale)"),
     ] = None,
     spp: Annotated[int | None, typer.Option(help="Samples per pixel of each picture.")] = None,
-    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
-    integrator: Annotated[
-        str | None, typer.Option(help="ray_cast, whitted, direct or path.")
-    ] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the random numbers.")] = None,
+    size: Size = None,
+    integrator: IntegratorName = None,
+    seed: Seed = None,
     threads: Threads = None,
     define: Defaults = None,
     allow_missing: AllowMissing = False,
@@ -245,11 +244,9 @@ def trace(
         typer.Option(metavar="FILE", help="Also write a page that draws the rays in the scene."),
     ] = None,
     spp: Annotated[int | None, typer.Option(help="Samples per pixel.")] = None,
-    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
-    integrator: Annotated[
-        str | None, typer.Option(help="ray_cast, whitted, direct or path.")
-    ] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the random numbers.")] = None,
+    size: Size = None,
+    integrator: IntegratorName = None,
+    seed: Seed = None,
     define: Defaults = None,
     allow_missing: AllowMissing = False,
 ) -> None:

@@ -29,6 +29,12 @@ Defaults = Annotated[
     ),
 ]
 
+Size = Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")]
+
+IntegratorName = Annotated[str | None, typer.Option(help="ray_cast, whitted, direct or path.")]
+
+Seed = Annotated[int | None, typer.Option(help="Seed of the random numbers.")]
+
 AllowMissing = Annotated[
     bool,
     typer.Option(

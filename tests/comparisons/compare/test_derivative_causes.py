@@ -67,6 +67,8 @@ FAULTS = {
     "mirrored": ("the picture is mirrored", ALBEDO, lambda x: x[:, :, ::-1]),
     "the size": ("the size in place of the value", RADIUS, np.abs),
     "nothing": ("it is 0", ALBEDO, np.zeros_like),
+    "next to nothing": ("it is 0", ALBEDO, lambda x: 1e-9 * x[:, ::-1]),
+    "nothing below 0": ("negative values are cut off", RADIUS, lambda x: np.maximum(x, 0.0)),
     "channels exchanged": ("?", ALBEDO, lambda x: x[..., ::-1]),
     "a corner is lost": ("?", ALBEDO, lambda x: np.where(np.arange(12)[:, None] < 5, 0.0, x)),
 }
@@ -119,9 +121,21 @@ def test_a_factor_that_grows_with_the_number_of_pixels():
     found = likeliest(ours, right, wrong, Margins(), lambda: (right, 0.25 * wrong))
     assert found is not None
     assert found.name == "a factor that grows with the number of pixels"
-    same = likeliest(ours, right, wrong, Margins(), lambda: (right, wrong))
-    assert same is not None
-    assert same.name == "a constant factor"
+    noise = np.random.default_rng(3).normal(size=right.shape)
+    for small in (wrong, noise, np.zeros_like(wrong)):  # which do not show that it grows
+        same = likeliest(ours, right, wrong, Margins(), lambda small=small: (right, small))
+        assert same is not None
+        assert same.name == "a constant factor"
+
+
+def test_what_few_samples_do_not_show_has_no_cause():
+    """A small slope, seen with little noise: each hypothesis would seem to explain it."""
+    ours, rng = Ours(scene(), ALBEDO), np.random.default_rng(1)
+    mean = ours.replicates(COUNT).mean(axis=0)
+    sloped = np.linspace(0.997, 1.003, 12)[:, None] * mean
+    right, wrong = (x * rng.normal(1.0, 3e-4, (COUNT, *mean.shape)) for x in (mean, sloped))
+    assert judged(wrong, right, 0.05, Margins()).status == "differ"
+    assert likeliest(ours, right, wrong, Margins(), None) is None
 
 
 HEAVY = {
@@ -137,19 +151,21 @@ HEAVY = {
 }
 
 
+@pytest.mark.parametrize("pairs", [20, pytest.param(500, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("one", HEAVY)
 @pytest.mark.parametrize("two", HEAVY)
-def test_right_derivatives_are_not_called_wrong(one, two):
-    """Of 40 pairs with one mean, none differs: the stated level is one in a thousand.  Both sides'
-    noise is of its own law, as that of differences and of AD is; the mean changes its sign over the
-    picture, so that its mean is near 0."""
+def test_right_derivatives_are_not_called_wrong(one, two, pairs):
+    """The stated level is one in a thousand: of 500 pairs with one mean 4 differ with a chance of
+    0.002, and of 20 one does with 0.02.  Both sides' noise is of its own law, as that of
+    differences and of AD is; the mean changes its sign over the picture, so that its mean is near
+    0."""
     rng = np.random.default_rng(5)
     mean = np.linspace(-1.0, 1.2, 16)[:, None, None] * np.ones((16, 16, 3))
     alarms = 0
-    for _ in range(40):
+    for _ in range(pairs):
         a, b = (mean + 0.3 * HEAVY[law](rng, (COUNT, 16, 16, 3)) for law in (one, two))
         alarms += judged(a, b, 0.05, Margins()).status == "differ"
-    assert alarms == 0
+    assert alarms <= (0 if pairs < 100 else 3)
 
 
 def test_a_bias_is_relative_to_the_size_and_not_to_the_mean():

@@ -50,6 +50,23 @@ def test_a_reflectance_agrees_in_both_modes():
 
 
 @needs_llvm
+def test_fixed_replicates_are_looked_at_once():
+    mitsuba()
+    asked = Asked(parameter="materials.floor.reflectance")
+    budget = usual(64, 8, fixed=True, limit=0.05, derivative=asked)
+    found = compare_scene(Subject(Scene.parse(DISK)), budget, lambda line: None)
+    numbers = found.rungs[0].numbers
+    assert numbers["replicates_candidate"] == numbers["replicates_reference"] == 8
+    assert "looks" not in numbers
+
+
+@needs_llvm
+def test_what_pictures_would_replace_is_noted():
+    found = case("materials.floor.reflectance", DISK.replace("type: diffuse, ", "type: plastic, "))
+    assert any("own plastic is differentiated" in note for note in found.notes)
+
+
+@needs_llvm
 def test_edges_that_move_are_left_out_by_prb():
     found = case("shapes[1].transform[0].scale")
     assert found.verdict == "differ"
@@ -180,3 +197,4 @@ def test_the_command(tmp_path):
     assert refused.exit_code == 2
     assert "expected such as" in refused.stderr
     assert invoke(*options, "--guiding", "none").exit_code == 2
+    assert invoke(*options, *asked, "--witness", "cycles").exit_code == 2

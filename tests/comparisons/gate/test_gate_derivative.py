@@ -104,6 +104,21 @@ def test_the_command(right, tmp_path):
     assert invoke("gate", str(tmp_path / "d.npy"), *exact, "--step", "1", *out).exit_code == 2
 
 
+@pytest.mark.parametrize(
+    "option",
+    [
+        *(["--junit", "x.xml"], ["--github"], ["-D", "a=1"], ["--witness", "cycles"]),
+        *(["--baseline", "room"], ["--noise-free"], ["--rim", "1"], ["--truth", "disk_lamp"]),
+    ],
+    ids=lambda option: option[0],
+)
+def test_no_option_is_passed_over_in_silence(tmp_path, option):
+    exact = ["--reference", "exact.npy", "--derivative", "radius", "-o", str(tmp_path)]
+    found = invoke("gate", "d.npy", *exact, *option)
+    assert found.exit_code == 2
+    assert "does not apply to --derivative" in found.stderr
+
+
 def test_the_fixture(derivative_gate, right, tmp_path, monkeypatch):
     """A right derivative passes, and a wrong one fails the test with its cause."""
     monkeypatch.setattr(derivative_gate, "_out", tmp_path)
