@@ -86,7 +86,7 @@ def derivative_case(
     cause = None
     if found.status == "differ":
         say("looks for a cause")
-        half = partial(_at_half_size, scene, budget)
+        half = partial(_at_half_size, scene, budget, ours.times)
         cause = likeliest(ours, right, wrong, both.margins(), half)
     rungs.append(adjoint)
     if adjoint.status == "differ":
@@ -125,15 +125,17 @@ def _error(wrong: FloatArray, right: FloatArray) -> float | None:
     return float((errors[seen] / size[seen]).max()) if seen.any() else None
 
 
-def _at_half_size(scene: Scene, budget: Budget) -> tuple[FloatArray, FloatArray]:
-    """Replicates of ours and of Mitsuba's with half as many pixels along each side."""
+def _at_half_size(scene: Scene, budget: Budget, times: int) -> tuple[FloatArray, FloatArray]:
+    """Replicates of ours and of Mitsuba's with half as many pixels along each side;  times: as of
+    `Ours`."""
     asked, film = budget.derivative, scene.film
     assert asked is not None
     update = {"width": max(1, film.width // 2), "height": max(1, film.height // 2)}
     small = scene.changed(film=film.model_copy(update=update))
     theirs = _Theirs(small, asked.parameter, Differentiator(asked.integrator, asked.guiding))
-    ours = Ours(small, asked.parameter, asked.step).replicates(FIRST)
-    return ours, np.stack([theirs.picture(k) for k in range(FIRST)])
+    ours = Ours(small, asked.parameter, asked.step)
+    ours.times = times
+    return ours.replicates(FIRST), np.stack([theirs.picture(k) for k in range(FIRST)])
 
 
 class _Theirs:

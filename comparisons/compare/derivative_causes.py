@@ -55,8 +55,11 @@ UNITS = {
 EDGES = "edges that move are left out"
 
 NEAR = 0.01
-"""How near a factor must be to one of UNITS, its standard error to nothing, and the size of what is
-called 0."""
+"""How near a factor must be to one of UNITS, and its standard error to nothing."""
+
+NOTHING = 1e-3
+"""The size, in parts of the derivative's, of what is called 0: less than any factor that is right
+but for a few constants."""
 
 MOST = 16
 """Replicates of a hypothesis, of the scene's samples each: it need not be seen as exactly as the
@@ -158,7 +161,7 @@ def likeliest(
         inner = [_inner(x, one.rim) for x in (picture, few, wrong)]
         if inner[0].size and _is(inner[0], inner[2], margins):
             return Cause(one.name, one.evidence, _explained(*inner))
-        if one.name == EDGES and _size(wrong) <= NEAR * _size(right):
+        if one.name == EDGES and _size(wrong) <= NOTHING * _size(right):
             return Cause("it is 0", "the candidate does not see the parameter move", 1.0)
     return None
 
