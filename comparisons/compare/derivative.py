@@ -56,6 +56,7 @@ def derivative_case(
     assert asked is not None
     differentiator = Differentiator(asked.integrator, asked.guiding)
     sides = (f"Mitsuba's ({differentiator.words})", "ours")
+    whole, scene = scene, differentiator.seen_of(scene)
     try:
         theirs = _Theirs(scene, asked.parameter, differentiator)
         adjoint = theirs.adjoint()  # Mitsuba refuses before any work of ours
@@ -96,6 +97,11 @@ def derivative_case(
         f"derivatives by {theirs.moving.path}, in W/sr/m2 per unit of it; in Mitsuba "
         f"{', '.join(theirs.moving.moved)} move with it",
         *ours.notes(),
+        *(
+            [f"both sides have direct light alone (max_depth 2), as {differentiator.name} has"]
+            if scene is not whole
+            else []
+        ),
         *(
             f"Mitsuba's own {plugin} is differentiated, while a comparison of pictures says: {note}"
             for plugin, note in dict.fromkeys(inexact(scene))

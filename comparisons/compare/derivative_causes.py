@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from comparisons.compare.path_length import DIRECT
-from comparisons.compare.single_lights import without_each
+from comparisons.compare.single_lights import each_alone, without_each
 from comparisons.results.case import Cause
 from comparisons.statistics.cells import Margins
 from comparisons.statistics.decide import compare
@@ -28,12 +28,16 @@ from reference_rt.rendering.derivative import (
     derivative,
     difference,
 )
+from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.parameters import parameter
 from reference_rt.util.errors import ReferenceRtError
 
 SEED = 3 << 40
 """Of our replicates: far from those of users."""
+
+PICTURES = SEED + (1 << 32)
+"""The first seed of pictures."""
 
 NO_EDGE = 2.0**-30
 """A step, in parts of the parameter's scale, that no sample crosses an edge with: if an edge sweeps
@@ -60,6 +64,9 @@ NEAR = 0.01
 NOTHING = 1e-3
 """The size, in parts of the derivative's, of what is called 0: less than any factor that is right
 but for a few constants."""
+
+NEAR_NOTHING = 5.0
+"""Standard errors from which on a share is none of noise."""
 
 MOST = 16
 """Replicates of a hypothesis, of the scene's samples each: it need not be seen as exactly as the
@@ -107,6 +114,12 @@ class Ours:
         """Those of another scene, or with another step."""
         return self._derivative(scene, count, seed, step or self.step, 1).replicates
 
+    def pictures(self, scene: Scene, count: int) -> FloatArray:
+        """Replicates of a scene's picture, not of its derivative."""
+        seeds = range(PICTURES, PICTURES + count)
+        found = [render(scene, seed=seed, threads=self.threads).colour for seed in seeds]
+        return np.stack(found)
+
     def _derivative(
         self, scene: Scene, count: int, begun: int, step: float | None, times: int
     ) -> Derivative:
@@ -148,7 +161,8 @@ def likeliest(
     """
     if (found := _factor(right, wrong, margins, at_half_size)) is not None or ours is None:
         return found
-    few = ours.of(ours.scene, min(len(right), MOST))
+    count = min(len(right), MOST)
+    few = right[:count] if ours.times == 1 else ours.of(ours.scene, count)
     if _is(few, wrong, margins):
         return None
     for one in _hypotheses(ours, few):
@@ -163,6 +177,32 @@ def likeliest(
             return Cause(one.name, one.evidence, _explained(*inner))
         if one.name == EDGES and _size(wrong) <= NOTHING * _size(right):
             return Cause("it is 0", "the candidate does not see the parameter move", 1.0)
+    return _detached(ours, few, wrong, margins)
+
+
+def _detached(ours: Ours, right: FloatArray, wrong: FloatArray, margins: Margins) -> Cause | None:
+    """A lamp's size, say, changes the density p of the points that are sampled on it.  Where light
+    f / p is differentiated as if p stood still, f p' / p^2 is missing: of a density that is the
+    same everywhere, the picture under that lamp alone times the change of ln p."""
+    count = len(right)
+    for name, scene in each_alone(ours.scene):
+        if not hasattr(scene.integrator, "hide_emitters"):
+            return None
+        # The camera's own view of the lamp is not sampled by it.
+        hidden = scene.integrator.model_copy(update={"hide_emitters": True})
+        light = ours.pictures(scene.changed(integrator=hidden), count)
+        change, error = factor_of(light, right - wrong)
+        if not abs(change) > NEAR_NOTHING * error:
+            continue
+        picture = right - change * light
+        if _is(picture, wrong, margins):
+            return Cause(
+                "detached sampling",
+                f"{change:.4g} ± {error:.1g} times the light of {name} is missing, as where the "
+                "density of the points that are sampled there is held while the parameter changes "
+                "it",
+                _explained(picture, right, wrong),
+            )
     return None
 
 

@@ -25,29 +25,31 @@ def single_lights(
 ) -> Mapping[str, FloatArray]:
     """Our picture (height, width, 3) under each light or emissive material alone, by its name;
     empty if there are fewer than two, or more than MOST."""
-    shining = [name for name, m in scene.materials.items() if isinstance(m, Emissive)]
-    lights = [k for k, light in enumerate(scene.lights) if not isinstance(light, Ambient)]
-    if not 2 <= len(shining) + len(lights) <= MOST:
+    if not 2 <= len(list(each_alone(scene))) <= MOST:
         return {}
     sampler = scene.resolved_sampler
     if hasattr(sampler, "seed"):
         sampler = sampler.model_copy(update={"spp": spp})
-    pictures = {}
-    for name in shining:
-        one = scene.changed(lights=(), materials=_only(scene, name), sampler=sampler)
-        pictures[f"the material '{name}'"] = render(one, threads=threads).colour
-    for k in lights:
+    return {
+        name: render(one.changed(sampler=sampler), threads=threads).colour
+        for name, one in each_alone(scene)
+    }
+
+
+def each_alone(scene: Scene) -> Iterator[tuple[str, Scene]]:
+    """The scene under each light or emissive material alone, by its name."""
+    for name in _shining(scene):
+        yield f"the material '{name}'", scene.changed(lights=(), materials=_only(scene, name))
+    for k in _lights(scene):
         light = scene.lights[k]
-        one = scene.changed(lights=(light,), materials=_only(scene, None), sampler=sampler)
-        pictures[f"lights[{k}] ({light.type})"] = render(one, threads=threads).colour
-    return pictures
+        one = scene.changed(lights=(light,), materials=_only(scene, None))
+        yield f"lights[{k}] ({light.type})", one
 
 
 def without_each(scene: Scene) -> Iterator[tuple[str, Scene]]:
     """The scene without one of its lights or emissive materials, by its name; nothing if there are
     fewer than two, or more than MOST.  The others keep their places."""
-    shining = [name for name, m in scene.materials.items() if isinstance(m, Emissive)]
-    lights = [k for k, light in enumerate(scene.lights) if not isinstance(light, Ambient)]
+    shining, lights = _shining(scene), _lights(scene)
     if not 2 <= len(shining) + len(lights) <= MOST:
         return
     for name in shining:
@@ -57,6 +59,16 @@ def without_each(scene: Scene) -> Iterator[tuple[str, Scene]]:
         light = scene.lights[k]
         others = (*scene.lights[:k], OUT, *scene.lights[k + 1 :])
         yield f"lights[{k}] ({light.type})", scene.changed(lights=others)
+
+
+def _shining(scene: Scene) -> list[str]:
+    """The names of emissive materials."""
+    return [name for name, m in scene.materials.items() if isinstance(m, Emissive)]
+
+
+def _lights(scene: Scene) -> list[int]:
+    """The places of lights that light reaches surfaces from."""
+    return [k for k, light in enumerate(scene.lights) if not isinstance(light, Ambient)]
 
 
 def _only(scene: Scene, name: str | None) -> dict[str, AnyMaterial]:

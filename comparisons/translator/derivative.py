@@ -23,6 +23,7 @@ from comparisons.results.differentiators import DifferentiatorName, Guiding
 from comparisons.translator import MOST_INSTANCES, to_mitsuba
 from comparisons.translator.native import MOST_TOLD, failing
 from reference_rt.core.arrays import FloatArray
+from reference_rt.integrators import Light, Path
 from reference_rt.rendering.derivative import difference
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceUnavailableError
@@ -52,6 +53,16 @@ class Differentiator:
         """Whether it builds an octree of edges for each picture: 8 CPU s, however few samples it
         has (Mitsuba 3.9.1, 16 x 16 pixels, a disk over a floor)."""
         return self.name in PROJECTIVE and self.guiding in (None, "octree")
+
+    def seen_of(self, scene: Scene) -> Scene:
+        """The scene as far as this integrator sees its light."""
+        whole = scene.integrator
+        if self.name != "direct_projective" or not isinstance(whole, Path | Light):
+            return scene
+        if whole.max_depth == SEES_DIRECT_LIGHT:
+            return scene
+        update = {"max_depth": SEES_DIRECT_LIGHT}
+        return scene.changed(integrator=whole.model_copy(update=update))
 
     def of(self, scene: Scene) -> dict[str, Any]:
         """Its dictionary for a scene's integrator.  Raises NoCounterpartError."""

@@ -4,7 +4,7 @@ The wrong ones are made of our own differences of other scenes, of other random 
 of Mitsuba's, and no part of `likeliest`, makes them.
 """
 
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ import pytest
 from comparisons.compare.derivative import judged, margins
 from comparisons.compare.derivative_causes import Ours, likeliest
 from comparisons.statistics.cells import Margins
-from reference_rt import Scene
+from reference_rt import Scene, render
 
 ROOM = """
 film: {width: 12, height: 12}
@@ -42,15 +42,22 @@ def scene(text: str = ROOM) -> Scene:
     return Scene.parse(text)
 
 
+@cache
 def others(path: str, text: str = ROOM, **options) -> np.ndarray:
     """Replicates with random numbers that no other ones here have."""
     return Ours(scene(text), path).of(scene(text), COUNT, seed=1000, **options)
 
 
+@cache
+def right_of(path: str) -> tuple[Ours, np.ndarray]:
+    """Ours, and its replicates."""
+    ours = Ours(scene(), path)
+    return ours, ours.replicates(COUNT)
+
+
 def told(path: str, wrong: np.ndarray) -> str:
     """The cause of a difference; "" without a difference, "?" without a cause."""
-    ours = Ours(scene(), path)
-    right = ours.replicates(COUNT)
+    ours, right = right_of(path)
     found = judged(wrong, right, 0.05, Margins())
     if found.status != "differ":
         return ""
@@ -104,6 +111,31 @@ def test_what_is_missing(cause, old, new):
     assert told(ALBEDO, others(ALBEDO, ROOM.replace(old, new))) == cause
 
 
+LAMP = "shapes[2].transform[0].scale"
+
+
+def test_a_density_that_is_held():
+    """As where the lamp's points are sampled by its area, and the area is held: by two pictures
+    whose lamp has its power kept, which is another thing than its radiance only where it is
+    sampled.  The camera does not see the lamp's front."""
+    step, size = 2.0**-6, 0.4
+    sides = []
+    for sign in (1, -1):
+        moved = size + sign * step
+        text = ROOM.replace("radiance: 6", f"radiance: {6.0 * (size / moved) ** 2}")
+        one = scene(text.replace("scale: 0.4", f"scale: {moved}"))
+        sides.append([render(one, seed=7000 + k).colour for k in range(COUNT)])
+    wrong = np.subtract(*sides) / (2.0 * step)
+    ours, right = right_of(LAMP)
+    assert judged(wrong, right, 0.05, Margins()).status == "differ"
+    cause = likeliest(ours, right, wrong, Margins(), None)
+    assert cause is not None
+    assert cause.name == "detached sampling"
+    share, _, error = cause.evidence.split(" times")[0].split()
+    assert abs(float(share) - 2.0 / size) < 4.0 * float(error)  # of the logarithm of an area
+    assert "the material 'lamp'" in cause.evidence
+
+
 @pytest.mark.parametrize(("down", "across"), [(1, 0), (0, -1), (1, 1)])
 def test_half_a_pixel(down, across):
     """Pixels half as large, moved by one of them: but the rim, as a camera that is moved makes
@@ -116,8 +148,8 @@ def test_half_a_pixel(down, across):
 
 def test_a_factor_that_grows_with_the_number_of_pixels():
     """A quarter of the pixels, a quarter of the factor."""
-    ours = Ours(scene(), ALBEDO)
-    right, wrong = ours.replicates(COUNT), 0.01 * others(ALBEDO)
+    ours, right = right_of(ALBEDO)
+    wrong = 0.01 * others(ALBEDO)
     found = likeliest(ours, right, wrong, Margins(), lambda: (right, 0.25 * wrong))
     assert found is not None
     assert found.name == "a factor that grows with the number of pixels"
@@ -131,7 +163,8 @@ def test_a_factor_that_grows_with_the_number_of_pixels():
 def test_what_few_samples_do_not_show_has_no_cause():
     """A small slope, seen with little noise: each hypothesis would seem to explain it."""
     ours, rng = Ours(scene(), ALBEDO), np.random.default_rng(1)
-    mean = ours.replicates(COUNT).mean(axis=0)
+    ours.times = 64  # of `right`, below, whose noise is that of many samples
+    mean = right_of(ALBEDO)[1].mean(axis=0)
     sloped = np.linspace(0.997, 1.003, 12)[:, None] * mean
     right, wrong = (x * rng.normal(1.0, 3e-4, (COUNT, *mean.shape)) for x in (mean, sloped))
     assert judged(wrong, right, 0.05, Margins()).status == "differ"

@@ -166,6 +166,21 @@ def test_direct_projective_takes_direct_light_alone():
     assert len(DIFFERENTIATORS) == 10
 
 
+@needs_llvm
+def test_direct_projective_is_judged_by_direct_light():
+    """The disk is white, so that light of the scene comes by two bounces, too."""
+    found = case(
+        "materials.floor.reflectance",
+        DISK.replace("{type: direct}", "{type: path, max_depth: 5}").replace(
+            "black: {type: diffuse, reflectance: 0}", "black: {type: diffuse, reflectance: 0.9}"
+        ),
+        integrator="direct_projective",
+        guiding="none",
+    )
+    assert found.verdict == "agree", found.reason
+    assert any("direct light alone (max_depth 2)" in note for note in found.notes)
+
+
 def test_every_parameter_of_the_suite_is_one():
     asked = suite.load()
     planned = suite.plan(asked, ROOT / "scenes", DIFFERENTIATORS[:1])
