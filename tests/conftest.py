@@ -1,8 +1,10 @@
 """What all tests share: which of them a fast run holds, what a test may cost, wording of messages.
 
-A fast run (`pytest`) leaves out the tests marked `slow`.  `@pytest.mark.cases(n)` makes a
-parametrized test slow but for n cases.  The run prints the tests that took most CPU time, and the
-fast ones that took more than LIMIT; with `--judge-costs` it fails for these.
+A run leaves out the tests marked `slow`.  `@pytest.mark.cases(n)` makes a parametrized test slow
+but for n cases.  A run of everything (`pytest`) leaves out the dear ones, too: those that took more
+than QUICK, as `dear.json` has them; `--dear only` runs these alone, and a run of files or folders
+that are named holds them.  The run prints the tests that took most CPU time, and those that took
+more than LIMIT; with `--judge-costs` it fails for these.
 """
 
 import gc
@@ -58,10 +60,18 @@ no process is left alone with one at the end.  Files that share kernels are kept
 the second one then finds them compiled."""
 
 
+QUICK = 1.0
+"""CPU seconds above which a test is dear: four in a hundred of the tests, which took six tenths of
+the time."""
+
+DEAR = Path(__file__).with_name("dear.json")
+"""The names of dear tests, as `--write-dear` has measured them: what a test costs is nothing that a
+person knows."""
+
 LIMIT = 5.0
-"""CPU seconds that a fast test should take at most, its fixtures and child processes included, on
-an idle machine (two cores of an Intel Xeon with AVX-512).  A test during which a kernel was
-compiled into the cache is not judged: it is cheaper the next time."""
+"""CPU seconds that a test that is not slow should take at most, its fixtures and child processes
+included, on an idle machine (two cores of an Intel Xeon with AVX-512).  A test during which a
+kernel was compiled into the cache is not judged: it is cheaper the next time."""
 
 WORDING = Path(__file__).with_name("wording.json")
 """Whole messages, by the test that shows each (fixture `wording`)."""
@@ -76,12 +86,21 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help=f"fail fast tests that take more than {LIMIT:g} CPU s, for an idle machine",
     )
+    parser.addoption(
+        "--dear",
+        choices=("with", "without", "only"),
+        help="dear tests (default: without, but with them where files or folders are named)",
+    )
+    parser.addoption("--write-dear", action="store_true", help=f"write {DEAR.name} anew")
     parser.addoption("--write-wording", action="store_true", help=f"write {WORDING.name} anew")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """xdist would start with the files of the most tests, which are quick ones.  It would also
     replace a process that died by one that waits for ever: the run ends with an error instead."""
+    if config.option.dear is None:  # before xdist tells its processes the options
+        everything = config.args_source is not pytest.Config.ArgsSource.ARGS
+        config.option.dear = "without" if everything else "with"
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
         config.option.maxworkerrestart = "0"
@@ -106,8 +125,20 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.slow)
     if (tenth := config.getoption("tenth")) is not None:
         items[:] = [item for item in items if zlib.crc32(item.nodeid.encode()) % 10 == tenth % 10]
+    _leave_out_dear_ones(config, items)
     places = {name: k for k, name in enumerate(LONGEST_FIRST)}
     items.sort(key=lambda item: places.get(Path(item.path).stem, len(places)))
+
+
+def _leave_out_dear_ones(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if (dear := config.option.dear) == "with" or not DEAR.exists():
+        return
+    names = set(json.loads(DEAR.read_text(encoding="utf-8")))
+    kept = [item for item in items if (item.nodeid in names) == (dear == "only")]
+    if dear == "without":  # who asks for slow ones by -m has each of them
+        kept = [x for x in items if x.nodeid not in names or x.get_closest_marker("slow")]
+    config.hook.pytest_deselected(items=[x for x in items if x not in set(kept)])
+    items[:] = kept
 
 
 @pytest.hookimpl(trylast=True)
@@ -153,6 +184,7 @@ _begun: dict[str, tuple[float, int]] = {}
 _files_begun: set[Path] = set()
 _costs: dict[str, float] = {}
 _dear: list[str] = []
+_judged: list[str] = []
 
 
 def pytest_runtest_logstart(nodeid: str) -> None:
@@ -173,7 +205,8 @@ def pytest_runtest_makereport(
         cpu, kernels = _begun.pop(item.nodeid)
         report.cpu = _cpu() - cpu
         is_fast = item.get_closest_marker("slow") is None
-        report.is_dear = is_fast and report.cpu > LIMIT and kernels == _kernels()
+        report.is_judged = is_fast and kernels == _kernels()
+        report.is_dear = report.is_judged and report.cpu > LIMIT
         if report.is_dear and report.passed and item.config.getoption("judge_costs"):
             report.outcome = "failed"
             report.longrepr = (
@@ -201,6 +234,20 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
         _costs[report.nodeid] = getattr(report, "cpu", 0.0)
         if getattr(report, "is_dear", False):
             _dear.append(report.nodeid)
+        if getattr(report, "is_judged", False):
+            _judged.append(report.nodeid)
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Write `dear.json`: tests that did not run, or compiled, stay as they were, and a dear one is
+    no more dear from a fifth below QUICK on, so that noise does not move it to and fro."""
+    if hasattr(session.config, "workerinput") or not session.config.getoption("write_dear"):
+        return
+    names = set(json.loads(DEAR.read_text(encoding="utf-8"))) if DEAR.exists() else set()
+    for name in _judged:
+        bound = 0.8 * QUICK if name in names else QUICK
+        (names.add if _costs[name] > bound else names.discard)(name)
+    DEAR.write_text(json.dumps(sorted(names), indent=0) + "\n", encoding="utf-8")
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
