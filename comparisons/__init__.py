@@ -16,6 +16,10 @@
     case = comparisons.gate_derivative(derivatives, primal=my_picture, at=0.5)
 
 `gate_derivative` takes derivatives of pictures; see `comparisons.gate.derivative`.
+
+    checks = comparisons.testing.check_material(evaluate, sample, pdf)
+
+`testing` takes functions of a material, or of a sampler; see `comparisons.gate.material`.
 """
 
 import importlib
@@ -24,6 +28,8 @@ from typing import Any
 
 def __getattr__(name: str) -> Any:
     """Import what is named when it is first used: importing Mitsuba takes a second."""
+    if name == "testing":
+        return importlib.import_module("comparisons.gate.material")
     if name == "gate_derivative":
         return importlib.import_module("comparisons.gate.derivative").gate_derivative
     if name not in ("compare", "gate"):

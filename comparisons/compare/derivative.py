@@ -66,7 +66,7 @@ def derivative_case(
         return Case(scene.name, verdict, reason, (rung,), None, {}, sides=sides)
     say(f"adjoint: {adjoint.status}")
     ours = Ours(scene, asked.parameter, asked.step, threads)
-    both = _Both(theirs, ours, budget.limit)
+    both = _Both(theirs, ours, budget.limit, budget.seconds)
     if budget.seconds is None:
         both.grow(budget.replicates)
         found = both.look(1.0)
@@ -200,8 +200,10 @@ def _wrong_mode(adjoint: RungResult, right: FloatArray) -> Cause | None:
 class _Both:
     """The replicates of both sides."""
 
-    def __init__(self, theirs: _Theirs, ours: Ours, limit: float) -> None:
+    def __init__(self, theirs: _Theirs, ours: Ours, limit: float, seconds: float | None) -> None:
+        """seconds: that a decision should take; None: any number."""
         film = ours.scene.film
+        self._allowed = seconds or math.inf
         self.most = most_kept(FIRST, 3 * film.width * film.height)
         self._pools = Pool(self.most, mean_picture), Pool(self.most, mean_picture)
         self._theirs, self._ours, self._limit = theirs, ours, limit
@@ -222,15 +224,20 @@ class _Both:
         self.seconds["reference"]["render"] += time.perf_counter() - between
 
     def _balance(self) -> None:
-        """Give the noisier side more samples: edges that move make noise in our differences, and
-        hardly any where they are sampled."""
+        """Give the noisier side more samples, since edges that move make noise in our differences,
+        and hardly any where they are sampled: as far as the first look's pictures take no longer
+        than is allowed."""
+        start = time.perf_counter()
         theirs = np.stack([self._theirs.picture(PILOT_SEED + k) for k in range(PILOTS)])
+        between = time.perf_counter()
         ours = self._ours.of(self._ours.scene, PILOTS, seed=PILOT_SEED)
+        taken = between - start, time.perf_counter() - between
+        most = [self._allowed / (max(seconds, 1e-3) * FIRST / PILOTS) for seconds in taken]
         of_theirs, of_ours = (float(side.var(axis=0, ddof=1).sum()) for side in (theirs, ours))
         if of_theirs and of_ours:
             more = 2.0 ** round(math.log2(of_ours / of_theirs))
-            self._ours.times = int(min(max(more, 1.0), MOST_TIMES))
-            self._theirs.times *= int(min(max(1.0 / more, 1.0), MOST_TIMES))
+            self._ours.times = int(min(max(more, 1.0), MOST_TIMES, max(most[1], 1.0)))
+            self._theirs.times *= int(min(max(1.0 / more, 1.0), MOST_TIMES, max(most[0], 1.0)))
 
     def pictures(self) -> tuple[FloatArray, FloatArray]:
         """Mitsuba's, and ours."""

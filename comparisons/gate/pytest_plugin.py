@@ -1,11 +1,14 @@
-"""pytest plugin: the fixtures `image_gate` and `derivative_gate`, which check a picture, and the
-derivative of one, in one line of a test.
+"""pytest plugin: the fixtures `image_gate`, `derivative_gate` and `material_gate`, which check a
+picture, the derivative of one, and a material, in one line of a test.
 
     def test_cornell_box(image_gate):
         image_gate(my_renderer("scenes/cornell_box.yaml"), scene="scenes/cornell_box.yaml")
 
     def test_its_derivative(derivative_gate):
         derivative_gate(my_gradients(), primal=my_picture, at=0.5)
+
+    def test_my_metal(material_gate):
+        material_gate(my_evaluate, my_sample, my_pdf)
 
 It imports nothing but pytest until it is used.
 """
@@ -21,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
+    from comparisons.gate.material import Check
     from comparisons.gate.pictures_in import Picture
     from comparisons.results.case import Case
 
@@ -55,6 +59,12 @@ def derivative_gate(request: pytest.FixtureRequest) -> "DerivativeGate":
     return DerivativeGate(request.node, request.config)
 
 
+@pytest.fixture
+def material_gate(request: pytest.FixtureRequest) -> "MaterialGate":
+    """Checks materials: see `MaterialGate.__call__`."""
+    return MaterialGate(request.node, request.config)
+
+
 class Gate:
     """The gate for one test; each call has a folder of its own."""
 
@@ -73,19 +83,10 @@ class Gate:
     ) -> "Case":
         """Fail the test unless the case passes that `judged` makes of the pictures, by its name."""
         __tracebackhide__ = True
-        self._calls += 1
-        missing, failed = "", ""
-        try:
-            importlib.import_module("comparisons.gate.request")
-            from reference_rt.util.errors import ReferenceRtError
-        except ModuleNotFoundError as error:
-            from reference_rt.util.extras import needs
+        self._begin("comparisons.gate.request")
+        from reference_rt.util.errors import ReferenceRtError
 
-            missing = needs(self.fixture, "compare", error.name)
-        # Failing outside of `except`: pytest would show the handled error, with all its frames.
-        if missing:
-            pytest.fail(missing)
-
+        failed = ""
         given: list[tuple[Picture, Path | None]] = []
         try:
             folder = self._folder()
@@ -105,6 +106,21 @@ class Gate:
             pytest.fail("\n".join([told, *unkept]))
         return case
 
+    def _begin(self, module: str) -> None:
+        """A call of the gate, which needs a module.  Fails the test if its extra is missing."""
+        __tracebackhide__ = True
+        self._calls += 1
+        missing = ""
+        try:
+            importlib.import_module(module)
+        except ModuleNotFoundError as error:
+            from reference_rt.util.extras import needs
+
+            missing = needs(self.fixture, "compare", error.name)
+        # Failing outside of `except`: pytest would show the handled error, with all its frames.
+        if missing:
+            pytest.fail(missing)
+
     def _folder(self) -> Path:
         """The folder of this call, the same in each run; outputs of an earlier run are removed.
         Raises ImageError where it cannot be written."""
@@ -119,7 +135,7 @@ class Gate:
         check_writable(*files)
         for file in files:
             discard(file)
-        for old in folder.glob("candidate-*.exr"):
+        for old in (*folder.glob("candidate-*.exr"), *folder.glob("*.png")):
             discard(old)
         return folder
 
@@ -245,6 +261,50 @@ class DerivativeGate(Gate):
             return case_of([picture.radiance for picture in pictures], asked)
 
         return self._judge(candidate, judged)
+
+
+class MaterialGate(Gate):
+    """The gate for functions of a material."""
+
+    fixture = "material_gate"
+
+    def __call__(
+        self,
+        evaluate: Callable[[Any, Any], Any],
+        sample: Callable[[Any, Any], Any],
+        pdf: Callable[[Any, Any], Any],
+        *,
+        views: Any = None,
+        eta: float | None = None,
+        reciprocal: bool = True,
+        seed: int = 0,
+    ) -> "list[Check]":
+        """Fail the test unless a material's functions of arrays fit together, do not create light,
+        and are reciprocal; arguments: see `comparisons.gate.material.check_material`.  Pictures of
+        what is wrong are kept.  Returns the checks."""
+        __tracebackhide__ = True
+        self._begin("comparisons.gate.material")
+        from comparisons.gate.material import check_material
+        from reference_rt.util.errors import ReferenceRtError
+
+        lines: list[str] = []
+        try:
+            folder = self._folder()
+            asked = {"views": views, "eta": eta, "reciprocal": reciprocal, "seed": seed}
+            found = check_material(evaluate, sample, pdf, **asked)
+            for check in found:
+                if not check:
+                    lines.append(f"{self.fixture}: {check.name}: {check.reason}")
+                if check.maps:
+                    folder.mkdir(parents=True, exist_ok=True)
+                    picture = folder / f"{check.name}.png"
+                    check.write_picture(picture)
+                    lines.append(f"kept: {_relative(picture, self._root)}")
+        except ReferenceRtError as error:
+            lines = [f"{self.fixture}: {error}"]
+        if lines:
+            pytest.fail("\n".join(lines))
+        return found
 
 
 def _pictures(given: Any, folder: Path) -> "list[tuple[Picture, Path | None]]":

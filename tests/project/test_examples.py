@@ -48,6 +48,13 @@ def test_every_example_is_tested():
     assert [path.stem for path in EXAMPLES if f'run("{path.stem}"' not in tests] == []
 
 
+def test_own_material(run):
+    """Each mistake is seen, and nothing where there is none."""
+    parts = re.split(r"^(?=\S)", run("own_material"), flags=re.MULTILINE)[1:]
+    assert [part.count("FAILED") for part in parts] == [0, 2, 3, 2]
+    assert all(part.count("passed") + part.count("FAILED") == 4 for part in parts)
+
+
 def test_oracle(run):
     """float64 leaves the textbook's formula 1e-16 of 1e10 = (1e5 radii)^2, halved by the root."""
     error = float(re.search(r"up to (\S+) radii", run("oracle"))[1])
