@@ -2,6 +2,10 @@
 
 import json
 import math
+import shutil
+import subprocess
+import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -272,3 +276,39 @@ def test_the_command(tmp_path: Path) -> None:
     assert "one pixel low" in json.dumps(facts)
     assert "one pixel low" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert invoke(*command, "--from", "nobody").exit_code == 2
+
+
+MEASURE = Path(__file__).parents[3] / "docs" / "measure_conventions.py"
+
+NEEDS: dict[str, tuple[str, ...]] = {
+    "cycles": ("bpy",),
+    "luxcore": ("pyluxcore",),
+    "mitsuba": ("mitsuba",),
+    "radiance": ("pyradiance",),
+    "raysect": ("raysect",),
+}
+"""The packages of renderers that are no programs; some cannot be installed together."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", RENDERERS)
+def test_what_renderers_really_do(name: str) -> None:
+    """The table is what a renderer that is installed does now."""
+    known = RENDERERS[name]
+    packages = NEEDS.get(name, ())
+    if any(find_spec(package) is None for package in packages):
+        pytest.skip(f"{packages[0]} is not installed")
+    if not packages and shutil.which(name) is None:
+        pytest.skip(f"{name} is not installed")
+    command = [sys.executable, str(MEASURE), name]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=600)
+    found = json.loads(next(line for line in done.stdout.splitlines() if line.startswith("{")))
+    assert Changes(**found["placed"]) == known.picture
+    if known.glass is not None:
+        # Radiance's files have 8 bits, and rays of LuxCore noise.
+        assert found["glass"] == pytest.approx(1.5**2 if known.glass else 1.0, rel=0.01)
+    for kind, factor in found["lamps"].items():
+        # Its lamps of a point have to fade as the inverse square to be ours.
+        if (name, kind) in (("povray", "point"), ("tachyon", "point")):
+            continue
+        assert factor == pytest.approx(known.changes.lights.get(kind, 1.0), rel=0.005)
