@@ -10,11 +10,10 @@ from dataclasses import replace
 
 from scipy import ndimage
 
-from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.gate.conventions import RENDERERS, Changes
 from comparisons.gate.terms import picture_of
 from comparisons.gate.undone import Undo
-from comparisons.results.case import Case, Cause, FloatArray
+from comparisons.results.case import Case, Cause, FloatArray, Images
 from reference_rt.materials import Dielectric
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import UsageError
@@ -43,10 +42,10 @@ def as_renderers(
     """
     if case.images is None or case.images.candidate.shape != case.images.reference.shape:
         return None
-    misfit = Misfit(case.images)
-    if not (misfit.clear and misfit.excess > 0.0):
+    images = case.images
+    total = _squares(images, images.reference)
+    if not 0.0 < total < math.inf:  # also refuses NaN
         return None
-    total = misfit.squares(misfit.reference)
     left: list[tuple[float, Undo, list[str]]] = []
     kinds = set() if scene is None else {light.type for light in scene.lights}
     for changes, whose in _all(kinds):
@@ -54,9 +53,9 @@ def as_renderers(
             undo = Undo(changes, scene, scene is None)
         except UsageError:
             continue
-        if not _could_be(undo, misfit):
+        if not _could_be(undo, images):
             continue
-        left.append((misfit.squares(_predicted(undo, misfit, threads)), undo, whose))
+        left.append((_squares(images, _predicted(undo, images, threads)), undo, whose))
     best = min((squares for squares, _, _ in left), default=total)
     for squares, undo, whose in sorted(left, key=lambda one: one[0]):
         if squares <= min(WORTH * total, RIVAL * best) and judged(undo).verdict == "agree":
@@ -67,7 +66,12 @@ def as_renderers(
             if option:
                 evidence = f"with {option} the pictures agree"
             return Cause(name, evidence, 1.0 - squares / total)
-    return None if scene is None else _of_glass(misfit, scene, scaled)
+    return None if scene is None else _of_glass(images, scene, scaled)
+
+
+def _squares(images: Images, picture: FloatArray) -> float:
+    """Of what a picture leaves of the candidate, noise included: the gate judges afterwards."""
+    return float(((images.candidate - picture) ** 2).sum())
 
 
 def _all(kinds: Collection[str]) -> list[tuple[Changes, list[str]]]:
@@ -96,7 +100,7 @@ def _options(changes: Changes, kinds: Collection[str]) -> list[str]:
     ]
 
 
-def _could_be(undo: Undo, misfit: Misfit) -> bool:
+def _could_be(undo: Undo, images: Images) -> bool:
     """Whether the numbers of lights, if they are part of it, change the light of this scene by what
     the candidate's mean differs."""
     factors = undo.changes.lights
@@ -104,18 +108,18 @@ def _could_be(undo: Undo, misfit: Misfit) -> bool:
         return True
     assert undo.scene is not None
     values = [factors.get(light.type, 1.0) for light in undo.scene.lights]
-    means = misfit.reference.mean()
+    means = images.reference.mean()
     if not means > 0.0:
         return False
-    ratio = float(misfit.candidate.mean() / means)
+    ratio = float(images.candidate.mean() / means)
     return (1.0 - SAME) * min(*values, 1.0) <= ratio <= (1.0 + SAME) * max(*values, 1.0)
 
 
-def _predicted(undo: Undo, misfit: Misfit, threads: int | None) -> FloatArray:
+def _predicted(undo: Undo, images: Images, threads: int | None) -> FloatArray:
     """The candidate that the changes predict: with few samples where lights change, interpolated
     where it is moved."""
     changes = undo.changes
-    picture = misfit.reference
+    picture = images.reference
     if changes.lights:
         described = replace(undo, changes=Changes(lights=changes.lights)).described()
         assert described is not None
@@ -124,11 +128,11 @@ def _predicted(undo: Undo, misfit: Misfit, threads: int | None) -> FloatArray:
     return undo.applied(ndimage.shift(picture, by, order=1, mode="nearest") if any(by) else picture)
 
 
-def _of_glass(misfit: Misfit, scene: Scene, scaled: Callable[[float], Case]) -> Cause | None:
+def _of_glass(images: Images, scene: Scene, scaled: Callable[[float], Case]) -> Cause | None:
     """Radiance that is not divided by the square of an index: of an eye in glass all light is 1/n²
     of what it should be, of lamps in glass n² times."""
-    means = misfit.reference.mean()
-    ratio = float(misfit.candidate.mean() / means) if means > 0.0 else 0.0
+    means = images.reference.mean()
+    ratio = float(images.candidate.mean() / means) if means > 0.0 else 0.0
     for material in scene.materials.values():
         if not isinstance(material, Dielectric):
             continue
@@ -139,7 +143,7 @@ def _of_glass(misfit: Misfit, scene: Scene, scaled: Callable[[float], Case]) -> 
                 what = f"{'divided' if where == 'eye' else 'multiplied'} by {n:g}²"
                 name = f"radiance without 1/eta² in glass, as {', '.join(whose)}"
                 evidence = f"the {where} is in glass, and the pictures agree with ours {what}"
-                squares = misfit.squares(factor * misfit.reference)
-                left = squares / misfit.squares(misfit.reference)
+                squares = _squares(images, factor * images.reference)
+                left = squares / _squares(images, images.reference)
                 return Cause(name, evidence, 1.0 - left)
     return None

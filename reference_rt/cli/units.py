@@ -107,13 +107,13 @@ def lines_of(scene: Scene) -> Iterator[str]:
             yield f"{place}: {kind}: no row"
             continue
         name, letter, unit = UNITS[kind]
-        values = getattr(lamp, name, None)
-        known = isinstance(values, tuple)
-        said = " ".join(f"{v:.6g}" for v in values) if known else printable(str(values))
+        given = getattr(lamp, name)
+        values: tuple[float, ...] = given if isinstance(given, tuple) else ()
+        said = " ".join(f"{v:.6g}" for v in values) if values else printable(str(given))
         yield f"{place}: {kind}, {name} {letter} = {said} {unit}"
         for row in ROWS[kind]:
             source = row.measured or "from the specification, not rendered"
             numbers = ""
-            if known and row.factor is not None:
+            if values and row.factor is not None:
                 numbers = " = " + " ".join(f"{row.factor * v:.6g}" for v in values)
             yield f"  {row.renderer} ({source}): {row.lamp}: {row.write}{numbers}"

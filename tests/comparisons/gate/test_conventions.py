@@ -199,7 +199,7 @@ def test_pictures_against_pictures_are_cropped() -> None:
 
 IN_GLASS = """
 camera: {type: perspective, eye: [0, 0, 0], target: [0.3, 0.1, 1], fov: 60}
-film: {width: 16, height: 16}
+film: {width: 10, height: 10}
 sampler: {type: grid, spp: 4}
 integrator: {type: whitted, max_depth: 5}
 materials: {glass: {type: dielectric, interior_ior: 1.5}}
