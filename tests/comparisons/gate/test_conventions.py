@@ -165,6 +165,15 @@ def test_the_cosine_is_that_of_the_rays() -> None:
     np.testing.assert_allclose(cosines(scene, (24, 36)), expected, rtol=1e-12)
 
 
+@pytest.mark.parametrize("changes", [Changes(True, True, cosine=True), Changes(cosine=True)])
+def test_reading_is_the_inverse_of_what_happened(changes: Changes) -> None:
+    undo = Undo(changes, scene_of())
+    right = np.random.default_rng(0).random((24, 36, 3))
+    shown = undo.applied(right)
+    assert not np.allclose(shown, right)
+    np.testing.assert_allclose(undo.read([Picture(shown)])[0].radiance, right, rtol=1e-12)
+
+
 def test_a_moved_view_shows_the_same_picture_elsewhere() -> None:
     """Of a scene that is nowhere singular, one sample a pixel at the same places."""
     scene = scene_of().changed(camera=scene_of().camera)
