@@ -145,6 +145,16 @@ def gate(
             "aces, agx, neutral, filmic, exponential, a file of pairs, or estimate.",
         ),
     ] = "",
+    renderer: Annotated[
+        str,
+        typer.Option(
+            "--from",
+            metavar="NAME[:numbers]",
+            help="Read the candidates as this renderer means them, its conventions undone: cycles, "
+            "luxcore, mitsuba, povray, radiance, raysect or tachyon; with :numbers also what its "
+            "numbers of lights mean.",
+        ),
+    ] = "",
     witness: Witness = None,
     derivative: Annotated[
         str | None,
@@ -195,6 +205,7 @@ def gate(
         from comparisons.gate.reference import SizeError, is_noise_free
         from comparisons.gate.request import Request, gated
         from comparisons.gate.rounds import Rounds, gated_renderer
+        from comparisons.gate.undone import Reading
         from comparisons.renderers import witness_facts
         from comparisons.report import biases, terminal
         from comparisons.report.ci import Formats
@@ -226,7 +237,7 @@ def gate(
             others = {"truth": truth, "command": command, "reference-layer": reference_layer}
         others |= {"variance": variance, "baseline": baseline, "fixed": fixed, "rim": rim}
         others |= {"noise-free": noise_free, "witness": witness, "browser": browser}
-        others |= {"allow-missing": allow_missing, "tone-curve": tone_curve}
+        others |= {"allow-missing": allow_missing, "tone-curve": tone_curve, "from": renderer}
         for name, value in {**others, "junit": junit, "github": github, "define": define}.items():
             if value:
                 raise UsageError(f"--{name}: does not apply to {alone}; expected one of them")
@@ -246,6 +257,9 @@ def gate(
         if scene is None
         else adjusted(Scene.load(scene, by_name(define), allow_missing), spp, size)
     )
+    if renderer and baseline:
+        raise UsageError("--from: a baseline is the renderer's own; expected one of them")
+    reading = Reading.of(renderer, described, of_files=bool(reference))
     run, rounds = None, Rounds()
     if driven:
         noiseless = noise_free or (described is not None and is_noise_free(described))
@@ -281,9 +295,10 @@ def gate(
     driver: Driver | None = None
     failed: ReferenceRtError | None = None
     try:
+        files = [p for path in reference or () for p in read_candidates(path, theirs)]
         request = Request(
-            scene=described,
-            references=tuple(p for path in reference or () for p in read_candidates(path, theirs)),
+            scene=reading.scene(described),
+            references=reading.judge(files),
             variance=variance,
             baseline=baseline or "",
             baselines=baselines,
@@ -300,11 +315,12 @@ def gate(
             if run is not None:
                 if browser is not None and described is not None:
                     write_resolved(described, run.scene or out, float32=True)
-                driver = Driver(run, out / "candidates", progress.line)
+                driver = Driver(run, out / "candidates", progress.line, reading.read)
                 case = gated_renderer(request, driver, rounds, progress.line, progress)
             else:
                 pictures = [p for path in candidates or () for p in read_candidates(path, layer)]
-                case = gated(request, pictures, progress)
+                case = gated(request, reading.read(pictures), progress)
+            case = reading.told(case)
     except UsageError:
         raise
     except ReferenceRtError as error:
@@ -321,7 +337,7 @@ def gate(
     facts |= {"baseline": baseline} if baseline else {}
     facts |= {"command": command} if command else {}
     facts |= {"browser": browser} if browser else {}
-    facts |= witness_facts(witness)
+    facts |= witness_facts(witness) | reading.facts(renderer)
     results, report = outputs.write(case, out, facts, time.perf_counter() - started)
     about = {} if scene is None else {case.scene: scene.as_posix()}
     for_ci.write("gate", [case], about, title=f"gate: {case.scene}")

@@ -114,14 +114,19 @@ class Command:
 
 class Driver:
     """Runs a renderer, each time in a new folder; copies of its pictures are kept in `keep`, from
-    which those of an earlier gate are removed.  say: is told of each start.  Raises UsageError for
-    a command that cannot be run, ImageError for what is in a picture's place and is no file."""
+    which those of an earlier gate are removed.  say: is told of each start;  read: what is done to
+    pictures that were read.  Raises UsageError for a command that cannot be run, ImageError for
+    what is in a picture's place and is no file."""
 
     def __init__(
-        self, command: Command, keep: Path, say: Callable[[str], None] = lambda line: None
+        self,
+        command: Command,
+        keep: Path,
+        say: Callable[[str], None] = lambda line: None,
+        read: Callable[[Sequence[Picture]], list[Picture]] = list,
     ) -> None:
         command.arguments(Path("checked first"), 0)
-        self._command, self._keep, self._say = command, keep, say
+        self._command, self._keep, self._say, self._read = command, keep, say, read
         self.made: list[Path] = []
         """The pictures that are kept."""
         self.seconds = 0.0
@@ -174,7 +179,7 @@ class Driver:
             finally:
                 self.seconds += time.perf_counter() - begun
             kept = [self._kept(output) for output in outputs]
-        return [read_candidate(path) for path in kept]
+        return self._read([read_candidate(path) for path in kept])
 
     def _kept(self, output: Path) -> Path:
         """Copy a picture; its place among those that are kept.  Raises ImageError."""

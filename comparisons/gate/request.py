@@ -16,6 +16,7 @@ from comparisons.compare.notebook import NotebookCase
 from comparisons.compare.path_length import Lengths, path_lengths
 from comparisons.compare.single_lights import single_lights
 from comparisons.gate import baselines, reference
+from comparisons.gate.as_renderers import as_renderers
 from comparisons.gate.digest import scene_digest
 from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture, pictures_of
@@ -25,6 +26,7 @@ from comparisons.gate.rim import check_rim
 from comparisons.gate.shown_curve import estimated
 from comparisons.gate.terms import missing_terms
 from comparisons.gate.tone_curves import ESTIMATE, ToneCurve, curve_of
+from comparisons.gate.undone import Reading, Undo
 from comparisons.renderers import WitnessName
 from comparisons.results.case import Case, Cause, FloatArray, RungResult
 from comparisons.results.headline import UP_TO
@@ -114,6 +116,7 @@ def gate(
     tone_curve: str = "",
     rim: int = 0,
     threads: int | None = None,
+    conventions: str = "",
 ) -> NotebookCase:
     """Judge the pictures of another renderer; Mitsuba takes no part.
 
@@ -123,7 +126,8 @@ def gate(
     renders;  reference: in its place, pictures that are right;  limit: the smallest relative bias
     of the image mean that must be detectable;  noise_free: they were rendered without random
     numbers;  tone_curve: what such a picture went through, as of `gate --tone-curve`;  rim: how
-    many of the outermost pixels are left out;  threads: ours, None for all.
+    many of the outermost pixels are left out;  threads: ours, None for all;  conventions: the
+    renderer as whose they are read, as of `gate --from`.
 
     The case has `verdict`, `reason`, `cause` and `write_page`.  Raises ImageError, SceneError,
     UsageError.
@@ -131,9 +135,11 @@ def gate(
     known = scene if scene is None or isinstance(scene, Scene) else Scene.load(os.fspath(scene))
     others = () if reference is None else pictures_of(reference)
     settings: dict[str, Any] = {"limit": limit, "noise_free": noise_free, "tone_curve": tone_curve}
+    reading = Reading.of(conventions, known, of_files=bool(others))
+    known, others = reading.scene(known), reading.judge(others)
     request = Request(known, others, threads=threads, rim=rim, **settings)
-    case = gated(request, pictures_of(pictures))
-    return NotebookCase.of(case)
+    case = gated(request, reading.read(pictures_of(pictures)))
+    return NotebookCase.of(reading.told(case))
 
 
 @dataclass(frozen=True)
@@ -172,8 +178,36 @@ class Judge:
     def case(
         self, candidates: Sequence[Picture], notes: Sequence[str] = (), looks: Looks | None = None
     ) -> Case:
-        """The verdict by `gate_pictures`; a difference from our own pictures may be of terms that
-        the renderer lacks."""
+        """The verdict by `gate_pictures`; a difference may be a convention of a renderer that was
+        measured, or, from our own pictures, of terms that the renderer lacks."""
+        case = self._explained(candidates, notes, looks)
+        request = self.request
+        if case.verdict != "differ" or self.misread is not None or self.curve or request.baseline:
+            return case
+        scene = None if request.references else self.scene
+        plain = replace(request, witness=None)
+
+        def judged(undo: Undo) -> Case:
+            pictures, described, linear = undo.read(candidates), undo.described(), self.linear
+            if described is None:
+                linear = replace(linear, pictures=undo.cropped(linear.pictures))
+            elif described != scene:
+                linear = reference.of_scene(described, request.limit, threads=request.threads)
+            return Judge(plain, linear, described)._case(pictures, diagnosed=False)
+
+        def scaled(factor: float) -> Case:
+            linear = replace(self.linear, pictures=factor * self.linear.pictures)
+            return Judge(plain, linear, None)._case(candidates, diagnosed=False)
+
+        if request.rim or request.variance:
+            return case
+        cause = as_renderers(case, scene, request.threads, judged, scaled)
+        return case if cause is None else replace(case, cause=cause)
+
+    def _explained(
+        self, candidates: Sequence[Picture], notes: Sequence[str], looks: Looks | None
+    ) -> Case:
+        """The same without conventions of other renderers."""
         request = self.request
         case = self._case(candidates, notes, looks)
         if request.tone_curve == ESTIMATE and self.curve is not None:

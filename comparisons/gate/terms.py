@@ -59,7 +59,7 @@ def missing_terms(
         return None
     left = {}
     for terms, other in variants(scene):
-        picture = _picture(other, rim, threads)
+        picture = picture_of(other, rim, threads)
         left[terms] = misfit.squares(picture if curve is None else curve(picture)), other
     most = WORTH * misfit.squares(misfit.reference)
     best = min((squares for squares, _ in left.values()), default=most)
@@ -118,7 +118,8 @@ def _without_metal(base: Any, metallic: Any, name: str) -> dict[str, Any]:
     return {name: tuple((1.0 - metallic) * x for x in base), "metallic": 0.0}
 
 
-def _picture(scene: Scene, rim: int, threads: int | None) -> FloatArray:
+def picture_of(scene: Scene, rim: int, threads: int | None) -> FloatArray:
+    """Ours with few samples, without a rim of so many pixels."""
     sampler = scene.resolved_sampler
     if not isinstance(sampler, Grid):
         pixels = scene.film.width * scene.film.height

@@ -283,6 +283,12 @@ def explain(
         bool,
         typer.Option("--parameters", help="List what `derivative` can be asked, with values."),
     ] = False,
+    units: Annotated[
+        bool,
+        typer.Option(
+            "--units", help="What other renderers' lamps are given for the light of its lamps."
+        ),
+    ] = False,
     witness: Annotated[
         str | None,
         typer.Option(
@@ -302,6 +308,12 @@ def explain(
         from reference_rt.cli.derivative import lines_of
 
         for line in lines_of(loaded):
+            say(line)
+        return
+    if units:
+        from reference_rt.cli.units import lines_of as units_of
+
+        for line in units_of(loaded):
             say(line)
         return
     print_page(loaded)

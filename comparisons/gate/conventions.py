@@ -1,0 +1,203 @@
+"""What other renderers' pictures have otherwise than ours, as data, each measured.
+
+A convention of the picture (mirrored, a shift, a falloff of the camera) is undone by `Changes`
+exactly; what numbers of lights mean is a convention of the scene's text, which is undone only where
+the numbers were copied as they stand.
+"""
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+LIGHTS = {
+    "point": "intensity",
+    "spot": "intensity",
+    "directional": "irradiance",
+    "constant": "radiance",
+}
+"""The types of lights whose numbers other renderers have too, and the field of ours."""
+
+
+@dataclass(frozen=True)
+class Changes:
+    """What happened to a right picture.
+
+    mirrored, upside_down: it was turned so, before anything else is measured;  right, down: pixels
+    by which what it shows lies further right and down, once it is turned back;  cosine: its values
+    are multiplied by the cosine between the pixel's ray and the direction of view;  lights: by
+    type, how many times as bright as ours with the same number.
+    """
+
+    mirrored: bool = False
+    upside_down: bool = False
+    right: float = 0.0
+    down: float = 0.0
+    cosine: bool = False
+    lights: dict[str, float] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        return self != Changes()
+
+    def parts(self) -> "list[Changes]":
+        """Each change alone, and all; a shift is one change."""
+        alone = [
+            Changes(**{f.name: getattr(self, f.name)})
+            for f in fields(self)
+            if f.name not in ("right", "down")
+        ]
+        found = [Changes(right=self.right, down=self.down), *alone, self]
+        return [one for k, one in enumerate(found) if one and one not in found[:k]]
+
+    def seen(self, kinds: Collection[str]) -> "Changes":
+        """Those that a scene with these types of lights shows."""
+        return replace(self, lights={k: v for k, v in self.lights.items() if k in kinds})
+
+    def words(self) -> tuple[str, ...]:
+        """Each change for people, such as "one pixel low"."""
+        said = ["mirrored left to right"] if self.mirrored else []
+        said += ["upside down"] if self.upside_down else []
+        shifts = ((self.right, "to the right", "to the left"), (self.down, "low", "high"))
+        moved = [f"{_pixels(x)} {plus if x > 0.0 else minus}" for x, plus, minus in shifts if x]
+        said += [" and ".join(moved)] if moved else []
+        said += ["darker by the cosine to the direction of view"] if self.cosine else []
+        said += [
+            f"numbers of {type_} lights {_times(factor)} as bright"
+            for type_, factor in sorted(self.lights.items())
+        ]
+        return tuple(said)
+
+
+_NAMED = {0.5: "half a pixel", 0.25: "a quarter of a pixel", 1.0: "one pixel"}
+
+
+def _pixels(shift: float) -> str:
+    return _NAMED.get(abs(shift), f"{abs(shift):.3g} pixels")
+
+
+def _times(factor: float) -> str:
+    known = {math.pi: "π times", 1.0 / (4.0 * math.pi): "1/(4π) times"}
+    near = [word for value, word in known.items() if math.isclose(value, factor, rel_tol=1e-12)]
+    return near[0] if near else f"{factor:.4g} times"
+
+
+@dataclass(frozen=True)
+class Known:
+    """A renderer that was measured.
+
+    title: its name;  version: which was measured;  changes: of its pictures, and of numbers of
+    lights;  glass: whether radiance in glass is divided by the square of the index, None: unknown;
+    said: what a picture has besides that cannot be undone;  measured: the command.
+    """
+
+    title: str
+    version: str
+    changes: Changes
+    glass: bool | None
+    said: tuple[str, ...]
+    measured: str
+
+    @property
+    def whose(self) -> str:
+        """Such as "LuxCore 2.11.2's"."""
+        return f"{self.title} {self.version}'s"
+
+    @property
+    def picture(self) -> Changes:
+        """The changes that hold for any scene's text."""
+        return replace(self.changes, lights={})
+
+
+_QUARTER = 1.0 / (4.0 * math.pi)
+_SCRIPT = "python docs/measure_conventions.py"
+
+_DATA: dict[str, dict[str, Any]] = {
+    "cycles": {
+        "title": "Cycles",
+        "version": "5.0.1",
+        "changes": {"lights": {"point": _QUARTER, "spot": _QUARTER}},
+        "glass": False,
+        "said": (
+            "its first sample of each pixel lies at the pixel's centre",
+            "its default filter is Blackman-Harris, 1.5 pixels wide",
+            "the angle of view spans the longer side",
+        ),
+    },
+    "luxcore": {
+        "title": "LuxCore",
+        "version": "2.11.2",
+        "changes": {"down": 1.0, "lights": {"point": _QUARTER}},
+        "glass": True,
+        "said": ("the angle of view spans the longer side",),
+    },
+    "mitsuba": {
+        "title": "Mitsuba",
+        "version": "3.9.1",
+        "changes": {},
+        "glass": True,
+        "said": (
+            "its default filter is a Gaussian of 0.5 pixels",
+            "its integrator `direct` adds up the samples of point and directional lamps",
+        ),
+    },
+    "povray": {
+        "title": "POV-Ray",
+        "version": "3.7.0.10",
+        "changes": {"lights": {"directional": math.pi}},
+        "glass": False,
+        "said": (
+            "its light sources do not fade with distance unless they are told to, and then as "
+            "2 / (1 + (distance / fade_distance)^fade_power)",
+            "a camera whose `right` is positive mirrors right-handed scenes",
+        ),
+    },
+    "radiance": {
+        "title": "Radiance",
+        "version": "6.0a",
+        "changes": {},
+        "glass": True,
+        "said": (
+            "its samples are moved at random within pixels by -pj, and left out by -ps",
+            "its lamps are spheres, rings and discs, and are seen",
+        ),
+    },
+    "raysect": {
+        "title": "raysect",
+        "version": "0.9.1",
+        "changes": {"cosine": True},
+        "glass": False,
+        "said": (
+            "frames are indexed by column and row",
+            "the angle of view spans the longer side",
+        ),
+    },
+    "tachyon": {
+        "title": "tachyon",
+        "version": "0.99b6",
+        "changes": {
+            "mirrored": True,
+            "right": 0.5,
+            "down": 0.5,
+            "lights": {"directional": math.pi},
+        },
+        "glass": None,
+        "said": (
+            "its files of 8 bits have codes in proportion to radiance, rounded down",
+            "its point lights are seen as balls, and do not fade with distance without ATTENUATION",
+            "highlights are Blinn's, with the exponent of Phong's, without -shade_phong",
+        ),
+    },
+}
+
+RENDERERS: dict[str, Known] = {
+    name: Known(
+        one["title"],
+        one["version"],
+        Changes(**one["changes"]),
+        one["glass"],
+        one["said"],
+        f"{_SCRIPT} {name}",
+    )
+    for name, one in _DATA.items()
+}
+"""By the name that `gate --from` takes."""
