@@ -40,6 +40,10 @@ MOST_TIMES = 64
 NEAR = 4.0
 """Standard deviations of a sum that counts as right."""
 
+MOST_TERMS = 1 << 14
+"""Samples of all pixels and channels together that the rung `adjoint` sums: so rounding is at most
+a thousandth."""
+
 DEAR = 16
 """Times as many samples of an integrator whose pictures cost as much with few as with many."""
 
@@ -91,7 +95,7 @@ def derivative_case(
         cause = likeliest(ours, right, wrong, both.margins(), half)
     rungs.append(adjoint)
     if adjoint.status == "differ":
-        cause = _wrong_mode(adjoint, right) or cause
+        cause = _wrong_mode(adjoint, right, ours.times * scene.resolved_sampler.spp) or cause
     verdict, reason = decide(rungs, None)
     notes = (
         f"derivatives by {theirs.moving.path}, in W/sr/m2 per unit of it; in Mitsuba "
@@ -162,15 +166,14 @@ class _Theirs:
 
     def adjoint(self) -> RungResult:
         """The rung: the sum of the derivative's pixels with random weights, by both modes with the
-        same seed.  They differ by the rounding of float32 alone, of as many terms as a picture has
-        samples, whose errors are unrelated: the root of their number times half a unit."""
+        same seed.  They differ by the rounding of float32 alone: half a unit for each term, since
+        terms that are alike round alike.  So there are few samples, of some pixels."""
         weights = _weights(self._shape)
-        spp = self.times * self._spp
-        picture = self.picture(0)
+        terms = np.count_nonzero(weights) * (spp := _adjoint_spp(self._shape))
+        picture = self.moving.forward(self._integrator, spp, 0)
         forward = float((weights * picture).sum())
         reverse = self.moving.reverse(self._integrator, spp, 0, weights)
-        rounding = math.sqrt(spp * weights.size) * 2.0**-24
-        bound = rounding * float((weights * np.abs(picture)).sum())
+        bound = terms * 2.0**-24 * float((weights * np.abs(picture)).sum())
         numbers = {"forward": forward, "reverse": reverse, "bound": bound}
         told = f"forward mode {forward:.7g}, reverse mode {reverse:.7g}, with the same weights"
         if not abs(forward - reverse) <= bound:
@@ -179,15 +182,26 @@ class _Theirs:
 
 
 def _weights(shape: tuple[int, ...]) -> FloatArray:
-    """Random ones from 0 to 1, always the same."""
-    return np.random.default_rng(0).random(shape)
+    """Random ones from 0 to 1, always the same; 0 but for MOST_TERMS of them, at random."""
+    rng = np.random.default_rng(0)
+    weights = rng.random(shape)
+    share = MOST_TERMS / weights.size
+    return weights if share >= 1.0 else np.where(rng.random(shape) < share, weights, 0.0)
 
 
-def _wrong_mode(adjoint: RungResult, right: FloatArray) -> Cause | None:
+def _adjoint_spp(shape: tuple[int, ...]) -> int:
+    """Samples per pixel of the rung `adjoint`."""
+    return max(1, MOST_TERMS // math.prod(shape))
+
+
+def _wrong_mode(adjoint: RungResult, right: FloatArray, spp: int) -> Cause | None:
     """Which of the two modes ours say is wrong: the one whose sum is not theirs, if the other one's
-    is.  Each of Mitsuba's is of one picture: about as noisy as one of ours."""
-    sums = (_weights(right.shape[1:]) * right).sum(axis=(1, 2, 3))
-    mean, noise = float(sums.mean()), float(sums.std(ddof=1)) * math.sqrt(1.0 + 1.0 / len(sums))
+    is.  Each of Mitsuba's is of one picture of few samples;  spp: of each of ours, to which its
+    noise is scaled."""
+    shape = right.shape[1:]
+    sums = (_weights(shape) * right).sum(axis=(1, 2, 3))
+    scale = spp / _adjoint_spp(shape) + 1.0 / len(sums)
+    mean, noise = float(sums.mean()), float(sums.std(ddof=1)) * math.sqrt(scale)
     apart = {mode: abs(adjoint.numbers[mode] - mean) for mode in ("forward", "reverse")}
     near = [mode for mode, distance in apart.items() if distance <= NEAR * noise]
     if len(near) != 1:
