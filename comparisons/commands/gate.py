@@ -21,6 +21,7 @@ from comparisons.commands.options import (
     Witness,
     compare_extra,
 )
+from comparisons.commands.pair import pair_gate
 from comparisons.commands.truth import truth_gate
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.cli.options import AllowMissing, Defaults, adjusted, by_name, duration
@@ -146,6 +147,17 @@ def gate(
         ),
     ] = "",
     witness: Witness = None,
+    pair: Annotated[
+        tuple[str, str] | None,
+        typer.Option(
+            metavar="A B",
+            help="Whether two renderers, back ends or versions make the same pictures: two "
+            "commands as of --command, web pages, or folders of pictures.",
+        ),
+    ] = None,
+    judge: Annotated[
+        bool, typer.Option("--judge", help="With --pair: our pictures of --scene say who is wrong.")
+    ] = False,
     derivative: Annotated[
         str | None,
         typer.Option(
@@ -205,8 +217,29 @@ def gate(
     from reference_rt.util.console import ProgressLine
 
     seconds = None if time_limit is None else seconds_of(time_limit, "--time-limit")
+    if pair is not None:
+        alone: dict[str, Any] = {"reference": reference, "variance": variance, "truth": truth}
+        alone |= {"baseline": baseline, "command": command, "browser": browser, "step": step}
+        alone |= {"witness": witness, "derivative": derivative, "tone-curve": tone_curve}
+        alone = {f"--{name}": value for name, value in alone.items()} | {"candidates": candidates}
+        for name, value in {**alone, "--reference-layer": reference_layer}.items():
+            if value:
+                raise UsageError(f"{name}: does not apply to --pair; expected one of them")
+        if scene is None and size is not None:
+            raise UsageError("--size: only applies to --scene; expected that too")
+        found = None
+        if scene is not None:
+            found = adjusted(Scene.load(scene, by_name(define), allow_missing), spp, size)
+        pair_gate(
+            pair, found, scene, judged=judge, layer=layer, spp=spp, seed=seed,
+            replicates=replicates, fixed=fixed, seconds=seconds, suffix=suffix, limit=limit,
+            noise_free=noise_free, rim=rim, out=out, threads=threads, junit=junit, github=github,
+            trace="" if scene is None else trace_command(scene, size, by_name(define)),
+        )  # fmt: skip
+    if judge:
+        raise UsageError("--judge: only applies to --pair; expected that too")
     if [command is None, browser is None, not candidates].count(False) != 1:
-        raise UsageError("expected either candidates, --command or --browser")
+        raise UsageError("expected either candidates, --command, --browser or --pair")
     driven = command is not None or browser is not None
     driving: dict[str, Any] = {"replicates": replicates, "seed": seed, "suffix": suffix}
     driving |= {"time-limit": time_limit, "fixed": fixed or None}
@@ -220,7 +253,7 @@ def gate(
     if scene is None and not driven and spp is not None:
         raise UsageError("--spp: only applies to --scene or --command; expected one of them")
     if truth is not None or derivative is not None:
-        alone = "--truth" if derivative is None else "--derivative"
+        which = "--truth" if derivative is None else "--derivative"
         others: dict[str, Any] = {"scene": scene, "reference": reference, "size": size}
         if derivative is not None:
             others = {"truth": truth, "command": command, "reference-layer": reference_layer}
@@ -229,7 +262,7 @@ def gate(
         others |= {"allow-missing": allow_missing, "tone-curve": tone_curve}
         for name, value in {**others, "junit": junit, "github": github, "define": define}.items():
             if value:
-                raise UsageError(f"--{name}: does not apply to {alone}; expected one of them")
+                raise UsageError(f"--{name}: does not apply to {which}; expected one of them")
     if truth is not None:
         numbers = {"replicates": replicates, "spp": spp, "seed": seed}
         truth_gate(truth, candidates or (), command, layer, out, suffix=suffix,
