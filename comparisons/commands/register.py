@@ -2,6 +2,7 @@
 
 import typer
 
+from comparisons.commands.back_ends import variants, versions
 from comparisons.commands.compare import compare, convert, report, suite
 from comparisons.commands.derivatives import derivatives
 from comparisons.commands.gate import accept, gate
@@ -15,6 +16,7 @@ def register(app: typer.Typer) -> None:
     commands = (
         *(compare, suite, gate, accept, report, selftest),
         *(converge, methods, bench, stability, convert, fuzz, truth, derivatives),
+        *(variants, versions),
     )
     for command in commands:
         app.command()(command)
