@@ -12,6 +12,7 @@ from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import UsageError
 
 if TYPE_CHECKING:
+    from comparisons.commands.outputs import Outputs
     from comparisons.compare.budget import Budget
     from comparisons.results.case import Case
 
@@ -30,6 +31,8 @@ Limit = Annotated[
     float,
     typer.Option(help="Smallest relative bias of the image mean that must be detectable."),
 ]
+
+FILES = ("results.json", "report.html")
 
 PARAMETERS = {"cornell_box": "materials.red.reflectance"}
 """Of these scenes derivatives are compared, too, by variants that have them."""
@@ -59,9 +62,12 @@ def variants(
     Exit code: 0 if nothing differs (pictures may be too noisy to tell), 1 if something does.
     """
     with compare_extra():
+        from comparisons.commands.outputs import Outputs
         from comparisons.experiments import variants as by
         from comparisons.report.table import Column, Table
 
+    writes = Outputs(out, FILES, markdown=(markdown, "variants"))
+    writes.check()
     paths = _paths(scenes_named or ["cornell_box"], scenes)
     found, left_out = by.works()
     if variant:
@@ -81,7 +87,7 @@ def variants(
         Column("verdict", lambda case: case.verdict),
         Column("why", lambda case: case.reason),
     )
-    _finish(cases, out, markdown, "variants", lambda made: Table(columns, list(made)), {})
+    _finish(cases, writes, lambda made: Table(columns, list(made)), {})
 
 
 @guarded
@@ -110,9 +116,12 @@ def versions(
     Exit code: 0 if no picture changed, 1 if one did, 4 if a version cannot be installed.
     """
     with compare_extra():
+        from comparisons.commands.outputs import Outputs
         from comparisons.experiments import versions as by
         from comparisons.mitsuba.backend import backend
 
+    writes = Outputs(out, FILES, markdown=(markdown, "versions"))
+    writes.check()
     if of != "mitsuba":
         raise UsageError(f"--of: expected mitsuba, got '{of}'")
     if len(names) < 2:
@@ -120,10 +129,11 @@ def versions(
     paths = _paths(scene or sorted(path.stem for path in scenes.glob("*.yaml")), scenes)
     budget = _budget(size, spp, replicates, limit)
     facts = {"versions": ", ".join(names)}
-    _finish(
-        lambda: by.compared(names, paths, budget, backend(), lambda line: say(line, err=True)),
-        out, markdown, "versions", by.table, facts,
-    )  # fmt: skip
+
+    def cases() -> tuple[list["Case"], list[str]]:
+        return by.compared(names, paths, budget, backend(), lambda line: say(line, err=True))
+
+    _finish(cases, writes, by.table, facts)
 
 
 def _paths(given: Sequence[str], folder: Path) -> list[Path]:
@@ -148,25 +158,22 @@ def _budget(size: str, spp: int, replicates: int, limit: float) -> "Budget":
 
 def _finish(
     made: Callable[[], tuple[list["Case"], list[str]]],
-    out: Path,
-    markdown: Path | None,
-    block: str,
+    writes: "Outputs",
     table: Callable[[Sequence["Case"]], Any],
     facts: dict[str, Any],
 ) -> None:
     """Write the page and results.json of the cases, and say what was found."""
-    from comparisons.commands.outputs import Outputs
     from comparisons.report import terminal, write_report, write_results
     from comparisons.runs.provenance import provenance
 
-    writes = Outputs(out, ("results.json", "report.html"), markdown=(markdown, block))
     writes.prepare()
     begun = time.perf_counter()
     cases, left_out = made()
     told = {**provenance(), **facts} | ({"left out": "; ".join(left_out)} if left_out else {})
     told |= {"seconds": round(time.perf_counter() - begun, 1)}
-    write_results(out / "results.json", cases, told)
-    write_report(out / "report.html", cases, told, title=block, walls={})
+    results, page = writes.files
+    write_results(results, cases, told)
+    write_report(page, cases, told, title=writes.markdown[1], walls={})
     rows = table(cases)
     console = terminal.console()
     if rows.rows:
@@ -175,6 +182,6 @@ def _finish(
         say(line)
     failed = [case for case in cases if case.verdict in ("differ", "invalid")]
     count = len(cases)
-    say(f"{count} cases: {len(failed)} differ" + ("" if failed else ", none of them is known to"))
+    say(f"{count} cases, {len(failed)} of them differ")
     writes.finish(lambda: "\n".join(rows.markdown()))
     raise typer.Exit(1 if failed else 0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from comparisons.results.case import FloatArray
-from comparisons.statistics.sides import side_of
+from comparisons.statistics.sides import neighbourhood, side_of
 from comparisons.statistics.welch import noise_ratio
 
 FEWEST = 4
@@ -55,7 +55,8 @@ def streams_of(a: FloatArray, b: FloatArray) -> Streams:
     count = min(len(a), len(b))
     if count < FEWEST:
         return Streams(0.0, 1.0, False)
-    scale = np.sqrt(a.var(axis=0) + b.var(axis=0))
+    # Of the neighbourhood: a pixel's own variance is high where its residuals are.
+    scale = np.sqrt(neighbourhood(a.var(axis=0) + b.var(axis=0)))
     weight = np.where(scale > 0.0, 1.0 / np.where(scale > 0.0, scale, 1.0), 0.0)
     one, two = (((x[:count] - x.mean(axis=0)) * weight).reshape(count, -1) for x in (a, b))
     lengths = np.outer(np.linalg.norm(one, axis=1), np.linalg.norm(two, axis=1))

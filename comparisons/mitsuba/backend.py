@@ -139,6 +139,21 @@ def choose(asked: str | None = None) -> Backend:
     return Backend(SCALAR, version, f"{reasons}; {advice}{slower}", None)
 
 
+@contextlib.contextmanager
+def asked_for(variant: str) -> Iterator[None]:
+    """A context in which `choose` takes this variant, here and in child processes; FASTEST leaves
+    what the environment says."""
+    before = os.environ.get(FORCE)
+    if variant != FASTEST or not before:
+        os.environ[FORCE] = variant
+    try:
+        yield
+    finally:
+        os.environ.pop(FORCE, None)
+        if before is not None:
+            os.environ[FORCE] = before
+
+
 def no_gpu() -> str | None:
     """That there is no driver of an NVIDIA GPU, which variants of CUDA need; None if there is."""
     named = os.environ.get("DRJIT_LIBCUDA_PATH")

@@ -16,7 +16,7 @@ from reference_rt.rendering.scene import Scene
 SCENE = """\
 film: {width: 32, height: 32}
 camera: {type: perspective, eye: [0, 0, 4], target: [0, 0, 0], fov: 40}
-integrator: {type: path, max_depth: 3}
+integrator: {type: direct}
 materials:
   grey: {type: diffuse, reflectance: 0.5}
   red: {type: diffuse, reflectance: [0.6, 0.2, 0.1]}
