@@ -5,11 +5,15 @@ Mitsuba and NumPy alone, so it imports nothing else.
 """
 
 import json
+import signal
 import sys
 from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
+
+SECONDS = 300
+"""Time limit of a scene, beyond which the system ends the process, where it has alarms."""
 
 
 def main(variant: str, folder: Path, replicates: int, spp: int, names: list[str]) -> None:
@@ -21,7 +25,9 @@ def main(variant: str, folder: Path, replicates: int, spp: int, names: list[str]
             print(json.dumps([name, problem]), file=file)
 
     for name in names:
-        tell(name, "it crashed")
+        tell(name, f"it crashed, or took longer than {SECONDS} s")
+        if hasattr(signal, "alarm"):
+            signal.alarm(SECONDS)
         try:
             scene = mi.load_file(str(folder / f"{name}.xml"))
             pictures = [np.array(mi.render(scene, spp=spp, seed=k)) for k in range(replicates)]

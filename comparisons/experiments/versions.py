@@ -23,10 +23,13 @@ from comparisons.compare.budget import Budget
 from comparisons.compare.compare import budgeted
 from comparisons.gate.pair import Asked, pair_case
 from comparisons.gate.pictures_in import from_array
+from comparisons.geometry.flatten import copies_of
 from comparisons.mitsuba.backend import LLVM, SCALAR, Backend, cache_folder
 from comparisons.mitsuba.llvm_libraries import LIBRARY
 from comparisons.report.table import Column, Table
 from comparisons.results.case import Case, RungResult, decide
+from comparisons.results.headline import headline
+from comparisons.translator import MOST_INSTANCES
 from comparisons.translator.writing import write_xml
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
@@ -105,7 +108,11 @@ def _written(
     names, left_out = [], []
     for path in scenes:
         try:
-            _, notes = write_xml(budgeted(Scene.load(path), budget), folder / f"{path.stem}.xml")
+            scene = budgeted(Scene.load(path), budget)
+            if sum(copy.instance >= 0 for copy in copies_of(scene)) > MOST_INSTANCES:
+                left_out.append(f"{path.stem}: Mitsuba takes minutes to compile many instances")
+                continue
+            _, notes = write_xml(scene, folder / f"{path.stem}.xml")
         except SceneError as error:
             left_out.append(str(error))
             continue
@@ -195,7 +202,7 @@ def table(cases: Sequence[Case]) -> Table[Case]:
         Column("scene", lambda case: case.scene.partition(": ")[0]),
         Column("changed", lambda case: f"from {case.scene.partition(': ')[2]}"),
         Column("bias of the image mean (R, G, B)", _bias),
-        Column("what", lambda case: case.reason if case.cause is None else case.cause.name),
+        Column("what", lambda case: headline(case) if case.cause is None else case.cause.name),
     )
     return Table(columns, changed(cases))
 
