@@ -179,7 +179,7 @@ def _finish(
     if rows.rows:
         console.print(rows.terminal(console.width))
     for line in left_out:
-        say(line)
+        say(f"left out: {line}")
     failed = [case for case in cases if case.verdict in ("differ", "invalid")]
     count = len(cases)
     say(f"{count} cases, {len(failed)} of them differ")

@@ -3,8 +3,9 @@
 import shlex
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -88,10 +89,9 @@ def pair_gate(
             if commands:
                 if data is not None and described is not None:
                     write_resolved(described, data, float32=True)
-                drivers = [
-                    Driver(command, keep, lambda line, of=keep.name: progress.line(f"{of}: {line}"))
-                    for command, keep in zip(commands, folders, strict=True)
-                ]
+                for command, keep in zip(commands, folders, strict=True):
+                    tell = partial(_tell, progress.line, keep.name)
+                    drivers.append(Driver(command, keep, tell))
                 first = Rounds() if seed is None else Rounds(seed)
                 rounds = replace(
                     first,
@@ -125,6 +125,10 @@ def pair_gate(
     biases.tell(terminal.console(), case)
     say(f"{results}, {report}", err=True)
     raise typer.Exit(outputs.code_of(case))
+
+
+def _tell(say: Callable[[str], None], side: str, line: str) -> None:
+    say(f"{side}: {line}")
 
 
 def _places(worst: Sequence[Any]) -> list[str]:

@@ -184,7 +184,8 @@ def _case(name: str, old: Rendered, new: Rendered, limit: float) -> Case:
     sides = f"Mitsuba {new.version}'s", f"Mitsuba {old.version}'s"
     if name in old.pictures and name in new.pictures:
         asked = Asked(limit, title, sides=sides)
-        return pair_case(*(from_array(v.pictures[name]) for v in (new, old)), asked)
+        after, before = (from_array(v.pictures[name]) for v in (new, old))
+        return pair_case(after, before, asked)
     why = [f"{v.version}: {v.problems[name]}" for v in (old, new) if name in v.problems]
     rung = RungResult("statistics", "not-comparable", "; ".join(why))
     verdict, reason = decide([rung], None)

@@ -211,7 +211,7 @@ def _changes(seen: _Seen, threads: int | None) -> Iterator[tuple[str, FloatArray
         other = scene.changed(shapes=rest)
         yield f"without {seen.named(shape)}", _picture(other, threads) - right
     names = list(scene.materials)
-    used = [getattr(one, "material", None) for one in scene.shapes]
+    used = [str(getattr(one, "material", None)) for one in scene.shapes]
     if len(names) < 2 or not all(name in names for name in used):
         return
     for step in (1, -1):
