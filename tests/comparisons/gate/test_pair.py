@@ -55,6 +55,16 @@ def test_shared_random_numbers_show_small_biases() -> None:
     assert compare(a, 1.0003 * pictures(9)).status == "inconclusive"
 
 
+def test_light_that_neither_side_met_is_counted_by_the_pictures_not_by_their_differences() -> None:
+    a = pictures(1, kind="fireflies")
+    paired, alone = compare(a, a, paired=True), compare(a, pictures(2, kind="fireflies"))
+    met = [rung.numbers["unseen_light"]["met_once"] for rung in (paired, alone)]
+    assert met[0] == pytest.approx(met[1], rel=0.3)
+    assert met[0] > 0.01
+    with pytest.raises(ValueError, match="as many on both sides"):
+        compare(a, a[:4], paired=True)
+
+
 def test_other_random_numbers_are_not_paired() -> None:
     a, b = pictures(1), pictures(2)
     assert not streams_of(a, b).shared
