@@ -20,6 +20,11 @@
     checks = comparisons.testing.check_material(evaluate, sample, pdf)
 
 `testing` takes functions of a material, or of a sampler; see `comparisons.gate.material`.
+
+    case = comparisons.gate_pair(pictures_a, pictures_b)
+
+`gate_pair` takes the pictures of two renderers, or of two back ends of one; see
+`comparisons.gate.pair`.
 """
 
 import importlib
@@ -30,8 +35,9 @@ def __getattr__(name: str) -> Any:
     """Import what is named when it is first used: importing Mitsuba takes a second."""
     if name == "testing":
         return importlib.import_module("comparisons.gate.material")
-    if name == "gate_derivative":
-        return importlib.import_module("comparisons.gate.derivative").gate_derivative
+    if name in ("gate_derivative", "gate_pair"):
+        module = importlib.import_module(f"comparisons.gate.{name.removeprefix('gate_')}")
+        return getattr(module, name)
     if name not in ("compare", "gate"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return importlib.import_module(f"comparisons.{name}")

@@ -72,6 +72,12 @@ def compare(
     define: Defaults = None,
     allow_missing: AllowMissing = False,
     witness: Witness = None,
+    variant: Annotated[
+        Literal["fastest", "scalar_rgb", "llvm_ad_rgb", "cuda_ad_rgb"],
+        typer.Option(
+            help="Of Mitsuba: fastest takes cuda_ad_rgb where a GPU is present and it works."
+        ),
+    ] = "fastest",
     derivative: Annotated[
         str | None,
         typer.Option(
@@ -113,12 +119,13 @@ def compare(
         raise UsageError("got an option of a derivative; expected --derivative PARAMETER, too")
     limit = None if time_limit is None else seconds_of(time_limit, "--time-limit")
     with compare_extra():
+        from comparisons.mitsuba.backend import asked_for
         from comparisons.runs.processes import Children
         from comparisons.suites import worker_command
 
     # As `run_cases` does, which is imported while the worker is: before that begins.
     check_writable(*(out / name for name in ("results.json", "report.html", "cases/a case")))
-    with closing(Children()) as children:
+    with asked_for(variant), closing(Children()) as children:
         if fresh or not (out / "cases").is_dir():  # where there is one, nothing may be left to do
             children.begin(tuple(worker_command(threads)))
         with compare_extra():

@@ -2,9 +2,11 @@
 
 import typer
 
+from comparisons.commands.accept import accept
+from comparisons.commands.back_ends import variants, versions
 from comparisons.commands.compare import compare, convert, report, suite
 from comparisons.commands.derivatives import derivatives
-from comparisons.commands.gate import accept, gate
+from comparisons.commands.gate import gate
 from comparisons.commands.speed import bench, converge, methods
 from comparisons.commands.trials import fuzz, selftest, stability
 from comparisons.commands.truth import truth
@@ -15,6 +17,7 @@ def register(app: typer.Typer) -> None:
     commands = (
         *(compare, suite, gate, accept, report, selftest),
         *(converge, methods, bench, stability, convert, fuzz, truth, derivatives),
+        *(variants, versions),
     )
     for command in commands:
         app.command()(command)

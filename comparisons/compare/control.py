@@ -30,7 +30,7 @@ def control(scene: Scene, budget: Budget, say: Callable[[str], None]) -> Case:
     """Compare the pictures of a scene by two of Mitsuba's variants.  Raises SceneError,
     ReferenceUnavailableError."""
     if scene.integrator.deterministic:
-        scene = _smaller(scene)
+        scene = smaller(scene)
     chosen = backend.backend().variant
     variants = {"candidate": backend.SCALAR, "reference": chosen}
     replicates: list[FloatArray] = []
@@ -43,10 +43,10 @@ def control(scene: Scene, budget: Budget, say: Callable[[str], None]) -> Case:
             start = time.perf_counter()
             with backend.variant(variant):
                 # The candidate's seeds must not overlap the reference's.
-                replicates.append(_of_seeds(scene, budget, (1 - number) * 100_000))
+                replicates.append(of_seeds(scene, budget, (1 - number) * 100_000))
             seconds[side] = {"render": time.perf_counter() - start}
             say(f"{variant}: {seconds[side]['render']:.1f} s")
-    except (UntranslatableError, _NoLightError) as error:
+    except (UntranslatableError, NoLightError) as error:
         rungs = (RungResult("statistics", "not-comparable", str(error)),)
     else:
         if scene.integrator.deterministic:
@@ -59,7 +59,7 @@ def control(scene: Scene, budget: Budget, say: Callable[[str], None]) -> Case:
     return judge(evidence, budget.limit)
 
 
-def _smaller(scene: Scene) -> Scene:
+def smaller(scene: Scene) -> Scene:
     """The scene with at most MOST_PIXELS, of about the same aspect ratio."""
     film = scene.film
     factor = min(1.0, math.sqrt(MOST_PIXELS / (film.width * film.height)))
@@ -67,20 +67,20 @@ def _smaller(scene: Scene) -> Scene:
     return scene.changed(film=film.model_copy(update=sides))
 
 
-class _NoLightError(Exception):
+class NoLightError(Exception):
     """The scene has no counterpart in Mitsuba that can be lit."""
 
 
-def _of_seeds(scene: Scene, budget: Budget, seed: int) -> FloatArray:
+def of_seeds(scene: Scene, budget: Budget, seed: int) -> FloatArray:
     """(replicates, height, width, 3) by the active variant; one replicate if deterministic."""
     counterpart = load(scene)
     if isinstance(scene.integrator, RayCast):
         return pictures.mitsuba_cast(scene, counterpart, render(scene))[0][np.newaxis]
     if counterpart.no_light_reason:
-        raise _NoLightError(counterpart.no_light_reason)
+        raise NoLightError(counterpart.no_light_reason)
     if isinstance(scene.integrator, Whitted):
         return pictures.mitsuba_whitted(scene, build_tables(scene), counterpart)[np.newaxis]
     if counterpart.no_pictures_reason:
-        raise _NoLightError(counterpart.no_pictures_reason)
+        raise NoLightError(counterpart.no_pictures_reason)
     spp = scene.resolved_sampler.spp
     return mitsuba_scene.render(counterpart.mi_scene, budget.replicates, spp, seed).pictures

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -56,7 +57,8 @@ class Rendered:
 
     images: the two pictures;  seconds: wall clock by side and step;  replicates: of noisy pictures,
     whose means the images are;  checked: the rung `input` of these, if it is known already;  still:
-    the rung `statistics` of pictures without noise;  fixed_reference: as in `statistics.compare`.
+    the rung `statistics` of pictures without noise;  fixed_reference, paired: as in
+    `statistics.compare`.
     """
 
     images: Images
@@ -66,6 +68,7 @@ class Rendered:
     checked: RungResult | None = None
     still: Callable[[], RungResult] = _deterministic
     fixed_reference: bool = False
+    paired: bool = False
 
     @property
     def resampled(self) -> Pair | None:
@@ -74,6 +77,8 @@ class Rendered:
         if self.replicates is None or len(self.replicates[0]) < 2:
             return None
         candidate, reference = self.replicates
+        if self.paired and not isinstance(reference, statistics.Known):
+            candidate, reference = statistics.differences(candidate, reference)
         if isinstance(reference, statistics.Known):
             deviation = np.sqrt(reference.variance)
             return candidate, np.stack([reference.mean + deviation, reference.mean - deviation])
@@ -220,8 +225,10 @@ def at_look(rendered: Rendered, limit: float, level: float) -> RungResult:
 def _tested(rendered: Rendered, limit: float, level: float = 1.0) -> RungResult:
     if rendered.replicates is None:
         return rendered.still()
-    fixed = rendered.fixed_reference
-    return statistics.compare(*rendered.replicates, limit=limit, level=level, fixed_reference=fixed)
+    how: dict[str, Any] = {"fixed_reference": rendered.fixed_reference}
+    if rendered.paired:
+        how = {"paired": True, "margins": statistics.PAIRED}
+    return statistics.compare(*rendered.replicates, limit=limit, level=level, **how)
 
 
 def _whole(
@@ -252,6 +259,8 @@ _UNKNOWN_NOISE = "the noise of a single picture is unknown"
 def _means_tested(rendered: Rendered) -> Replicates:
     """The replicates; of pictures without noise one each."""
     images = rendered.images
+    if rendered.paired and rendered.resampled is not None:
+        return rendered.resampled
     return rendered.replicates or (images.candidate[np.newaxis], images.reference[np.newaxis])
 
 

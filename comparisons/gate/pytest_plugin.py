@@ -1,5 +1,5 @@
-"""pytest plugin: the fixtures `image_gate`, `derivative_gate` and `material_gate`, which check a
-picture, the derivative of one, and a material, in one line of a test.
+"""pytest plugin: the fixtures `image_gate`, `derivative_gate`, `material_gate` and `pair_gate`,
+which check a picture, its derivative, a material, and pictures of two renderers, in one line of a test.
 
     def test_cornell_box(image_gate):
         image_gate(my_renderer("scenes/cornell_box.yaml"), scene="scenes/cornell_box.yaml")
@@ -9,6 +9,9 @@ picture, the derivative of one, and a material, in one line of a test.
 
     def test_my_metal(material_gate):
         material_gate(my_evaluate, my_sample, my_pdf)
+
+    def test_back_ends(pair_gate):
+        pair_gate(my_renderer("cpu"), my_renderer("gpu"), scene="scenes/cornell_box.yaml")
 
 It imports nothing but pytest until it is used.
 """
@@ -63,6 +66,12 @@ def derivative_gate(request: pytest.FixtureRequest) -> "DerivativeGate":
 def material_gate(request: pytest.FixtureRequest) -> "MaterialGate":
     """Checks materials: see `MaterialGate.__call__`."""
     return MaterialGate(request.node, request.config)
+
+
+@pytest.fixture
+def pair_gate(request: pytest.FixtureRequest) -> "PairGate":
+    """Compares the pictures of two renderers: see `PairGate.__call__`."""
+    return PairGate(request.node, request.config)
 
 
 class Gate:
@@ -305,6 +314,47 @@ class MaterialGate(Gate):
         if lines:
             pytest.fail("\n".join(lines))
         return found
+
+
+class PairGate(Gate):
+    """The gate for two renderers."""
+
+    fixture = "pair_gate"
+
+    def __call__(
+        self,
+        a: Any,
+        b: Any,
+        *,
+        scene: str | Path | None = None,
+        judged: bool = False,
+        spp: int | None = None,
+        limit: float = 0.005,
+        noise_free: bool = False,
+        rim: int = 0,
+    ) -> "Case":
+        """Fail the test unless the pictures of two renderers, builds, back ends or versions agree.
+
+        a, b: as `candidate` of `image_gate`, replicate k of both with the same seed, so that random
+        numbers that are shared are found;  scene: what both show, a file relative to the root
+        folder, for the causes;  judged: our pictures of it say who is wrong;  spp: samples per
+        pixel of a replicate;  limit, noise_free, rim: as of `image_gate`.
+
+        Pictures that are too noisy to tell fail too.  Returns the
+        `comparisons.results.case.Case`.
+        """
+        __tracebackhide__ = True
+
+        def case_of(pictures: "list[Picture]", name: str) -> "Case":
+            from comparisons.gate.pair import Asked, pair_case
+            from comparisons.gate.pictures_in import pictures_of
+            from reference_rt.rendering.scene import Scene
+
+            known = None if scene is None else Scene.load(self._root / scene)
+            asked = Asked(limit, name, known, spp, judged, noise_free, rim)
+            return pair_case(pictures, pictures_of(b), asked)
+
+        return self._judge(a, case_of)
 
 
 def _pictures(given: Any, folder: Path) -> "list[tuple[Picture, Path | None]]":

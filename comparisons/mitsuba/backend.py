@@ -1,10 +1,12 @@
-"""Chooses the Mitsuba variant: llvm_ad_rgb if an LLVM works on this machine, else scalar_rgb.
+"""Chooses the Mitsuba variant: llvm_ad_rgb if an LLVM works on this machine, else scalar_rgb; where
+the fastest is asked for, cuda_ad_rgb before these if a GPU is present.
 
 An unsuitable libLLVM aborts the process instead of raising an exception, so each library is first
 tried in a child process.
 """
 
 import contextlib
+import ctypes.util
 import functools
 import importlib.metadata
 import importlib.util
@@ -30,7 +32,13 @@ from reference_rt.util.processes import tied
 
 FORCE = "REFERENCE_RT_MITSUBA_VARIANT"
 
-SCALAR, LLVM = "scalar_rgb", "llvm_ad_rgb"
+SCALAR, LLVM, CUDA = "scalar_rgb", "llvm_ad_rgb", "cuda_ad_rgb"
+
+VARIANTS = (SCALAR, LLVM, CUDA)
+"""Those that compute colours as we do."""
+
+FASTEST = "fastest"
+"""In place of a variant's name: CUDA if a GPU is present and it works, else what is usual."""
 
 _PROOF_SECONDS = 120.0
 """Time limit of a trial, which takes 1 to 3 s on an idle machine."""
@@ -92,16 +100,22 @@ def _expected_version() -> str | None:
     return None
 
 
-def choose() -> Backend:
+def choose(asked: str | None = None) -> Backend:
     """Find the best variant that works, without loading Mitsuba into this process.
 
-    The environment variable REFERENCE_RT_MITSUBA_VARIANT forces a variant.  Libraries are tried in
+    asked: a variant, or FASTEST; None: what the environment variable REFERENCE_RT_MITSUBA_VARIANT
+    says.  Libraries are tried in
     the order of `llvm_libraries.candidates`; in a process that has imported Dr.Jit, only the one
     that it loaded then.  Raises ReferenceUnavailableError: Mitsuba is not installed, or the forced
     variant does not run.
     """
     version = _version()
-    forced = os.environ.get(FORCE)
+    forced, slower = asked or os.environ.get(FORCE), ""
+    if forced == FASTEST:
+        problem = no_gpu() or prove(CUDA, None)
+        if problem is None:
+            return Backend(CUDA, version, "the fastest variant that works here", None)
+        forced, slower = None, f"; {CUDA}: {problem}"
     if forced and "llvm" not in forced:
         problem = None if forced.startswith("scalar") else prove(forced, None)
         if problem:
@@ -116,13 +130,35 @@ def choose() -> Backend:
         name = path or "the LLVM that Dr.Jit had loaded"
         if problem is None:
             why = f"forced by {FORCE}" if forced else "the fastest variant that works here"
-            return Backend(variant, version, f"{why}, with {name}", path)
+            return Backend(variant, version, f"{why}, with {name}{slower}", path)
         tried.append(f"{name} {problem}")
     reasons = "; ".join(tried) or "no libLLVM was found"
     advice = f"to get llvm: {llvm_libraries.ADVICE}"
     if forced:
         raise ReferenceUnavailableError(f"{FORCE}={forced}: {reasons}; {advice}")
-    return Backend(SCALAR, version, f"{reasons}; {advice}", None)
+    return Backend(SCALAR, version, f"{reasons}; {advice}{slower}", None)
+
+
+@contextlib.contextmanager
+def asked_for(variant: str) -> Iterator[None]:
+    """A context in which `choose` takes this variant, here and in child processes; FASTEST leaves
+    what the environment says."""
+    before = os.environ.get(FORCE)
+    if variant != FASTEST or not before:
+        os.environ[FORCE] = variant
+    try:
+        yield
+    finally:
+        os.environ.pop(FORCE, None)
+        if before is not None:
+            os.environ[FORCE] = before
+
+
+def no_gpu() -> str | None:
+    """That there is no driver of an NVIDIA GPU, which variants of CUDA need; None if there is."""
+    named = os.environ.get("DRJIT_LIBCUDA_PATH")
+    found = named or ctypes.util.find_library("cuda") or ctypes.util.find_library("nvcuda")
+    return None if found else "no GPU (no driver library libcuda was found)"
 
 
 def _libraries() -> list[str | None]:

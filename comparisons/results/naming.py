@@ -9,7 +9,7 @@ import re
 _OWNERS = {"ours": "our"}
 """Before a noun, where that is another word."""
 
-_NAME = re.compile(r"ours|[\w ]+'s")
+_NAME = re.compile(r"ours|[\w .]+'s")
 """Names that sentences can have; others, such as "the baseline's, room", say more."""
 
 _ROLE = re.compile(r"\bthe (candidate|reference)('s)?(?! rung)\b")

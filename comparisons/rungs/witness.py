@@ -64,9 +64,13 @@ def witness_of(
 
 
 def vote(
-    replicates: tuple[FloatArray, FloatArray, FloatArray], names: tuple[str, str, str], limit: float
+    replicates: tuple[FloatArray, FloatArray, FloatArray],
+    names: tuple[str, str, str],
+    limit: float,
+    of_sides: RungResult | None = None,
 ) -> RungResult:
-    """Who of three renderers stands alone.  names: of the candidate, the reference, the witness.
+    """Who of three renderers stands alone.  names: of the candidate, the reference, the witness;
+    of_sides: the statistics of the former two, where they are judged otherwise, as by pairs.
 
     Each pair is judged as two renderers are, at a third of the level, so that the chance that any
     pair of right renderers differs is that of one comparison.  A renderer stands alone if it
@@ -76,7 +80,10 @@ def vote(
     judged = {
         (a, b): statistics.compare(replicates[a], replicates[b], limit=limit, level=1.0 / 3.0)
         for a, b in PAIRS
+        if of_sides is None or (a, b) != (0, 1)
     }
+    if of_sides is not None:
+        judged = {(0, 1): of_sides} | judged
     numbers = {
         "pairs": [
             {

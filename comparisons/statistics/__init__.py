@@ -57,17 +57,19 @@ add a scale: its test, and its row in `scales` (the levels must still sum to 1e-
 """
 
 from comparisons.statistics.advice import noise_free_candidate, replicates_asked, shortfall
-from comparisons.statistics.cells import CHANNELS, Margins
-from comparisons.statistics.decide import compare
+from comparisons.statistics.cells import CHANNELS, PAIRED, Margins
+from comparisons.statistics.decide import compare, differences
 from comparisons.statistics.places import standard_error, worst_regions
 from comparisons.statistics.reading import read
 from comparisons.statistics.sides import Known
 
 __all__ = [
     "CHANNELS",
+    "PAIRED",
     "Known",
     "Margins",
     "compare",
+    "differences",
     "noise_free_candidate",
     "read",
     "replicates_asked",

@@ -57,6 +57,11 @@ class Margins:
     the mean, so that it is all that is permitted in a dark pixel without noise, as a background."""
 
 
+PAIRED = Margins(image=5e-5, tile=5e-4, pixel=5e-3)
+"""For sides that use the same random numbers, and so trace the same paths with the same offsets:
+what is left is the rounding of float32, in which a path that grazes an edge goes either way."""
+
+
 class Cells(NamedTuple):
     """Parts of a picture.
 

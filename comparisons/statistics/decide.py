@@ -2,7 +2,7 @@
 their noise."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -94,6 +94,7 @@ def compare(
     level: float = 1.0,
     fixed_reference: bool = False,
     signed: bool = False,
+    paired: bool = False,
 ) -> RungResult:
     """Decide whether two sets of replicates have the same mean, by the rule of this package.
 
@@ -105,10 +106,11 @@ def compare(
     level: the share of each family's level that is used, for one of several looks at a growing
     number of replicates, whose shares must not exceed 1 together; not for single pictures;
     fixed_reference: the reference cannot be rendered with more samples, so that advice is about the
-    candidate's;  signed: pictures of values of both signs, such as derivatives, whose biases are
-    fractions of their mean size; two or more of each.  Raises ValueError for other shapes, for
-    another level than 0 < level <= 1, and for a limit that is not larger than the margin of the
-    image mean.
+    candidate's; signed: pictures of values of both signs, such as derivatives, whose biases are
+    fractions of their mean size; two or more of each; paired: replicate i of both sides has the
+    same random numbers, so that their differences show the noise. Raises ValueError for other
+    shapes, for another level than 0 < level <= 1, and for a limit that is not larger than the
+    margin of the image mean.
     """
     margins = margins or Margins()
     if not limit > margins.image:
@@ -125,9 +127,23 @@ def compare(
     other = b if isinstance(b, Known) else by_pairs(b)
     if signed and (len(a) < 2 or (not isinstance(b, Known) and len(b) < 2)):
         raise ValueError("a single picture of values of both signs; expected two or more")
-    tested = findings(by_pairs(a), other, tile, margins, level, signed)
+    if paired:
+        if isinstance(b, Known) or len(a) != len(b) or len(a) < 2:
+            raise ValueError("paired replicates: expected as many on both sides, two or more")
+        tested = findings(*differences(a, b), tile, margins, level, signed)
+        met = worse(*(unseen(np.abs(x), level * IMAGE.level) for x in (a, b)))
+        tested = replace(tested, unseen=met)
+    else:
+        tested = findings(by_pairs(a), other, tile, margins, level, signed)
     alone = noise_free_candidate(b, margins, level, signed) if fixed_reference else None
     return _verdict(tested, a, pictures, limit, alone)
+
+
+def differences(a: FloatArray, b: FloatArray) -> tuple[FloatArray, Known]:
+    """Paired replicates (R, height, width, 3) as a candidate whose deviations from b's mean, which
+    is then exact, are the differences of pairs."""
+    mean = b.mean(axis=0)
+    return a - b + mean, Known(mean, np.zeros_like(mean))
 
 
 def findings(

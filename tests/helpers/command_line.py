@@ -21,6 +21,8 @@ def invoke(*words: Any, catch_exceptions: bool = True, **environment: str) -> Re
 
 SCENE = str(Path(__file__).parents[2] / "scenes" / "spheres_whitted.yaml")
 
+BOX = str(Path(SCENE).with_name("cornell_box.yaml"))
+
 COMMANDS = {c.name or c.callback.__name__: c.callback for c in app.registered_commands}
 
 ARGUMENTS = {
@@ -43,6 +45,14 @@ ARGUMENTS = {
     "trace": [SCENE, "--pixel", "1,1"],
     "fuzz": ["--count", "1"],
     "truth": ["perspective", "--scenes", str(Path(SCENE).parent / "truth")],
+    "variants": [
+        str(Path(SCENE).with_name("cornell_box.yaml")),
+        "--variant",
+        "scalar_rgb",
+        "--variant",
+        "llvm_ad_rgb",
+    ],
+    "versions": ["3.9.1", "3.9.1", "--scene", str(Path(SCENE).with_name("cornell_box.yaml"))],
     "doctor": [],
     "schema": [],
     "warm-up": [],

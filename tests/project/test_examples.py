@@ -160,3 +160,10 @@ def test_tour(monkeypatch):
     assert "agree" in page
     assert "reference_rt" not in repr(case)
     assert repr(case).startswith("<Case scene: agree: no difference was found")
+
+
+def test_two_back_ends(run):
+    said = run("two_back_ends")
+    assert said.startswith("differ - paired: ")
+    assert "half floats: B's values" in said
+    assert run("two_back_ends", "float32").startswith("agree - paired: ")

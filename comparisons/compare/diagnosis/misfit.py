@@ -231,6 +231,8 @@ class Misfit:
     def left(self, picture: FloatArray) -> float:
         """The fraction of the excess that remains with `picture` as the reference; noise may make
         it negative."""
+        if self.excess == 0.0:  # nothing differs inside of what is compared: nothing is explained
+            return 1.0
         return (self.squares(picture) - self._scale.noise) / self.excess
 
     def amount(self, direction: FloatArray, rest: FloatArray | None = None) -> float:

@@ -62,6 +62,10 @@ FILES = {
     ("stability", "plots"): ["x"],
     ("derivatives", "out"): ["results.json", "report.html", "cases/x"],
     ("derivatives", "markdown"): [""],
+    ("variants", "out"): ["results.json", "report.html"],
+    ("variants", "markdown"): [""],
+    ("versions", "out"): ["results.json", "report.html"],
+    ("versions", "markdown"): [""],
     ("truth", "out"): ["results.json", "report.html"],
     ("truth", "markdown"): [""],
 }  # fmt: skip

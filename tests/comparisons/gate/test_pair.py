@@ -1,0 +1,220 @@
+"""A pair of renderers: the random numbers that they share, the statistics, the command, the
+fixture."""
+
+import json
+import shlex
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command_line import invoke
+from gate_checks import SCENE
+from test_pytest_plugin import project as project  # a fixture
+from test_pytest_plugin import run
+
+import comparisons
+from comparisons.gate.pair_noise import of_pixels, streams_of
+from comparisons.statistics import compare
+from reference_rt.core.arrays import FloatArray
+
+pytest_plugins = ["pytester"]
+
+SHAPE = (24, 32, 3)
+
+
+def mean() -> FloatArray:
+    y, x = np.mgrid[:24, :32]
+    return (1.0 + 0.5 * np.sin(x / 5.0) * np.cos(y / 4.0))[..., None] * np.array([1.0, 0.7, 0.4])
+
+
+def pictures(seed: int, count: int = 8, kind: str = "gamma") -> FloatArray:
+    """Replicates whose noise is skewed, or has fireflies."""
+    rng = np.random.default_rng(seed)
+    noise = rng.gamma(40.0, 1.0 / 40.0, (count, *SHAPE[:2], 1))
+    if kind == "fireflies":
+        noise = noise + 20.0 * (rng.uniform(size=noise.shape) < 1e-3) - 0.02
+    return mean() * noise
+
+
+def test_shared_random_numbers_show_small_biases() -> None:
+    a = pictures(1)
+    case = comparisons.gate_pair(a, 1.0003 * a)
+    assert case.verdict == "differ"
+    assert case.cause is not None
+    assert case.cause.name.startswith("constant gain")
+    assert any(note.startswith("paired: ") for note in case.notes)
+    same = comparisons.gate_pair(
+        a, a * (1.0 + 1e-7 * np.random.default_rng(2).normal(size=a.shape))
+    )
+    assert same.verdict == "agree"
+    (rung,) = [rung for rung in same.rungs if rung.name == "statistics"]
+    assert max(rung.numbers["detectable_bias"].values()) < 1e-4
+    # Without the pairs nothing is seen: the noise of the means is 0.05 %.
+    assert compare(a, 1.0003 * pictures(9)).status == "inconclusive"
+
+
+def test_light_that_neither_side_met_is_counted_by_the_pictures_not_by_their_differences() -> None:
+    a = pictures(1, kind="fireflies")
+    paired, alone = compare(a, a, paired=True), compare(a, pictures(2, kind="fireflies"))
+    met = [rung.numbers["unseen_light"]["met_once"] for rung in (paired, alone)]
+    assert met[0] == pytest.approx(met[1], rel=0.3)
+    assert met[0] > 0.01
+    with pytest.raises(ValueError, match="as many on both sides"):
+        compare(a, a[:4], paired=True)
+
+
+def test_other_random_numbers_are_not_paired() -> None:
+    a, b = pictures(1), pictures(2)
+    assert not streams_of(a, b).shared
+    assert streams_of(a, 2.0 * a).shared
+    assert not streams_of(a, np.roll(a, 1, axis=0)).shared  # in another order
+    half = 0.5 * (a + b)
+    assert streams_of(a, half).correlation == pytest.approx(np.sqrt(0.5), abs=0.03)
+    few = np.random.default_rng(3).normal(size=(8, 1, 1, 1)) * np.ones(SHAPE)
+    other = np.random.default_rng(4).normal(size=(8, 1, 1, 1)) * np.ones(SHAPE)
+    assert not streams_of(few, other).shared  # one random number for all pixels
+
+
+def test_pixels_that_share_numbers_are_found_at_any_distance() -> None:
+    rng = np.random.default_rng(5)
+    noise = rng.normal(size=(8, *SHAPE[:2], 1))
+    assert of_pixels(noise * np.ones(3))[0] < 0.1
+    moved = noise + np.roll(noise, (5, -7), axis=(1, 2))
+    share, (x, y) = of_pixels(moved * np.ones(3))
+    assert share == pytest.approx(0.5, abs=0.1)
+    assert (abs(x), abs(y)) == (7, 5)
+
+
+def test_sizes_and_sides_without_noise() -> None:
+    picture = mean()
+    assert comparisons.gate_pair(picture, picture, noise_free=True).verdict == "agree"
+    wrong = comparisons.gate_pair(picture, 1.02 * picture, noise_free=True)
+    assert wrong.verdict == "differ"
+    with pytest.raises(Exception, match="is 32 x 23 pixels; expected 32 x 24, as A's first"):
+        comparisons.gate_pair(picture, picture[1:])
+    repeated = np.stack([picture] * 8)
+    assert comparisons.gate_pair(repeated, repeated).verdict == "agree"
+    found = comparisons.gate_pair(repeated, pictures(1))
+    assert found.verdict == "invalid"
+    assert "the same bit for bit" in found.reason
+
+
+def test_ours_says_who_is_wrong(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from gate_checks import pictures as rendered
+
+    monkeypatch.chdir(tmp_path)
+    Path("ball.yaml").write_text(SCENE)
+    right = rendered(count=8)
+    for a, b, alone in ((1.05 * right, right, "A's"), (right, 1.05 * right, "B's")):
+        case = comparisons.gate_pair(a, b, scene="ball.yaml", judged=True, limit=0.01)
+        assert case.verdict == "differ"
+        (vote,) = [rung for rung in case.rungs if rung.name == "witness"]
+        assert vote.numbers["alone"] == alone
+        assert case.reason.endswith(f"{alone} stands alone")
+    with pytest.raises(Exception, match="expected a scene"):
+        comparisons.gate_pair(right, right, judged=True)
+
+
+RENDERER = """\
+import sys
+import numpy as np
+output, seed, gain, other = sys.argv[1], *map(float, sys.argv[2:])
+y, x = np.mgrid[:24, :32]
+mean = (1 + 0.5 * np.sin(x / 5) * np.cos(y / 4))[..., None] * np.array([1, 0.7, 0.4])
+if other >= 0:
+    gain *= np.random.default_rng(int(seed + other)).gamma(400, 1 / 400, mean.shape)
+np.save(output, gain * mean)
+"""
+
+
+def drive(gain: str, other: str) -> str:
+    program = f"{shlex.quote(sys.executable)} renderer.py"
+    return f"{program} {{output}} {{seed}} {gain} {other}"
+
+
+@pytest.mark.usefixtures("gate_folder")
+def test_the_command() -> None:
+    Path("renderer.py").write_text(RENDERER)
+    right, wrong = drive("1", "0"), drive("1.001", "0")
+    result = invoke("gate", "--pair", right, wrong, "--suffix", ".npy", "--replicates", "4")
+    assert result.exit_code == 1, result.output
+    assert "A's picture is 0.100 % darker than B's" in result.output
+    assert "paired: replicate k" in result.output
+    found = json.loads(Path("out/results.json").read_text())
+    assert found["provenance"]["A"] == right
+    for name in "AB":
+        assert len(list(Path(f"out/candidates/{name}").glob("*.npy"))) == 4
+    result = invoke("gate", "--pair", "out/candidates/A", "out/candidates/A")
+    assert result.exit_code == 0, result.output
+    still = drive("1", "-1")
+    result = invoke("gate", "--pair", still, still, "--suffix", ".npy")
+    assert result.exit_code == 0, result.output
+    assert "there is no noise" in result.output
+    assert len(list(Path("out/candidates/A").glob("*.npy"))) == 2
+
+
+@pytest.mark.usefixtures("gate_folder")
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--pair", "prog {output}", "."], "has no pictures"),
+        (["--pair", "prog {output}", "pictures"], "expected two commands or pages, or pictures"),
+        (["--pair", "prog", "prog {output}"], "--pair: has no {output}"),
+        (["--pair", "a {output}", "b {output}", "--baseline", "x"], "does not apply to --pair"),
+        (["--pair", "pictures", "pictures", "--replicates", "4"], "only applies to commands"),
+        (["--pair", "pictures", "pictures", "--judge"], "expected a scene"),
+        (["--judge", "x.npy"], "only applies to --pair"),
+    ],
+)
+def test_wrong_usage(words: list[str], said: str) -> None:
+    Path("pictures").mkdir()
+    np.save("pictures/a.npy", pictures(1))
+    result = invoke("gate", *words)
+    assert result.exit_code == 2, result.output
+    assert said in result.output
+
+
+@pytest.mark.slow
+def test_the_fixture(project: pytest.Pytester) -> None:
+    result = run(
+        project,
+        """
+def test_right(pair_gate):
+    case = pair_gate(my_renderer(SCENE), my_renderer(SCENE, first=900), scene=SCENE)
+    assert case.verdict == "agree"
+
+def test_gain(pair_gate):
+    pair_gate(my_renderer(SCENE), my_renderer(SCENE, gain=1.001))
+""",
+    )
+    result.assert_outcomes(passed=1, failed=1)
+    assert "pair_gate: differ: likeliest cause: constant gain of 0.999" in result.stdout.str()
+
+
+def alarms(kind: str, shared: bool, cases: int, first: int = 0) -> int:
+    """How often two right renderers differ."""
+    count = 0
+    for k in range(first, first + cases):
+        a = pictures(2 * k, kind=kind)
+        b: Any = pictures(2 * k + 1, kind=kind)
+        if shared:  # a hundredth of the paths go another way
+            other = np.random.default_rng(k).uniform(size=(8, *SHAPE[:2], 1)) < 0.01
+            b = np.where(other, b, a)
+        count += comparisons.gate_pair(a, b).verdict in ("differ", "invalid")
+    return count
+
+
+@pytest.mark.parametrize("kind", ["gamma", "fireflies"])
+@pytest.mark.parametrize("shared", [True, False], ids=["paired", "unpaired"])
+def test_right_pairs_do_not_differ(kind: str, shared: bool) -> None:
+    assert alarms(kind, shared, 4) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["gamma", "fireflies"])
+@pytest.mark.parametrize("shared", [True, False], ids=["paired", "unpaired"])
+def test_false_alarms(kind: str, shared: bool) -> None:
+    # One in a thousand cases at most: of 500, three or more have a chance of 1.4 %.
+    assert alarms(kind, shared, 500) <= 2
