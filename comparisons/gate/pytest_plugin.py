@@ -1,5 +1,5 @@
 """pytest plugin: the fixtures `image_gate`, `derivative_gate`, `material_gate` and `pair_gate`,
-which check a picture, its derivative, a material, and pictures of two renderers, in one line of a test.
+which check a picture, its derivative, a material, and two renderers, in one line of a test.
 
     def test_cornell_box(image_gate):
         image_gate(my_renderer("scenes/cornell_box.yaml"), scene="scenes/cornell_box.yaml")
