@@ -26,6 +26,7 @@ import platformdirs
 
 from comparisons.mitsuba import llvm_libraries
 from comparisons.mitsuba.llvm_libraries import LIBRARY
+from comparisons.mitsuba.uses import lacking
 from reference_rt.util.errors import ReferenceUnavailableError
 from reference_rt.util.files import read_text
 from reference_rt.util.processes import tied
@@ -216,6 +217,8 @@ def mitsuba() -> Any:
     # In scalar variants every loaded plugin logs a warning ("terrible performance"), which
     # `Backend.reason` states already.
     mi.set_log_level(mi.LogLevel.Error)
+    if chosen.doubt and (names := lacking(mi)):
+        raise ReferenceUnavailableError(f"{chosen.doubt}; it has no {', '.join(names)}")
     _register_once(chosen.variant)
     return mi
 
