@@ -85,10 +85,10 @@ def test_wrong_usage(right: FloatArray) -> None:
     candidate = write("c.exr", right[0])
     for arguments, message in (
         ([candidate], "expected a scene, reference or baseline"),
-        (["--scene", "ball.yaml"], "expected either candidates, --command or --browser"),
+        (["--scene", "ball.yaml"], "expected either candidates, --command, --browser or --pair"),
         (
             [candidate, "--command", "x {output}"],
-            "expected either candidates, --command or --browser",
+            "expected either candidates, --command, --browser or --pair",
         ),
         ([candidate, "--scene", "ball.yaml", "--seed", "3"], "--seed: only applies to --command"),
         ([candidate, "--scene", "ball.yaml", "--fixed"], "--fixed: only applies to --command"),
