@@ -226,8 +226,10 @@ def _local_array(dtype: Any) -> Any:
 if numba.config.DISABLE_JIT:
 
     def local_floats(n: int) -> npt.NDArray[np.float64]:
-        """Scratch for `n` floats, freed when the calling kernel returns; not for use in loops."""
-        return np.empty(n)
+        """Scratch for `n` floats, freed when the calling kernel returns; not for use in loops.
+        Zeros: a row that nothing was stored in is read as an integer, too, and then not used;
+        Python refuses to make one of the NaN that fresh memory may hold."""
+        return np.zeros(n)
 
     def local_integers(n: int) -> npt.NDArray[np.int64]:
         """Scratch for `n` integers, likewise."""
