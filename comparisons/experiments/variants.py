@@ -78,6 +78,14 @@ class Task:
     derivatives: Mapping[str, str] = field(default_factory=dict)
     plugins: tuple[str, ...] = PLUGINS
 
+    def parts(self) -> list[str]:
+        """What a process does, in its order."""
+        return [
+            *(f"rays {plugin}" for plugin in self.plugins if self.rays),
+            *(f"picture {Path(file).stem}" for file in self.scenes),
+            *(f"derivative {Path(file).stem}" for file in self.derivatives),
+        ]
+
 
 def works() -> tuple[list[str], list[str]]:
     """The variants that work here, and a line about each that does not."""
@@ -104,7 +112,7 @@ def run(
         told = {name: _measured(name, task, place / name, say) for name in variants}
         cases = [_of_rays(plugin, variants, told) for plugin in task.plugins if task.rays]
         for one, two in combinations(variants[::-1], 2):
-            for key in told[two]:
+            for key in task.parts():
                 kind, _, name = key.partition(" ")
                 is_scalar = kind == "derivative" and SCALAR in (one, two)  # which has none
                 if kind in ("picture", "derivative") and not is_scalar:
@@ -128,7 +136,8 @@ def _measured(variant: str, task: Task, folder: Path, say: Callable[[str], None]
         check=False,
     )
     found: dict[str, Any] = {}
-    for line in (folder / "told.jsonl").read_text(encoding="utf-8").splitlines():
+    told = folder / "told.jsonl"
+    for line in told.read_text(encoding="utf-8").splitlines() if told.exists() else ():
         answer = json.loads(line)
         if "array" in answer:
             answer["array"] = np.load(folder / answer["array"])
@@ -136,7 +145,7 @@ def _measured(variant: str, task: Task, folder: Path, say: Callable[[str], None]
     if child.returncode:
         last = [key for key, value in found.items() if value.get("status") == "begun"]
         how = f"ends the process with {child.returncode}: {child.stderr.strip()[-300:]}"
-        for key in last or ["process"]:
+        for key in last or [task.parts()[0]]:  # before it began anything
             found[key] = {"status": "differ", "reason": f"{variant} {how}"}
     return found
 

@@ -8,7 +8,6 @@ the numbers were copied as they stand.
 import math
 from collections.abc import Collection
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
 
 LIGHTS = {
     "point": "intensity",
@@ -85,17 +84,16 @@ def _times(factor: float) -> str:
 class Known:
     """A renderer that was measured.
 
-    title: its name;  version: which was measured;  changes: of its pictures, and of numbers of
-    lights;  glass: whether radiance in glass is divided by the square of the index, None: unknown;
-    said: what a picture has besides that cannot be undone;  measured: the command.
+    title: its name;  version: which was measured;  glass: whether radiance in glass is divided by
+    the square of the index, None: unknown;  said: what a picture has besides that cannot be undone;
+    changes: of its pictures, and of numbers of lights.
     """
 
     title: str
     version: str
-    changes: Changes
     glass: bool | None
     said: tuple[str, ...]
-    measured: str
+    changes: Changes = Changes()
 
     @property
     def whose(self) -> str:
@@ -109,95 +107,72 @@ class Known:
 
 
 _QUARTER = 1.0 / (4.0 * math.pi)
-_SCRIPT = "python docs/measure_conventions.py"
 
-_DATA: dict[str, dict[str, Any]] = {
-    "cycles": {
-        "title": "Cycles",
-        "version": "5.0.1",
-        "changes": {"lights": {"point": _QUARTER, "spot": _QUARTER}},
-        "glass": False,
-        "said": (
+RENDERERS = {
+    "cycles": Known(
+        "Cycles",
+        "5.0.1",
+        False,
+        (
             "its first sample of each pixel lies at the pixel's centre",
             "its default filter is Blackman-Harris, 1.5 pixels wide",
             "the angle of view spans the longer side",
         ),
-    },
-    "luxcore": {
-        "title": "LuxCore",
-        "version": "2.11.2",
-        "changes": {"down": 1.0, "lights": {"point": _QUARTER}},
-        "glass": True,
-        "said": ("the angle of view spans the longer side",),
-    },
-    "mitsuba": {
-        "title": "Mitsuba",
-        "version": "3.9.1",
-        "changes": {},
-        "glass": True,
-        "said": (
+        Changes(lights={"point": _QUARTER, "spot": _QUARTER}),
+    ),
+    "luxcore": Known(
+        "LuxCore",
+        "2.11.2",
+        True,
+        ("the angle of view spans the longer side",),
+        Changes(down=1.0, lights={"point": _QUARTER}),
+    ),
+    "mitsuba": Known(
+        "Mitsuba",
+        "3.9.1",
+        True,
+        (
             "its default filter is a Gaussian of 0.5 pixels",
             "its integrator `direct` adds up the samples of point and directional lamps",
         ),
-    },
-    "povray": {
-        "title": "POV-Ray",
-        "version": "3.7.0.10",
-        "changes": {"lights": {"directional": math.pi}},
-        "glass": False,
-        "said": (
+    ),
+    "povray": Known(
+        "POV-Ray",
+        "3.7.0.10",
+        False,
+        (
             "its light sources do not fade with distance unless they are told to, and then as "
             "2 / (1 + (distance / fade_distance)^fade_power)",
             "a camera whose `right` is positive mirrors right-handed scenes",
         ),
-    },
-    "radiance": {
-        "title": "Radiance",
-        "version": "6.0a",
-        "changes": {},
-        "glass": True,
-        "said": (
+        Changes(lights={"directional": math.pi}),
+    ),
+    "radiance": Known(
+        "Radiance",
+        "6.0a",
+        True,
+        (
             "its samples are moved at random within pixels by -pj, and left out by -ps",
             "its lamps are spheres, rings and discs, and are seen",
         ),
-    },
-    "raysect": {
-        "title": "raysect",
-        "version": "0.9.1",
-        "changes": {"cosine": True},
-        "glass": False,
-        "said": (
-            "frames are indexed by column and row",
-            "the angle of view spans the longer side",
-        ),
-    },
-    "tachyon": {
-        "title": "tachyon",
-        "version": "0.99b6",
-        "changes": {
-            "mirrored": True,
-            "right": 0.5,
-            "down": 0.5,
-            "lights": {"directional": math.pi},
-        },
-        "glass": None,
-        "said": (
+    ),
+    "raysect": Known(
+        "raysect",
+        "0.9.1",
+        False,
+        ("frames are indexed by column and row", "the angle of view spans the longer side"),
+        Changes(cosine=True),
+    ),
+    "tachyon": Known(
+        "tachyon",
+        "0.99b6",
+        None,
+        (
             "its files of 8 bits have codes in proportion to radiance, rounded down",
             "its point lights are seen as balls, and do not fade with distance without ATTENUATION",
             "highlights are Blinn's, with the exponent of Phong's, without -shade_phong",
         ),
-    },
+        Changes(mirrored=True, right=0.5, down=0.5, lights={"directional": math.pi}),
+    ),
 }
-
-RENDERERS: dict[str, Known] = {
-    name: Known(
-        one["title"],
-        one["version"],
-        Changes(**one["changes"]),
-        one["glass"],
-        one["said"],
-        f"{_SCRIPT} {name}",
-    )
-    for name, one in _DATA.items()
-}
-"""By the name that `gate --from` takes."""
+"""By the name that `gate --from` takes; measured by `python docs/measure_conventions.py NAME`."""

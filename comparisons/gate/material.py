@@ -34,6 +34,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
+from comparisons.gate.material_maps import GRID, Map, centres, draw, histograms, means
 from comparisons.rungs.sampling import materials as of_rung
 from comparisons.statistics import chi_square as statistics
 from reference_rt.core.arrays import FloatArray
@@ -59,13 +60,8 @@ ROUNDINGS = of_rung.AMPLIFIED
 """Of the caller's own type: times the change of a value when its directions are moved by one."""
 
 MOST_ALIKE = 16
-"""Draws that may be equal: two of 2^15 points of float32 are by chance, more are not."""
-
-GRID = (32, 64)
-"""Cells of a picture: the cosine of wi from 1 to -1 downwards, its azimuth across."""
-
-Map = tuple[str, FloatArray]
-"""A title, and values over GRID."""
+"""Draws that may be equal.  Numbers of float32 repeat: of 2^15 points of 2^24 values along each
+side two may be equal by chance, but not as many as these."""
 
 
 @dataclass(frozen=True)
@@ -90,20 +86,7 @@ class Check:
         Raises UsageError where there are none: a check that passed, or that is told in words."""
         if not self.maps:
             raise UsageError(f"{self.name}: there is no picture of this: {self.reason}")
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(4.2 * len(self.maps), 3.4), layout="constrained")
-        every = figure.subplots(1, len(self.maps), squeeze=False).ravel()
-        for axes, (title, values) in zip(every, self.maps, strict=True):
-            signed = bool((values < 0.0).any())
-            most = float(np.nanmax(np.abs(values))) or 1.0
-            colours = {"cmap": "RdBu_r" if signed else "viridis", "vmin": -most * signed}
-            place = {"extent": (0.0, 360.0, -1.0, 1.0), "aspect": "auto"}
-            shown = axes.imshow(values, vmax=most, **colours, **place)
-            axes.set(title=title, xlabel="azimuth of wi, degrees", ylabel="cosine of wi")
-            figure.colorbar(shown, ax=axes)
-        figure.suptitle(f"{self.name}: {self.reason}", fontsize=8, wrap=True)
-        figure.savefig(path, dpi=110)
+        draw(self.maps, f"{self.name}: {self.reason}", path)
 
 
 def views_of(views: Views = None, eta: float | None = None) -> FloatArray:
@@ -126,16 +109,21 @@ def check_material(
     views: Views = None,
     eta: float | None = None,
     reciprocal: bool = True,
+    precision: npt.DTypeLike | None = None,
     seed: int = 0,
 ) -> list[Check]:
     """All checks of a material; those of weights only where `sample` returns some.  reciprocal:
-    false for one that is not meant to be, such as a coat of many fits.  Raises UsageError."""
+    false for one that is not meant to be, such as a bump;  precision: the type of floats that the
+    functions compute with, such as "float32", where their arrays do not say it.  Raises
+    UsageError."""
     found = [chi_square(sample, pdf, views=views_of(views, eta), seed=seed)]
     if _drawn(sample, _tiled(views_of(views, eta)[0], 1), np.full((1, 3), 0.5))[1] is not None:
-        found.append(weights(evaluate, sample, pdf, views=views, eta=eta, seed=seed))
+        found.append(
+            weights(evaluate, sample, pdf, views=views, eta=eta, precision=precision, seed=seed)
+        )
     found.append(furnace(evaluate, sample, views=views, eta=eta, seed=seed))
     if reciprocal:
-        found.append(reciprocity(evaluate, eta=eta, seed=seed))
+        found.append(reciprocity(evaluate, eta=eta, precision=precision, seed=seed))
     return found
 
 
@@ -190,7 +178,8 @@ def chi_square(
             return Check("chi_square", False, f"{_seen(wo)}{error}")
         lost = float(failed.mean())
         sums.append(fit.integral)
-        sigmas = 5.0 * math.sqrt(max(lost * (1.0 - lost), 1.0 / draws) / draws)
+        sigmas = -float(special.ndtri(0.5 * level))
+        sigmas *= math.sqrt(max(lost * (1.0 - lost), 1.0 / draws) / draws)
         wrong = ""
         if fit.outside:
             wrong = f"{fit.outside} of {draws} draws are where the density is 0"
@@ -204,7 +193,7 @@ def chi_square(
                 f"the density integrates to {fit.integral:.4f}, and {lost:.4f} of the draws fail"
             )
         if wrong:
-            maps = _histograms(points[~failed], density, draws) if domain == "directions" else ()
+            maps = histograms(points[~failed], density, draws) if domain == "directions" else ()
             return Check("chi_square", False, _seen(wo) + wrong, {"integrals": sums}, maps)
     reason = f"{draws} draws have their density" + (
         f" in each of {len(looked)} views" if views is not None else ""
@@ -219,11 +208,17 @@ def weights(
     *,
     views: Views = None,
     eta: float | None = None,
+    precision: npt.DTypeLike | None = None,
     seed: int = 0,
 ) -> Check:
     """Whether a weight times the density is the value, of directions that are drawn, to the
-    rounding of the caller's own type.  Raises UsageError if `sample` returns no weights."""
-    for k, wo in enumerate(views_of(views, eta)):
+    rounding of the coarsest type of floats.  Raises UsageError if `sample` returns no weights."""
+    looked = views_of(views, eta)
+    one = _tiled(looked[0], 1)
+    drawn = sample(one, np.full((1, 3), 0.5))
+    drawn = drawn if isinstance(drawn, tuple) else (drawn,)
+    unit = _unit(precision, *drawn, evaluate(one, one), pdf(one, one))
+    for k, wo in enumerate(looked):
         rng = np.random.default_rng((seed, k, 1))
         rows = _tiled(wo, PAIRS)
         wi, weight = _drawn(sample, rows, rng.random((PAIRS, 3)))
@@ -231,14 +226,13 @@ def weights(
             raise UsageError("weights: sample returned directions alone; expected (wi, weight)")
         kept = np.isfinite(wi).all(axis=1)
         wi, weight, rows = wi[kept], weight[kept], rows[kept]
-        value, unit = _values(evaluate, rows, wi)
-        density = _checked(pdf(rows, wi), len(wi), "pdf", channels=False)
+        value, density = _values(evaluate, rows, wi), _densities(pdf, rows, wi)
         made = weight * density
         spread = np.zeros_like(value + made)
         for moved in _moved(wi, unit, rng):
-            again = _checked(pdf(rows, moved), len(wi), "pdf", channels=False)
-            change = np.abs(_values(evaluate, rows, moved)[0] - value)
-            spread = np.maximum(spread, change + weight * np.abs(again - density))
+            change = np.abs(_values(evaluate, rows, moved) - value)
+            again = np.abs(_densities(pdf, rows, moved) - density)
+            spread = np.maximum(spread, change + weight * again)
         bound = ROUNDINGS * (unit * (np.abs(value) + np.abs(made)) + spread)
         off = np.abs(value - made) - bound
         if not (off <= 0.0).all():
@@ -251,7 +245,7 @@ def weights(
             )
             wrong = int(np.count_nonzero(~(off <= 0.0).all(axis=1)))
             told += f" ({wrong} of {len(wi)} directions)"
-            maps = _maps(
+            maps = means(
                 wi, ("value", value.mean(axis=1)), ("weight times density", made.mean(axis=1))
             )
             return Check("weights", False, told, {"wrong": wrong}, maps)
@@ -286,7 +280,7 @@ def furnace(
                 seen = np.where(failed[:, None], 0.0, weight)
                 power = seen * _denser(wo, np.where(failed[:, None], wo, wi), eta)[:, None]
         at = hints[rng.integers(0, len(hints), 1024)]
-        first = _values(evaluate, _tiled(wo, len(at)), at)[0]
+        first = _values(evaluate, _tiled(wo, len(at)), at)
         if not (np.isfinite(first).all() and (first >= 0.0).all()):
             bad = float(np.where(np.isfinite(first), first, -math.inf).min())
             return Check("furnace", False, f"{_seen(wo)}a value is {bad:g}; expected 0 or more")
@@ -294,7 +288,7 @@ def furnace(
         for channel in range(first.shape[1]):
 
             def leaving(at: FloatArray, channel: int = channel, wo: FloatArray = wo) -> FloatArray:
-                value = _values(evaluate, _tiled(wo, len(at)), at)[0][:, channel]
+                value = _values(evaluate, _tiled(wo, len(at)), at)[:, channel]
                 return np.asarray(value * _denser(wo, at, eta))
 
             try:
@@ -314,28 +308,34 @@ def furnace(
                         f"weights have the mean {made:.4f}, and the values' integral is {said:.4f}"
                     )
         if wrong:
-            shown = _centres()
-            value = _values(evaluate, _tiled(wo, len(shown)), shown)[0].mean(axis=1)
+            shown = centres()
+            value = _values(evaluate, _tiled(wo, len(shown)), shown).mean(axis=1)
             maps = (("value", value.reshape(GRID)),)
             return Check("furnace", False, _seen(wo) + wrong, {"albedos": albedos}, maps)
     most = max(map(max, albedos))
     return Check("furnace", True, f"at most {most:.4f} of the light leaves", {"albedos": albedos})
 
 
-def reciprocity(evaluate: Evaluate, *, eta: float | None = None, seed: int = 0) -> Check:
+def reciprocity(
+    evaluate: Evaluate,
+    *,
+    eta: float | None = None,
+    precision: npt.DTypeLike | None = None,
+    seed: int = 0,
+) -> Check:
     """Whether f(wo, wi) = f(wi, wo), and for light that passes to another side, with an `eta`,
     f(wo, wi) n(wi)² = f(wi, wo) n(wo)² (Walter et al. 2007), to the rounding of the caller's own
     type, at random pairs of directions, a third of them near to grazing.  Raises UsageError."""
     rng = np.random.default_rng((seed, 3))
     a, b = (_random_directions(rng, PAIRS, both=eta is not None) for _ in (0, 1))
-    forth, unit = _values(evaluate, a, b)
-    back, _ = _values(evaluate, b, a)
+    forth, back = _values(evaluate, a, b), _values(evaluate, b, a)
+    unit = _unit(precision, evaluate(a[:1], b[:1]))
     scale = [np.abs(v[:, 2:]) / _index(v, eta)[:, None] ** 2 for v in (a, b)]
     left, right = forth * scale[0], back * scale[1]  # times both cosines, and over both indices
     spread = np.zeros_like(left)
     for one, two in zip(_moved(a, unit, rng), _moved(b, unit, rng), strict=True):
-        spread += np.abs(_values(evaluate, one, two)[0] - forth) * scale[0]
-        spread += np.abs(_values(evaluate, two, one)[0] - back) * scale[1]
+        spread += np.abs(_values(evaluate, one, two) - forth) * scale[0]
+        spread += np.abs(_values(evaluate, two, one) - back) * scale[1]
     bound = ROUNDINGS * (unit * (np.abs(left) + np.abs(right)) + spread)
     wrong = np.asarray(~(np.abs(left - right) <= bound).all(axis=1))
     numbers = {"wrong": int(wrong.sum()), "pairs": PAIRS}
@@ -347,10 +347,10 @@ def reciprocity(evaluate: Evaluate, *, eta: float | None = None, seed: int = 0) 
         f"f({a[worst].round(3).tolist()}, {b[worst].round(3).tolist()}) is {x / y:.6g} times that "
         f"of the directions exchanged ({numbers['wrong']} of {PAIRS} pairs)"
     )
-    wo, shown = a[worst], _centres()
+    wo, shown = a[worst], centres()
     other = _tiled(wo, len(shown))
-    one = _values(evaluate, other, shown)[0].mean(axis=1) / np.abs(shown[:, 2])
-    two = _values(evaluate, shown, other)[0].mean(axis=1) / abs(wo[2])
+    one = _values(evaluate, other, shown).mean(axis=1) / np.abs(shown[:, 2])
+    two = _values(evaluate, shown, other).mean(axis=1) / abs(wo[2])
     two *= (_index(shown, eta) ** -2.0 / _index(wo[None], eta) ** -2.0) if eta else 1.0
     maps = (("f(wo, wi)", one.reshape(GRID)), ("difference", (one - two).reshape(GRID)))
     return Check("reciprocity", False, told, numbers, maps)
@@ -367,12 +367,20 @@ def _checked(found: Any, n: int, name: str, channels: bool = True) -> FloatArray
     return np.asarray(array, np.float64)
 
 
-def _values(evaluate: Evaluate, wo: FloatArray, wi: FloatArray) -> tuple[FloatArray, float]:
-    """Values, and the unit of rounding of their type."""
-    found = np.asarray(evaluate(wo, wi))
-    single = found.dtype.kind == "f" and found.dtype.itemsize < 8
-    unit = float(np.finfo(found.dtype if single else np.float64).eps) / 2.0
-    return _checked(found, len(wi), "evaluate"), unit
+def _unit(precision: npt.DTypeLike | None, *found: Any) -> float:
+    """The unit of rounding of the coarsest type of floats among what functions return, or of the
+    type that the caller says that they compute with."""
+    kinds = [np.dtype(np.float64), *(np.asarray(one).dtype for one in found)]
+    kinds += [] if precision is None else [np.dtype(precision)]
+    return max(float(np.finfo(kind).eps) for kind in kinds if kind.kind == "f") / 2.0
+
+
+def _values(evaluate: Evaluate, wo: FloatArray, wi: FloatArray) -> FloatArray:
+    return _checked(evaluate(wo, wi), len(wi), "evaluate")
+
+
+def _densities(pdf: Evaluate, wo: FloatArray, wi: FloatArray) -> FloatArray:
+    return _checked(pdf(wo, wi), len(wi), "pdf", channels=False)
 
 
 def _drawn(sample: Sample, wo: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray | None]:
@@ -455,46 +463,3 @@ def _moved(v: FloatArray, unit: float, rng: np.random.Generator) -> Iterator[Flo
     """Directions moved by a few units of rounding, three times."""
     for _ in range(3):
         yield v + 4.0 * unit * rng.choice([-1.0, 1.0], v.shape)
-
-
-def _centres(at: FloatArray | None = None) -> FloatArray:
-    """Directions of the cells of a picture, row by row;  at (cells, n, 2): where in each cell."""
-    down, across = np.indices(GRID).reshape(2, -1, 1)
-    y, x = (0.5, 0.5) if at is None else (at[..., 0], at[..., 1])
-    z, azimuth = 1.0 - (down + y) * 2.0 / GRID[0], (across + x) * 2.0 * math.pi / GRID[1]
-    return statistics.SPHERE.points(np.stack([z, azimuth], axis=-1).reshape(-1, 2))
-
-
-def _cells(v: FloatArray) -> np.ndarray[Any, np.dtype[np.int64]]:
-    """The number of each direction's cell."""
-    z, azimuth = statistics.SPHERE.coordinates(v).T
-    down = np.clip(((1.0 - z) * 0.5 * GRID[0]).astype(int), 0, GRID[0] - 1)
-    across = np.clip((azimuth * 0.5 / math.pi * GRID[1]).astype(int), 0, GRID[1] - 1)
-    return np.asarray(down * GRID[1] + across)
-
-
-def _histograms(
-    v: FloatArray, density: Callable[[FloatArray], FloatArray], draws: int
-) -> tuple[Map, ...]:
-    """What is drawn, what the density says of it (64 points in each cell), and the difference in
-    standard deviations."""
-    size = GRID[0] * GRID[1]
-    counted = np.bincount(_cells(v), minlength=size)
-    fine = np.random.default_rng(4).random((size, 64, 2))
-    expected = density(_centres(fine)).reshape(size, 64).mean(axis=1) * 4.0 * math.pi / size * draws
-    apart = (counted - expected) / np.sqrt(np.maximum(expected, 1.0))
-    titles = ("drawn", "by the density", "difference, standard deviations")
-    return tuple(
-        (title, values.astype(float).reshape(GRID))
-        for title, values in zip(titles, (counted, expected, apart), strict=True)
-    )
-
-
-def _maps(v: FloatArray, *shown: Map) -> tuple[Map, ...]:
-    """Means over the cells of what belongs to directions."""
-    cells, size = _cells(v), GRID[0] * GRID[1]
-    counted = np.maximum(np.bincount(cells, minlength=size), 1)
-    return tuple(
-        (title, (np.bincount(cells, values, minlength=size) / counted).reshape(GRID))
-        for title, values in shown
-    )

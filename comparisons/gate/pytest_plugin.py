@@ -286,6 +286,7 @@ class MaterialGate(Gate):
         views: Any = None,
         eta: float | None = None,
         reciprocal: bool = True,
+        precision: Any = None,
         seed: int = 0,
     ) -> "list[Check]":
         """Fail the test unless a material's functions of arrays fit together, do not create light,
@@ -300,12 +301,11 @@ class MaterialGate(Gate):
         try:
             folder = self._folder()
             asked = {"views": views, "eta": eta, "reciprocal": reciprocal, "seed": seed}
-            found = check_material(evaluate, sample, pdf, **asked)
+            found = check_material(evaluate, sample, pdf, precision=precision, **asked)
             for check in found:
                 if not check:
                     lines.append(f"{self.fixture}: {check.name}: {check.reason}")
                 if check.maps:
-                    folder.mkdir(parents=True, exist_ok=True)
                     picture = folder / f"{check.name}.png"
                     check.write_picture(picture)
                     lines.append(f"kept: {_relative(picture, self._root)}")

@@ -26,10 +26,11 @@ NUMBERS = "numbers"
 
 @dataclass(frozen=True)
 class Undo:
-    """How pictures of a scene, or such that are compared with others, are read.
+    """What is taken back before candidates are compared with their reference.
 
-    changes: what happened to them;  scene: as it is described, None where it is not known;
-    of_files: whether the reference is a picture.  Raises UsageError for what cannot be undone.
+    changes: what their renderer did to them;  scene: the one that they show, None where it is not
+    known;  of_files: whether the reference is a picture.  Raises UsageError for what cannot be
+    undone.
     """
 
     changes: Changes
@@ -205,6 +206,7 @@ class Reading:
                 f"{renderer.title}: radiance is not divided by the square of the index in glass, "
                 "which an eye or a lamp in glass shows; that is not undone"
             )
-        notes.append(f"{renderer.title}: measured by {renderer.measured}")
+        name = next(name for name, one in RENDERERS.items() if one is renderer)
+        notes.append(f"{renderer.title}: measured by python docs/measure_conventions.py {name}")
         reason = f"{UP_TO}what was undone as {renderer.whose} ({undone}): {case.reason}"
         return replace(case, reason=reason if words else case.reason, notes=(*notes, *case.notes))

@@ -49,6 +49,24 @@ def pictures(scene: str = SCENE, count: int = 4, spp: int = 256) -> FloatArray:
     )
 
 
+BALL_ON_A_FLOOR = """
+camera: {type: perspective, eye: [0, 2, 5], target: [0, 0.4, 0], fov: 40}
+film: {width: 48, height: 32}
+sampler: {type: grid, spp: 4}
+integrator: {type: direct}
+materials:
+  floor: {type: diffuse, reflectance: [0.6, 0.5, 0.4]}
+  ball: {type: phong, diffuse: 0.1, specular: 0.3, exponent: 20}
+shapes:
+  - {type: sphere, center: [0, 0.5, 0], radius: 0.5, material: ball}
+  - type: rectangle
+    material: floor
+    transform: [{scale: 3}, {rotate: {axis: [1, 0, 0], degrees: -90}}]
+lights:
+  - {type: point, position: [2, 3, 2], intensity: [40, 50, 60]}
+"""
+
+
 def run(*arguments: str) -> tuple[Result, Any]:
     """`gate` with these, and the case in its results.json."""
     result = invoke("gate", *arguments, "--limit", LIMIT)

@@ -9,6 +9,7 @@ from command_line import invoke
 
 from comparisons.compare.budget import Asked, usual
 from comparisons.compare.compare import Subject, compare_scene
+from comparisons.compare.derivative import _Both
 from comparisons.mitsuba.backend import LLVM, backend, mitsuba
 from comparisons.renderers import NoCounterpartError
 from comparisons.suites import derivatives as suite
@@ -213,3 +214,25 @@ def test_the_command(tmp_path):
     assert "expected such as" in refused.stderr
     assert invoke(*options, "--guiding", "none").exit_code == 2
     assert invoke(*options, *asked, "--witness", "cycles").exit_code == 2
+
+
+class Noisy:
+    """A side whose pictures have this much noise, as both classes of sides are asked."""
+
+    def __init__(self, noise):
+        self.times, self.scene, self._noise = 1, Scene.parse(DISK), noise
+        self._rng = np.random.default_rng(1)
+
+    def picture(self, seed):
+        return 1.0 + self._noise * self._rng.normal(size=(8, 8, 3))
+
+    def of(self, scene, count, seed):
+        return np.stack([self.picture(k) for k in range(count)])
+
+
+@pytest.mark.parametrize(("noise", "more"), [((1.0, 4.0), (1, 16)), ((4.0, 1.0), (16, 1))])
+def test_the_noisier_side_gets_more_samples_as_far_as_there_is_time(noise, more):
+    for seconds, expected in ((None, more), (1e-9, (1, 1))):
+        theirs, ours = map(Noisy, noise)
+        _Both(theirs, ours, 0.01, seconds)._balance()
+        assert (theirs.times, ours.times) == expected

@@ -67,6 +67,26 @@ def test_a_failing_plugin_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     assert case.cause.name.startswith("constant gain of 0.9")
 
 
+def test_a_variant_that_does_not_start_differs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It has told nothing: all that it should have done is named, and the first part fails."""
+    program = tmp_path / "dies"
+    program.write_text("#!/bin/sh\necho no such driver >&2\nexit 3\n")
+    program.chmod(0o700)
+    task = variants.Task((BOX,), plugins=("sphere", "disk"))
+    with monkeypatch.context() as patched:
+        patched.setattr(variants.sys, "executable", str(program))
+        dead = variants._measured("cuda_ad_rgb", task, tmp_path / "v", lambda line: None)
+    cases = faked(monkeypatch, scalar_rgb=told(1.0), cuda_ad_rgb=dead)
+    found = {case.scene: case for case in cases}
+    assert found["rays of sphere"].verdict == "differ"
+    assert "ends the process with 3: no such driver" in found["rays of sphere"].reason
+    picture = found["cornell_box: cuda_ad_rgb against scalar_rgb"]
+    assert picture.verdict == "not-comparable"
+    assert "cuda_ad_rgb: was not run" in picture.reason
+
+
 def test_a_variant_that_crashes_names_what_it_did(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import invoke
+from gate_checks import BALL_ON_A_FLOOR
 
 from comparisons import gate
 from comparisons.gate.conventions import RENDERERS, Changes
@@ -22,22 +23,11 @@ from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import UsageError
 
-BALL = """
-camera: {type: perspective, eye: [0, 2, 5], target: [0.3, 0.4, 0], fov: 40}
-film: {width: 36, height: 24}
-sampler: {type: grid, spp: 4}
-integrator: {type: direct}
-materials:
-  floor: {type: diffuse, reflectance: [0.6, 0.5, 0.4]}
-  ball: {type: phong, diffuse: 0.1, specular: 0.3, exponent: 20}
-shapes:
-  - {type: sphere, center: [0, 0.5, 0], radius: 0.5, material: ball}
-  - type: rectangle
-    material: floor
-    transform: [{scale: 3}, {rotate: {axis: [1, 0, 0], degrees: -90}}]
-lights:
-  - {type: LAMP}
-"""
+BALL = (
+    BALL_ON_A_FLOOR.replace("width: 48, height: 32", "width: 36, height: 24")
+    .replace("target: [0, 0.4, 0]", "target: [0.3, 0.4, 0]")
+    .replace("point, position: [2, 3, 2], intensity: [40, 50, 60]", "LAMP")
+)
 
 LAMPS = {
     "point": "point, position: [2, 3, 2], intensity: [40, 50, 60]",

@@ -2,6 +2,7 @@
 recognised, and only those."""
 
 import pytest
+from gate_checks import BALL_ON_A_FLOOR
 
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.request import Request, gated
@@ -11,25 +12,8 @@ from reference_rt.integrators import Direct
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 
-FIXED = """
-camera: {type: perspective, eye: [0, 2, 5], target: [0, 0.4, 0], fov: 40}
-film: {width: 48, height: 32}
-sampler: {type: grid, spp: 4}
-integrator: {type: direct}
-materials:
-  floor: {type: diffuse, reflectance: [0.6, 0.5, 0.4]}
-  ball: {type: phong, diffuse: 0.1, specular: 0.3, exponent: 20}
-shapes:
-  - {type: sphere, center: [0, 0.5, 0], radius: 0.5, material: ball}
-  - type: rectangle
-    material: floor
-    transform: [{scale: 3}, {rotate: {axis: [1, 0, 0], degrees: -90}}]
-lights:
-  - {type: point, position: [2, 3, 2], intensity: [40, 50, 60]}
-"""
-
 NOISY = (
-    FIXED.replace("{type: grid, spp: 4}", "{type: sobol, spp: 256}")
+    BALL_ON_A_FLOOR.replace("{type: grid, spp: 4}", "{type: sobol, spp: 256}")
     .replace("direct", "path, max_depth: 5")
     .replace("phong, diffuse: 0.1, specular: 0.3, exponent: 20", "rough_plastic, alpha: 0.3")
 )
@@ -54,11 +38,11 @@ def cause(case: Case) -> str:
     return "" if case.cause is None else case.cause.name
 
 
-@pytest.mark.parametrize("text", [FIXED, pytest.param(NOISY, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("text", [BALL_ON_A_FLOOR, pytest.param(NOISY, marks=pytest.mark.slow)])
 def test_each_missing_term_is_named(text: str) -> None:
     scene = Scene.parse(text)
     wanted = [*variants(scene)]
-    assert len(wanted) == (3 if text == FIXED else 5)
+    assert len(wanted) == (3 if text == BALL_ON_A_FLOOR else 5)
     for terms, other in wanted:
         case = judged(scene, pictures(other), rim=2)
         name = f"without {' and '.join(terms)}"
@@ -69,7 +53,7 @@ def test_each_missing_term_is_named(text: str) -> None:
 
 def test_a_part_of_a_term_is_not_named() -> None:
     """Half of each shadow, and no shadows at half the light."""
-    scene = Scene.parse(FIXED)
+    scene = Scene.parse(BALL_ON_A_FLOOR)
     right, bright = (
         render(scene.changed(integrator=Direct(shadows=shadows))).colour
         for shadows in (True, False)
@@ -83,7 +67,7 @@ def test_a_small_shadow_is_no_bad_tile() -> None:
     """All of the difference is in one rectangle; of what explains it the simplest is named, though
     the scene has highlights where nothing shows them."""
     scene = Scene.parse(
-        FIXED.replace("radius: 0.5, material: ball", "radius: 0.15, material: floor")
+        BALL_ON_A_FLOOR.replace("radius: 0.5, material: ball", "radius: 0.15, material: floor")
     )
     bright = render(scene.changed(integrator=Direct(shadows=False))).colour
     assert cause(judged(scene, [bright])) == "without shadows"
