@@ -10,7 +10,7 @@
 
 - A scene: Scene, Film, json_schema; SceneError, SceneWarning
 - Its parts: a class for each type of shape (Sphere, Mesh, ...), solid (Union, ...), material
-  (Diffuse, ...), texture, light, camera, integrator, sampler and filter
+  (Diffuse, ...), medium, texture, light, camera, integrator, sampler and filter
 - Pictures: render, Picture, read_image, ImageError; by a parameter: derivative, Derivative
 - Queries: query (array queries, the methods of Scene), transform (affine maps), textbook (the
   textbook's intersection methods), build_tables, SceneTables
@@ -19,7 +19,7 @@
 Other modules are internal.  A name is imported when it is first used: importing the package takes
 milliseconds, and the renderer, with Numba, a second.  Folders from the lowest to the highest, each
 of which may import those before it: util, jit, core, sampling, textures, shapes, cameras, accel,
-materials, lights, integrators, scene, gltf, rendering, textbook, cli.
+materials, lights, media, integrators, scene, gltf, rendering, textbook, cli.
 """
 
 import textwrap as _textwrap

@@ -39,6 +39,7 @@ from .materials import Emissive as Emissive
 from .materials import GltfPbr as GltfPbr
 from .materials import Mask as Mask
 from .materials import Mirror as Mirror
+from .materials import NoSurface as NoSurface
 from .materials import NormalMap as NormalMap
 from .materials import Phong as Phong
 from .materials import Plastic as Plastic
@@ -49,6 +50,11 @@ from .materials import RoughDielectric as RoughDielectric
 from .materials import RoughPlastic as RoughPlastic
 from .materials import ThinDielectric as ThinDielectric
 from .materials import TwoSided as TwoSided
+from .media import BlendPhase as BlendPhase
+from .media import HenyeyGreenstein as HenyeyGreenstein
+from .media import Homogeneous as Homogeneous
+from .media import Isotropic as Isotropic
+from .media import Rayleigh as Rayleigh
 from .rendering.derivative import Derivative as Derivative
 from .rendering.derivative import derivative as derivative
 from .rendering.image import read_image as read_image

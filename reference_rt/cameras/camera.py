@@ -32,6 +32,8 @@ class Camera(Description):
     far: Positive | None = None
     """The far clipping plane, likewise: nothing behind it is seen but the environment.  Default:
     none."""
+    medium: str | None = None
+    """Name of the medium in which the camera stands.  Default: none."""
 
     @model_validator(mode="after")
     def _check_orientation(self) -> Self:

@@ -22,6 +22,7 @@ from reference_rt.core.model import module_of, setups_of
 from reference_rt.core.ray import put_vector, ray_of
 from reference_rt.integrators.direct import Direct as Direct
 from reference_rt.integrators.light import Light as Light
+from reference_rt.integrators.media_path import MediaPathSetup as MediaPathSetup
 from reference_rt.integrators.path import Path as Path
 from reference_rt.integrators.path import Scratch
 from reference_rt.integrators.ray_cast import RayCast as RayCast
@@ -33,8 +34,8 @@ from reference_rt.sampling import Samplers, sampler_of
 
 AnyIntegrator = Annotated[RayCast | Whitted | Direct | Path | Light, Field(discriminator="type")]
 
-SETUPS = (*setups_of(AnyIntegrator),)
-"""The classes that `setup` returns."""
+SETUPS = (*setups_of(AnyIntegrator), MediaPathSetup)
+"""The classes that `setup` returns, and that of paths through media."""
 
 
 def setup_of(integrator: Whitted | Direct | Path | Light, has_numbers: bool) -> Any:

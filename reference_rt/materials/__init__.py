@@ -67,7 +67,9 @@ from reference_rt.materials.nested.wrappers import Blend as Blend
 from reference_rt.materials.nested.wrappers import Mask as Mask
 from reference_rt.materials.nested.wrappers import TwoSided as TwoSided
 from reference_rt.materials.nested.wrappers import Wrapper as Wrapper
+from reference_rt.materials.none import NoSurface as NoSurface
 
 AnyMaterial = Annotated[
-    Bsdf | Emissive | Mask | TwoSided | Blend | Bump | NormalMap, Field(discriminator="type")
+    Bsdf | Emissive | NoSurface | Mask | TwoSided | Blend | Bump | NormalMap,
+    Field(discriminator="type"),
 ]

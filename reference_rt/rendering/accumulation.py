@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.integrators import Light, RayCast, setup_of
+from reference_rt.integrators import AnyIntegrator, Light, MediaPathSetup, RayCast, setup_of
 from reference_rt.integrators.light import LightSetup
 from reference_rt.lights.emission import Emission
 from reference_rt.rendering.splats import splat_tile
 from reference_rt.rendering.tiles import aov_tile, cost_tile, first_hits_tile, render_tile
 from reference_rt.sampling import Grid
 from reference_rt.scene.build import BuiltScene
+from reference_rt.scene.build_media import camera_medium, media_of
 
 Sums = dict[str, FloatArray]
 """Sums (n, width) of n pixels by name."""
@@ -91,7 +92,7 @@ def jobs_of(scene: BuiltScene) -> list[Job]:
         return [Job(aov_tile, None, centres, (_CENTRE,), _CENTRE_COLUMNS), *costs]
     sampler = scene.resolved_sampler
     has_variance = "variance" in wanted
-    setup = setup_of(scene.integrator, not isinstance(sampler, Grid))
+    setup = setup_for(scene, scene.integrator, not isinstance(sampler, Grid))
     jobs = [radiance_job(setup, sampler, shape, has_variance)]
     if set(OF_FIRST_HITS) & wanted:
         random_numbers = sampler.setup()
@@ -104,6 +105,15 @@ def jobs_of(scene: BuiltScene) -> list[Job]:
         columns = {name: _CENTRE_COLUMNS[name] for name in ("distance", "id")}
         jobs.append(Job(aov_tile, None, centres, (_CENTRE,), columns))
     return jobs + costs
+
+
+def setup_for(scene: BuiltScene, integrator: AnyIntegrator, has_numbers: bool) -> Any:
+    """`setup_of` an integrator, or that of paths through the scene's media."""
+    assert not isinstance(integrator, RayCast)
+    setup = setup_of(integrator, has_numbers)
+    if scene.has_media:
+        return MediaPathSetup(setup, media_of(scene), camera_medium(scene))
+    return setup
 
 
 def radiance_job(setup: Any, sampler: Any, shape: tuple[int, int], has_variance: bool) -> Job:

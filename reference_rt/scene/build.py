@@ -16,6 +16,7 @@ from reference_rt.materials import Emissive
 from reference_rt.scene.build_geometry import assemble
 from reference_rt.scene.build_lights import light_tables
 from reference_rt.scene.build_materials import material_tables
+from reference_rt.scene.build_media import Boundary, boundaries
 from reference_rt.scene.build_textures import texture_tables, with_uv_sets
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes.meshes.triangle_table import Triangles, shared, spread
@@ -55,15 +56,16 @@ _NOT_IN_TABLES = {"camera", "film", "sampler"}
 
 def build_tables(scene: SceneModel) -> SceneTables:
     """The tables of a scene.  Raises SceneError with file, line and key path."""
-    numbers: dict[str | None, int] = {name: i for i, name in enumerate(scene.materials)}
-    numbers[None] = len(numbers)
+    numbers = boundaries(scene)
     textures, palette = texture_tables(scene)
     with np.errstate(over="ignore", invalid="ignore"):  # checked afterwards: not finite
         geometry = assemble(scene, numbers)
         if any(isinstance(material, Emissive) for material in scene.materials.values()):
             geometry = _with_triangles(geometry, spread)  # which may be numbered as lights
-        materials = material_tables(scene, palette, _has_material(geometry, numbers[None]))
-        lights = light_tables(scene, geometry, palette)
+        default = numbers[Boundary(None)]
+        has_default = len(numbers) > default + 1 or _has_material(geometry, default)
+        materials = material_tables(scene, palette, has_default, numbers)
+        lights = light_tables(scene, geometry, palette, numbers)
         textures = with_uv_sets(scene, textures, geometry.shapes.triangles)
         geometry = _with_triangles(geometry, _as_in_scenes)
         return SceneTables(geometry, materials, lights, textures)

@@ -12,6 +12,7 @@ from reference_rt.core.arrays import Bounds, FloatArray, IntArray
 from reference_rt.core.transform import identity
 from reference_rt.materials.textured import textures_of
 from reference_rt.scene.build_hierarchies import ExpandedInstance, HierarchyBuilder, TableRows
+from reference_rt.scene.build_media import Boundary
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes import TABLES, TRIANGLE, Shape, Shapes, csg
 from reference_rt.shapes.csg import NOT, OR, Parts, Solid, Solids
@@ -35,7 +36,7 @@ MOST_INSTANCES = 10_000_000
 """Instances that a group may expand to: each takes some 500 bytes while the scene is built."""
 
 
-def assemble(scene: SceneModel, materials: dict[str | None, int]) -> Geometry:
+def assemble(scene: SceneModel, materials: dict[Boundary, int]) -> Geometry:
     """The geometry of a scene, its triangles `shared`.  materials: the row of each material.
 
     Raises SceneError with file, line and key path.
@@ -110,7 +111,7 @@ class _Program:
 class _Assembly:
     """Collects the primitives of a scene's shapes, groups and solids."""
 
-    def __init__(self, scene: SceneModel, materials: dict[str | None, int]) -> None:
+    def __init__(self, scene: SceneModel, materials: dict[Boundary, int]) -> None:
         self.scene, self.materials = scene, materials
         self.tables: dict[int, list[Any]] = {code: [] for code, _, _, _ in TABLES}
         self.rows = dict.fromkeys(self.tables, 0)
@@ -161,19 +162,20 @@ class _Assembly:
     def member(self, shape: Shape, owner: int, material: str | None) -> TableRows:
         """Add a shape of the scene or of a group that is not an instance."""
         name = shape.material if shape.material is not None else material
+        of = Boundary(name, shape.interior, shape.exterior)
         if isinstance(shape, Solid):
-            return TableRows(SOLID, np.array([self.solid(shape, owner, name)], np.int32))
-        return self.add(shape, self.place(owner, name))
+            return TableRows(SOLID, np.array([self.solid(shape, owner, of)], np.int32))
+        return self.add(shape, self.place(owner, of))
 
     def part(
-        self, shape: int, number: int, material: str | None, solid: int = -1, turned: bool = False
+        self, shape: int, number: int, of: Boundary, solid: int = -1, turned: bool = False
     ) -> TabulationContext:
         """The tabulation context of a part of a shape, with a new owner number."""
         self.parts.append((shape, number, solid, int(turned)))
-        return self.place(len(self.parts) - 1, material)
+        return self.place(len(self.parts) - 1, of)
 
-    def place(self, owner: int, material: str | None) -> TabulationContext:
-        return TabulationContext(owner, self.materials[material], self.scene.folder, warn=self.warn)
+    def place(self, owner: int, of: Boundary) -> TabulationContext:
+        return TabulationContext(owner, self.materials[of], self.scene.folder, warn=self.warn)
 
     def path_of(self, owner: int) -> tuple[str | int, ...]:
         """The key path of an owner in the scene file."""
@@ -184,11 +186,11 @@ class _Assembly:
 
     # ---- solids ---------------------------------------------------------------------------------
 
-    def solid(self, shape: Solid, owner: int, material: str | None) -> int:
+    def solid(self, shape: Solid, owner: int, of: Boundary) -> int:
         """Add a solid, and return its number.  Its operands become primitives that are in no
         hierarchy of shapes."""
         first, boxes = len(self.operands), []
-        operands = csg.operands_of(shape, identity(), material)
+        operands = csg.operands_of(shape, identity(), of.material)
         steps = csg.postfix(shape)
         if max(steps) >= MOST_OPERANDS:
             raise ValueError(f"over {MOST_OPERANDS:,} operands; expected fewer in one solid")
@@ -197,7 +199,8 @@ class _Assembly:
             operand, outer = seen[k]
             try:
                 whole, number = self.parts[owner][:2]
-                place = self.part(whole, number + k, name, len(self.solids), turned)
+                whose = of._replace(material=name)
+                place = self.part(whole, number + k, whose, len(self.solids), turned)
                 self.paths[place.owner] = self.path_of(owner)
                 boxes.append(self.operand(operand, place._replace(outer=outer)))
             except ValueError as error:
@@ -298,7 +301,8 @@ class _Assembly:
                     maps.append(inner)
                     _check_count(sum(map(len, trees)))
                 else:
-                    owner = self.part(-1, k + more, shape.material).owner
+                    of = Boundary(shape.material, shape.interior, shape.exterior)
+                    owner = self.part(-1, k + more, of).owner
                     self.paths[owner] = ("groups", name, k)
                     reference = self.member(shape, owner, None)
                     if not np.isfinite(self.box_of(reference)).all():
@@ -315,15 +319,16 @@ class _Assembly:
         return np.concatenate(trees), np.concatenate(maps)
 
 
-def _uv_sets(scene: SceneModel, materials: dict[str | None, int]) -> dict[int, dict[str, int]]:
+def _uv_sets(scene: SceneModel, materials: dict[Boundary, int]) -> dict[int, dict[str, int]]:
     """By the row of a material: its textures by sets of texture coordinates that meshes may lack,
     and the largest number of these."""
     numbers = {name: largest_uv_set(name, scene.textures) for name in scene.textures}
     if not any(numbers.values()):
         return {}
     of_materials = {
-        materials[name]: {of: numbers[of] for of in textures_of(name, scene.materials)}
-        for name in scene.materials
+        row: {of: numbers[of] for of in textures_of(boundary.material, scene.materials)}
+        for boundary, row in materials.items()
+        if boundary.material is not None
     }
     return {row: found for row, found in of_materials.items() if any(found.values())}
 

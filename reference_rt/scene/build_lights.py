@@ -1,5 +1,6 @@
 """The lights of a scene -> Lights: their tables, and how one of them is picked."""
 
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,8 @@ from reference_rt.lights.emitters import constant, environment_map
 from reference_rt.lights.selection import bounds
 from reference_rt.lights.selection.bounds import LightBounds
 from reference_rt.lights.selection.choice import FEW, LightTree, build
-from reference_rt.materials.material import Emissive
+from reference_rt.materials.material import Emissive, Material
+from reference_rt.scene.build_media import Boundary
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes import TABLES as SHAPE_TABLES
 from reference_rt.textures import Colours, Palette
@@ -45,11 +47,14 @@ of 1/2 fit the strata of the samples.
 """
 
 
-def light_tables(scene: SceneModel, geometry: Geometry, palette: Palette) -> Lights:
+def light_tables(
+    scene: SceneModel, geometry: Geometry, palette: Palette, rows: Iterable[Boundary]
+) -> Lights:
     """All lights, selected in proportion to their power.  Writes the primitives' `light` columns.
-    Raises SceneError."""
+    rows: of the materials.  Raises SceneError."""
     radius = scene_radius(geometry)
-    areas, powers = _area_lights(scene, geometry, palette)
+    materials = [scene.materials.get(boundary.material or "") for boundary in rows]
+    areas, powers = _area_lights(scene, geometry, palette, materials)
     kinds, rows, weights = [AREA] * len(powers), [*range(len(powers))], [powers]
     tables: dict[str, Any] = {}
     for code, field, description, module in LIGHT_TABLES:
@@ -236,16 +241,16 @@ def _ambient(scene: SceneModel) -> FloatArray | None:
 
 
 def _area_lights(
-    scene: SceneModel, geometry: Geometry, palette: Palette
+    scene: SceneModel, geometry: Geometry, palette: Palette, materials: Sequence[Material | None]
 ) -> tuple[Areas | None, FloatArray]:
     """The emissive primitives, and the luminance of their power: pi times area times radiance (for
     a texture its maximum).  It is 0 for primitives that only BSDF-sampled rays hit: those of types
     that cannot be sampled, and parts of groups and of solids."""
-    materials = [*scene.materials.values(), None]
-    emissive = [k for k, m in enumerate(materials) if isinstance(m, Emissive)]
-    if not emissive:
+    lamps = {k: m for k, m in enumerate(materials) if isinstance(m, Emissive)}
+    if not lamps:
         return None, np.zeros(0)
-    radiance, brightness = _radiances(scene, emissive, palette)
+    emissive = [*lamps]
+    radiance, brightness = _radiances([*lamps.values()], palette)
     kinds, rows, numbers, areas = [], [], [], []
     start = 0
     for code, field, _, module in SHAPE_TABLES:
@@ -276,15 +281,10 @@ def _area_lights(
     return table, np.where(np.isfinite(power), power, 0.0)
 
 
-def _radiances(
-    scene: SceneModel, emissive: list[int], palette: Palette
-) -> tuple[Colours, FloatArray]:
+def _radiances(lamps: Sequence[Emissive], palette: Palette) -> tuple[Colours, FloatArray]:
     """The radiance of each emissive material, and its maximum luminance."""
-    materials = list(scene.materials.values())
     columns, brightness = [], []
-    for k in emissive:
-        material = materials[k]
-        assert isinstance(material, Emissive)
+    for material in lamps:
         columns.append(palette.colours(material.radiance, np.inf))
         if isinstance(material.radiance, str):
             brightness.append(palette.greatest[palette.numbers_of[material.radiance]])

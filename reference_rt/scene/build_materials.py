@@ -1,6 +1,6 @@
 """The materials of a scene -> Materials: BSDF tables, and flattened nested materials."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from reference_rt.materials.nested.paths import (
     traits,
 )
 from reference_rt.materials.textured import textured_table, textures_of
+from reference_rt.scene.build_media import Boundary
 from reference_rt.scene.model import SceneModel
 from reference_rt.textures import Palette
 from reference_rt.textures.parameter import join
@@ -26,15 +27,19 @@ DEFAULT = "\0"
 """The name of the default material, of shapes without one; no scene can use this name."""
 
 
-def material_tables(scene: SceneModel, palette: Palette, default: bool) -> Materials:
+def material_tables(
+    scene: SceneModel, palette: Palette, default: bool, rows: Iterable[Boundary]
+) -> Materials:
     """The materials of a scene in its order; then the default material, if it is used (`default`)
-    or there is no other.
+    or there is no other; then those of `rows` once more that bound media.
 
     An emissive material has the BSDF of its base.  Raises SceneError.
     """
     materials: dict[str, Material] = {**scene.materials}
     if default or not materials:
         materials[DEFAULT] = Diffuse()
+    for boundary in [*rows][len(scene.materials) + 1 :]:
+        materials[f"{DEFAULT}{len(materials)}"] = materials[boundary.material or DEFAULT]
     leaves, flat_leaves = _Leaves(materials, palette), FlattenedBuilder(palette)
     kinds, rows, found_traits, shown = [], [], [], []
     for name in materials:

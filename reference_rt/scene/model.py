@@ -15,12 +15,21 @@ from reference_rt.cameras import AnyCamera
 from reference_rt.cameras.film import Film
 from reference_rt.cameras.perspective import Perspective
 from reference_rt.core.model import AS_DIGEST, Description, as_linear, name_of
-from reference_rt.integrators import AnyIntegrator, Direct
+from reference_rt.integrators import AnyIntegrator, Direct, RayCast
 from reference_rt.integrators import Path as PathTracing
 from reference_rt.lights import TABLES as LIGHT_TABLES
 from reference_rt.lights import Ambient, AnyLight, Constant, EnvironmentMap, Projector
-from reference_rt.materials import AnyMaterial, Bump, Emissive, Material, NormalMap, Wrapper
+from reference_rt.materials import (
+    AnyMaterial,
+    Bump,
+    Emissive,
+    Material,
+    NormalMap,
+    NoSurface,
+    Wrapper,
+)
 from reference_rt.materials.nested.paths import material_paths
+from reference_rt.media import AnyMedium
 from reference_rt.sampling import AnySampler, Grid, Sobol
 from reference_rt.shapes import Shape
 from reference_rt.shapes.csg import AnyShape, Solid
@@ -66,8 +75,9 @@ def no_such(kind: str, name: str, known: Iterable[str], instead: str = "") -> st
     with ", or "."""
     known = [*known]
     listed = ", ".join(f"'{k}'" for k in known) or "none"
+    key = {"medium": "media"}.get(kind, f"{kind}s")
     text = f"there is no {kind} '{name}'; expected {instead}one of: {listed}{meant(name, known)}"
-    return text if known else f"{text}; '{kind}s' describes them by name"
+    return text if known else f"{text}; '{key}' describes them by name"
 
 
 class SceneModel(Description):
@@ -89,6 +99,9 @@ class SceneModel(Description):
     """Textures by name, which parameters of materials refer to."""
     materials: dict[str, AnyMaterial] = Field(default_factory=dict)
     """Materials by name, which shapes and other materials refer to."""
+    media: dict[str, AnyMedium] = Field(default_factory=dict)
+    """What fills the space between surfaces, by name, which shapes and the camera refer to.  Path
+    tracing alone follows light through media."""
     shapes: tuple[AnyShape, ...] = Field(default=(), strict=False)
     """All surfaces and solids; the index of a shape is its place in this list, from 0."""
     groups: dict[str, Annotated[tuple[AnyShape, ...], Field(strict=False, min_length=1)]] = Field(
@@ -130,11 +143,28 @@ class SceneModel(Description):
                     raise SceneError(str(error), ("materials", name)) from None
         for i, light in enumerate(self.lights):
             self._check_textures(light, "lights", i)
+        self._check_medium(self.camera.medium, "camera", "medium")
+        self._check_follows_media()
         if sum(isinstance(light, Constant | EnvironmentMap) for light in self.lights) > 1:
             raise SceneError("more than one environment; expected at most one", ("lights",))
         if isinstance(self.sampler, Grid) and not self.integrator.deterministic:
             self._check_on_grid()
         return self
+
+    @property
+    def has_media(self) -> bool:
+        """Whether there are media, or boundaries without a surface, so that rays do not end at the
+        first surface that they meet."""
+        return bool(self.media) or any(isinstance(m, NoSurface) for m in self.materials.values())
+
+    def _check_follows_media(self) -> None:
+        if self.has_media and not isinstance(self.integrator, PathTracing | RayCast):
+            what = "media" if self.media else "the material 'none'"
+            raise SceneError(
+                f"'{self.integrator.type}' knows no {what}; expected 'path', or 'ray_cast', which "
+                "shows the first surfaces",
+                ("integrator", "type"),
+            )
 
     def _check_on_grid(self) -> None:
         """Check that an integrator that may need random numbers has no use for them."""
@@ -191,9 +221,20 @@ class SceneModel(Description):
                     f"'{base}' is emissive itself; expected a material that only scatters",
                     ("materials", name, field),
                 )
+            if base is not None and isinstance(self.materials[base], NoSurface):
+                raise SceneError(
+                    f"'{base}' is no surface; expected a material that scatters",
+                    ("materials", name, field),
+                )
 
     def _check_shape(self, shape: Shape, *path: str | int) -> None:
         self._check_material(shape.material, *path, "material")
+        sides = {side: getattr(shape, side) for side in ("interior", "exterior")}
+        for side, medium in sides.items():
+            self._check_medium(medium, *path, side)
+            if medium is not None and "of" in path:
+                message = "an operand bounds no medium; expected it on the whole solid"
+                raise SceneError(message, (*path, side))
         if isinstance(shape, Solid):
             if path.count("of") >= MOST_NESTED:
                 raise SceneError(
@@ -212,10 +253,17 @@ class SceneModel(Description):
                     "an instance has the materials of its group; expected none here",
                     (*path, "material"),
                 )
+            for side in [side for side, medium in sides.items() if medium is not None]:
+                message = "an instance has the media of its group's shapes; expected none here"
+                raise SceneError(message, (*path, side))
 
     def _check_material(self, name: str | None, *path: str | int) -> None:
         if name is not None and name not in self.materials:
             raise SceneError(no_such("material", name, self.materials), path)
+
+    def _check_medium(self, name: str | None, *path: str | int) -> None:
+        if name is not None and name not in self.media:
+            raise SceneError(no_such("medium", name, self.media), path)
 
     def __eq__(self, other: object) -> bool:
         """Equality of descriptions; file names do not count."""

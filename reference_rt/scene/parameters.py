@@ -21,7 +21,7 @@ from reference_rt.core.model import Description
 from reference_rt.scene.model import SceneModel
 from reference_rt.util.errors import UsageError, meant
 
-PARTS = ("camera", "textures", "materials", "shapes", "groups", "lights")
+PARTS = ("camera", "textures", "materials", "media", "shapes", "groups", "lights")
 """The parts of a scene that say what is seen.  The others (film, sampler, integrator) say how."""
 
 Keys = tuple[str | int, ...]

@@ -43,6 +43,11 @@ class Shape(Description):
     transform: Transform = ()
     """Steps from the shape's own coordinates to the world's (in a group: to the group's), the first
     one first.  Default: none."""
+    interior: str | None = None
+    """Name of the medium behind the surface, where its normal does not point: within a closed
+    shape.  Default: the shape changes no medium, or none if it has an `exterior`."""
+    exterior: str | None = None
+    """Name of the medium in front of the surface, where its normal points.  Default: likewise."""
 
     def tabulate(self, context: TabulationContext) -> Any:
         """This shape as rows of its table.  Raises ValueError (what is wrong, what was

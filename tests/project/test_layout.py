@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 FLOORS = {
     "reference_rt": (
         *("util", "jit", "core", "sampling", "textures", "shapes", "cameras", "accel"),
-        *("materials", "lights", "integrators", "scene", "gltf", "rendering"),
+        *("materials", "lights", "media", "integrators", "scene", "gltf", "rendering"),
         *("textbook", "cli"),
     ),
     "comparisons": (

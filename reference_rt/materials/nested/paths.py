@@ -11,6 +11,7 @@ from reference_rt.materials.bsdfs.phong import Phong
 from reference_rt.materials.material import Emissive, Material
 from reference_rt.materials.nested.tilted import Bump, NormalMap
 from reference_rt.materials.nested.wrappers import Blend, Mask, TwoSided, Wrapper
+from reference_rt.materials.none import NoSurface
 from reference_rt.textures import Palette
 
 # Codes of steps.  WEIGHT, ONE_MINUS_WEIGHT: times w, 1 - w, for a number w of `weights`;
@@ -142,8 +143,11 @@ def check_energy(
 
 
 def scattering_of(name: str, materials: Mapping[str, Material]) -> str | None:
-    """The name of the material with the BSDF: an emissive one's base, or None without a base."""
+    """The name of the material with the BSDF: an emissive one's base; None without a base, and for
+    what is no surface."""
     material = materials[name]
+    if isinstance(material, NoSurface):
+        return None
     return material.base if isinstance(material, Emissive) else name
 
 

@@ -14,11 +14,11 @@ from reference_rt.cameras.film import BoxFilter
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import UNIT_ROUNDOFF, Ray
 from reference_rt.core.vec3 import row
-from reference_rt.integrators import AnyIntegrator, Light, Path, RayCast, setup_of
+from reference_rt.integrators import AnyIntegrator, Light, Path, RayCast
 from reference_rt.integrators.ray_cast import cast
 from reference_rt.integrators.scene_tables import KernelScene, SceneTables
 from reference_rt.jit.kernel import entry_kernel
-from reference_rt.rendering.accumulation import mean_and_variance, radiance_job
+from reference_rt.rendering.accumulation import mean_and_variance, radiance_job, setup_for
 from reference_rt.rendering.kept_links import link_to_scene
 from reference_rt.rendering.kernels import kernels_for
 from reference_rt.rendering.query.rays import Rays, in_blocks, rays_of, shaped
@@ -67,6 +67,8 @@ def radiance(
         raise ValueError("integrator: 'light' has pictures, no radiance of a ray; expected 'path'")
     if spp is None:
         spp = 1 if integrator.deterministic else scene.resolved_sampler.spp
+    if scene.has_media:
+        scene.changed(integrator=integrator, sampler=None)  # an integrator that follows media
     tables = _tables_for(scene, integrator)
     rays = rays_of(origins, directions)
     if isinstance(integrator, RayCast):
@@ -77,7 +79,7 @@ def radiance(
             )
         mean = _colours(tables, rays, threads)
         return Radiance(shaped(mean, rays.shape), shaped(np.zeros_like(mean), rays.shape))
-    setup = setup_of(integrator, True)
+    setup = setup_for(scene, integrator, True)
     mean, error = estimate(tables, setup, rays, spp, seed, threads)
     if integrator.deterministic:
         error = np.zeros_like(mean)
