@@ -119,6 +119,15 @@ class Slab:
         return np.asarray(sum(weight * g**k for weight, g in lobes))
 
     @property
+    def words(self) -> str:
+        """Of the phase function."""
+        if isinstance(self.phase, str):
+            return "Rayleigh's phase function"
+        if isinstance(self.phase, float):
+            return f"g = {self.phase:g}"
+        return "a blend of " + " and ".join(f"{weight:g} of g = {g:g}" for weight, g in self.phase)
+
+    @property
     def streams(self) -> int:
         """As many as the peak of the phase function needs in a sun."""
         return 256 if isinstance(self.phase, float) and self.phase > 0.75 else 128
@@ -129,12 +138,12 @@ SLABS = {
     "slab_sun_2": Slab((0.5, 2.0, 8.0), (0.7, 0.95, 0.99), -0.5, True, 0.5, 0.8, 120.0),
     "slab_sun_3": Slab((0.1, 1.0, 10.0), (0.99, 0.8, 0.5), 0.3, True, 0.8, 0.4, 30.0),
     "slab_sun_4": Slab((0.5, 1.5, 4.0), (0.95, 0.9, 0.999), 0.5, True, 0.4, 0.6, 180.0),
-    "slab_sun_5": Slab((1.0, 3.0, 10.0), (0.99, 0.9, 0.999), 0.7, True, 0.7, 0.5, 20.0),
-    "slab_sun_6": Slab((1.0, 4.0, 10.0), (0.999, 0.99, 0.9), 0.9, True, 0.5, 0.5, 0.0),
-    "slab_sun_7": Slab((0.3, 1.0, 3.0), (0.9, 0.8, 0.99), -0.3, False, 0.6, 0.8, 90.0),
-    "slab_sun_8": Slab((0.2, 1.0, 6.0), (0.9, 0.95, 0.99), 0.5, False, 0.8, 0.6, 45.0),
-    "slab_sun_9": Slab((0.5, 2.0, 10.0), (0.99, 0.9, 0.999), 0.8, False, 0.7, 0.9, 10.0),
-    "slab_sun_10": Slab((0.3, 1.0, 4.0), (0.9, 0.99, 0.999), 0.9, False, 0.9, 0.7, 60.0),
+    "slab_sun_5": Slab((1.0, 3.0, 10.0), (0.99, 0.9, 0.999), 0.7, True, 0.4, 0.5, 20.0),
+    "slab_sun_6": Slab((0.3, 1.0, 3.0), (0.99, 0.9, 0.7), 0.9, True, 0.2, 0.3, 20.0),
+    "slab_sun_7": Slab((0.3, 1.0, 2.0), (0.9, 0.8, 0.95), -0.3, False, 0.6, 0.8, 90.0),
+    "slab_sun_8": Slab((0.2, 1.0, 3.0), (0.9, 0.95, 0.99), 0.5, False, 0.8, 0.7, 20.0),
+    "slab_sun_9": Slab((0.5, 2.0, 4.0), (0.99, 0.9, 0.999), 0.8, False, 0.8, 0.9, 10.0),
+    "slab_sun_10": Slab((0.3, 1.0, 4.0), (0.9, 0.99, 0.999), 0.9, False, 0.8, 0.7, 10.0),
     "slab_sun_11": Slab((0.1, 0.5, 2.0), (0.999, 0.9, 0.99), "rayleigh", True, 0.5, 0.3, 150.0),
     "slab_sun_12": Slab(
         (0.5, 2.0, 6.0), (0.95, 0.9, 0.99), ((0.7, 0.75), (0.3, -0.4)), True, 0.6, 0.8, 40.0
@@ -147,3 +156,60 @@ SLABS = {
     "slab_sky_6": Slab((1.0, 3.0, 10.0), (0.8, 0.95, 0.999), 0.9, False, 0.6),
 }
 """Each colour is a slab of its own."""
+
+RADIANCES = {
+    "slab_sun_1": ([0.0232008418, 0.0371074433, 0.165413814], 3.9e-06),
+    "slab_sun_2": ([0.0541186659, 0.147143972, 0.203274104], 5.4e-06),
+    "slab_sun_3": ([0.00919560258, 0.0361203765, 0.0180804244], 4.4e-05),
+    "slab_sun_4": ([0.026050018, 0.0460391418, 0.103745434], 6.2e-07),
+    "slab_sun_5": ([0.125669374, 0.116811124, 0.203106035], 2.7e-06),
+    "slab_sun_6": ([0.143892571, 0.195894323, 0.094870931], 1.7e-05),
+    "slab_sun_7": ([0.0226777513, 0.0377085238, 0.0568690506], 9.0e-07),
+    "slab_sun_8": ([0.0726671292, 0.184110931, 0.13171024], 4.3e-06),
+    "slab_sun_9": ([0.558886652, 0.583387986, 0.414699564], 1.8e-06),
+    "slab_sun_10": ([0.464716588, 1.06896425, 0.704966645], 4.3e-06),
+    "slab_sun_11": ([0.0187987458, 0.0489708044, 0.0842609916], 4.2e-05),
+    "slab_sun_12": ([0.0260737556, 0.063814178, 0.150077511], 4.0e-06),
+    "slab_sky_1": ([0.097318062, 0.282316417, 0.646889608], 1.6e-05),
+    "slab_sky_2": ([0.28819793, 0.588272325, 0.82002529], 1.0e-06),
+    "slab_sky_3": ([0.110993272, 0.224835101, 0.511207167], 3.1e-07),
+    "slab_sky_4": ([0.851471064, 0.518544875, 0.276322068], 8.7e-06),
+    "slab_sky_5": ([0.871606958, 0.710426418, 0.0672025985], 9.2e-08),
+    "slab_sky_6": ([0.654121777, 0.584739007, 0.513964684], 2.5e-08),
+}
+"""Of each slab, for a sun of irradiance 1 or a sky of radiance 1, and their relative error at most:
+what `python -m comparisons.truth.disort` prints."""
+
+
+def _slabs() -> None:
+    for name, slab in SLABS.items():
+
+        def seen(name: str = name, slab: Slab = slab) -> Expected:
+            values, error = RADIANCES[name]
+            light = SKY if slab.sun is None else SUN
+            return Expected(np.broadcast_to(light * values, (16, 16, 3)).copy(), error)
+
+        first = (
+            "The equation of transfer of a plane layer, solved by discrete ordinates (PythonicDISORT "
+            "1.8) with 128 or 256 streams; half as many tell the error. Each colour is a layer of "
+            "its own. "
+        )
+        text = first if name == "slab_sun_1" else "As `slab_sun_1`. "
+        text += (
+            f"Optical depths {slab.depth[0]:g}, {slab.depth[1]:g}, {slab.depth[2]:g}; albedos "
+            f"{slab.albedo[0]:g}, {slab.albedo[1]:g}, {slab.albedo[2]:g}; seen at the cosine "
+            f"{slab.cosine:g}"
+        )
+        if slab.sun is not None:
+            text += f", the sun at {slab.sun:g}, {slab.azimuth:g} degrees beside it"
+        side = "sends back" if slab.sent_back else "lets through"
+        light = "a sky" if slab.sun is None else "a sun"
+        _register(
+            name, f"{text}.",
+            r"$\mu \frac{dI}{d\tau} = I - a \int p(\Theta) I d\omega$, solved in "
+            f"{slab.streams} directions",
+            f"what a layer {side} of {light}: {slab.words}", "Stamnes and others 1988", seen,
+        )  # fmt: skip
+
+
+_slabs()
