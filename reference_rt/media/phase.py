@@ -136,14 +136,15 @@ def turned(lobes: Lobes, k: int, d: Vec3, u0: float, u1: float) -> Vec3:
         u0 -= lobes.share[i]
         i += 1
     if lobes.share[i] > 0.0:
-        u0 = min(u0 / lobes.share[i], _BELOW_ONE)
+        u0 = min(u0 / lobes.share[i], BELOW_ONE)
     cosine, rest = _cosine(lobes.code[i], lobes.g[i], u0)
     sine = math.sqrt(max(0.0, rest))
     x, y = on_circle(u1)
     return to_world(frame_from_normal(d), Vec3(sine * x, sine * y, cosine))
 
 
-_BELOW_ONE = 1.0 - 2.0**-53
+BELOW_ONE = 1.0 - 2.0**-53
+"""The largest number below 1."""
 
 
 @kernel
@@ -157,7 +158,7 @@ def _cosine(code: int, g: float, u: float) -> tuple[float, float]:
         cosine = math.copysign(root - 1.0 / root, half)
         cosine = min(1.0, max(-1.0, cosine))
         return cosine, 1.0 - cosine * cosine
-    # The textbook's form (PBR 4ed, 11.14) solved for the distance from the peak, 1 - |cosine| there,
+    # The textbook's form (PBR 4ed, 11.14), solved for the distance from the peak, 1 - |cosine|,
     # so that nothing cancels where |g| is near 1.
     a = abs(g)
     v = 1.0 - u if g > 0.0 else u
