@@ -216,9 +216,10 @@ def _met(
 
 
 class Picked(NamedTuple):
-    """A light sample, and the probability of its light."""
+    """A light sample, and the number and the probability of its light."""
 
     light: LightSample
+    number: int
     probability: float
 
 
@@ -227,10 +228,10 @@ def _light_for(scene: KernelScene, p: Vec3, n: Vec3, u: float, at: tuple[float, 
     """A light for a point, picked by u, and the sample `at` of it.  n: see `lights.pick`."""
     picked = any_light.pick(scene.lights, p, n, u)
     if picked.probability == 0.0:
-        return Picked(NO_LIGHT, 0.0)
+        return Picked(NO_LIGHT, 0, 0.0)
     k, u0, u1 = picked.light, at[0], at[1]
     found = any_light.sample_one(scene.lights, k, scene.shapes, scene.textures, p, u0, u1)
-    return Picked(found, picked.probability)
+    return Picked(found, k, picked.probability)
 
 
 @kernel
@@ -248,7 +249,8 @@ def _connect(
     light = picked.light
     if is_black(scattered.value):
         return Vec3(0.0, 0.0, 0.0)
-    way = _look(scene, setup.media, shadow_ray(point, light), medium)
+    shadow = shadow_ray(point, light)
+    way = _look(scene, setup.media, shadow, medium)
     if not way.is_open:
         return Vec3(0.0, 0.0, 0.0)
     density, weight = light.pdf * picked.probability * _mean(ratio), 1.0
