@@ -87,8 +87,8 @@ def sections() -> list[tuple[str, str, list[str]]]:
         ),
         (
             "Media",
-            "`media` gives each of these a name. `interior` and `exterior` of a shape, and `medium` "
-            "of the camera, name one.",
+            "`media` gives each of these a name. A shape's `interior` and `exterior`, and the "
+            "camera's `medium`, are such names.",
             of_kind("media"),
         ),
         (
