@@ -85,6 +85,17 @@ def sections() -> list[tuple[str, str, list[str]]]:
             "They name other materials, and may be nested.",
             wrappers,
         ),
+        (
+            "Media",
+            "`media` gives each of these a name. A shape's `interior` and `exterior`, and the "
+            "camera's `medium`, are such names.",
+            of_kind("media"),
+        ),
+        (
+            "Phase functions",
+            "`phase` of a medium is one of these.",
+            [name for name in _targets(TYPES["Homogeneous"]) if name != "Homogeneous"],
+        ),
         ("Textures", "`textures` gives each of these a name.", [*of_kind("textures"), "UvMap"]),
         (
             "Lights",

@@ -23,12 +23,16 @@ WRONG = {
     "no such medium": "shapes: [{type: sphere, interior: smog}]",
     "no such medium of the camera": "camera: {type: perspective, medium: smog}",
     "an operand": "shapes: [{type: union, of: [{type: sphere, interior: fog}, {type: box}]}]",
-    "an instance": "groups: {g: [{type: sphere}]}\nshapes: [{type: instance, group: g, exterior: fog}]",
+    "an instance": (
+        "groups: {g: [{type: box}]}\nshapes: [{type: instance, group: g, exterior: fog}]"
+    ),
     "a mask of nothing": "materials: {edge: {type: none}, m: {type: mask, base: edge}}",
     "a lamp of nothing": "materials: {e: {type: none}, m: {type: emissive, radiance: 1, base: e}}",
     "no length": "media: {fog: {type: homogeneous, sigma_t: -1, albedo: 0.5}}",
     "more than all": "media: {fog: {type: homogeneous, sigma_t: 1, albedo: [0.5, 1.5, 0.5]}}",
-    "a mirror of a phase": "media: {fog: {type: homogeneous, sigma_t: 1, albedo: 1, phase: {type: hg, g: 1}}}",
+    "a mirror of a phase": (
+        "media: {a: {type: homogeneous, sigma_t: 1, albedo: 1, phase: {type: hg, g: 1}}}"
+    ),
     "no such phase": "media: {fog: {type: homogeneous, sigma_t: 1, albedo: 1, phase: {type: mie}}}",
     "no such type": "media: {fog: {type: heterogeneous, sigma_t: 1, albedo: 1}}",
     "overlapping by priority": "shapes: [{type: sphere, interior: fog, priority: 2}]",
