@@ -42,7 +42,7 @@ def relative_expm1(x: npt.ArrayLike) -> FloatArray:
 
 
 def left(cosine: FloatArray, depth: npt.ArrayLike) -> FloatArray:
-    """(..., 3): the share of light that passes layers of optical depths `depth` (3,) at cosines (...)."""
+    """(..., 3): the share of light that passes layers of optical depths (3,) at cosines (...)."""
     return np.exp(-np.asarray(depth, float) / np.abs(cosine)[..., None])
 
 
@@ -79,8 +79,8 @@ def half_space(
 
 
 def half_space_in_sky(mu: FloatArray, albedo: npt.ArrayLike) -> FloatArray:
-    """(..., 3): the same under a sky of radiance 1: the integral of `half_space` over mu0 is that of
-    the equation of H, 1 / H(mu) = sqrt(1 - a) + (a / 2) int_0^1 x H(x) / (mu + x) dx."""
+    """(..., 3): the same under a sky of radiance 1: the integral of `half_space` over mu0 is that
+    of the equation of H, 1 / H(mu) = sqrt(1 - a) + (a / 2) int_0^1 x H(x) / (mu + x) dx."""
     a = np.asarray(albedo, float)
     return np.asarray(1.0 - np.sqrt(1.0 - a) * chandrasekhar_h(mu[..., None], a))
 
@@ -97,8 +97,8 @@ def sent_back(mu: FloatArray, mu0: float, depth: npt.ArrayLike) -> FloatArray:
 
 
 def let_through(mu: FloatArray, mu0: float, depth: npt.ArrayLike) -> FloatArray:
-    """(..., 3): the same of what it lets through: the integral over the depth x of the scattering of
-    exp(-x / mu0) exp(-(depth - x) / mu) / mu."""
+    """(..., 3): the same of what it lets through: the integral over the depth x, where light is
+    scattered, of exp(-x / mu0) exp(-(depth - x) / mu) / mu."""
     mu, depth = mu[..., None], np.asarray(depth, float)
     x = depth * (1.0 / mu0 - 1.0 / mu)
     return np.asarray(depth / mu * np.exp(-depth / mu) * relative_expm1(x))
@@ -117,8 +117,8 @@ def ball_in_sky(radius: float, albedo: float) -> Lack:
     of 1 in a sky of radiance 1.
 
     The mean radiance J is what is left of the sky's, and what the ball scatters.  What it lacks, D
-    = 1 - J, is scattered likewise, and absorption makes it evenly: D = K (1 - a) + a K D, where K is
-    the mean over all directions of the integral along them of exp(-t).  In a ball, K D times the
+    = 1 - J, is scattered likewise, and absorption makes it evenly: D = K (1 - a) + a K D, where K
+    is the mean over all directions of the integral along them of exp(-t).  In a ball, K D times the
     distance r is (1 / 2) int_0^R (E1(|r - q|) - E1(r + q)) q D(q) dq, E1 the exponential integral:
     Peierls' equation (Davison 1957, ch. V).  Gauss's nodes; x(q) - x(r) in place of x(q) takes away
     the pole of E1, whose integral is known.
@@ -137,11 +137,11 @@ def ball_in_sky(radius: float, albedo: float) -> Lack:
     return lambda r: np.asarray(np.polynomial.legendre.legval(2.0 * r / radius - 1.0, series))
 
 
-def seen_ball(across: FloatArray, radius: float, albedo: float, nodes: int = 64) -> FloatArray:
+def seen_ball(across: FloatArray, radius: float, albedo: float) -> FloatArray:
     """The radiance of that ball where rays pass its centre at optical distances `across` (...): 1
     without the integral along the ray of (1 - a J) exp(-t)."""
     lack = ball_in_sky(radius, albedo)
-    x, weight = np.polynomial.legendre.leggauss(nodes)
+    x, weight = np.polynomial.legendre.leggauss(64)
     half = np.sqrt(radius**2 - across**2)[..., None]
     t = half * (1.0 + x)
     r = np.sqrt(across[..., None] ** 2 + (t - half) ** 2)

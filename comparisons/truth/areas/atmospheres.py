@@ -66,9 +66,9 @@ def _half_spaces() -> None:
             return Expected(pixel_means(seen, 16, 16), 1e-9)
 
         first = (
-            "Light that is scattered in all directions alike, by a half space whose densities differ "
-            "by colour: the result does not depend on them. H obeys Chandrasekhar's integral "
-            "equation, and is an elementary integral (Stibbs & Weir 1959)."
+            "A half space scatters light in all directions alike. Its densities differ by colour, "
+            "and the result does not depend on them. H obeys Chandrasekhar's integral equation; it "
+            "is an elementary integral (Stibbs & Weir 1959)."
         )
         text = first if k == 1 else "As `half_space_sun_1`."
         text += f" Albedos {albedo[0]}, {albedo[1]}, {albedo[2]}; the sun at the cosine {mu0}."
@@ -190,9 +190,9 @@ def _slabs() -> None:
             return Expected(np.broadcast_to(light * values, (16, 16, 3)).copy(), error)
 
         first = (
-            "The equation of transfer of a plane layer, solved by discrete ordinates (PythonicDISORT "
-            "1.8) with 128 or 256 streams; half as many tell the error. Each colour is a layer of "
-            "its own. "
+            "The equation of transfer of a plane layer, solved by discrete ordinates with 128 or "
+            "256 streams (PythonicDISORT 1.8); half as many tell the error. Each colour is a layer "
+            "of its own. "
         )
         text = first if name == "slab_sun_1" else "As `slab_sun_1`. "
         text += (

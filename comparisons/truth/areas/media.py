@@ -107,7 +107,9 @@ def smoke_in_row() -> Expected:
     return Expected(pixel_means(lambda x, y: SKY * left(_down(x, y), depth), 32, 32))
 
 
-@case(r"$L \exp(-\sigma_1 (t_1 - t_2) - \sigma_2 t_2)$, $t$ the chords", "a medium in a medium", BEER)
+@case(
+    r"$L \exp(-\sigma_1 (t_1 - t_2) - \sigma_2 t_2)$, $t$ the chords", "a medium in a medium", BEER
+)
 def smoke_in_smoke() -> Expected:
     """In the inner ball, which is not in the middle, the inner medium is in place of the outer one.
     Pixels at the rims are not stated."""
@@ -166,8 +168,8 @@ def lamp_in_smoke() -> Expected:
     "a floor below a layer that absorbs", "Chandrasekhar 1960, appendix I",
 )  # fmt: skip
 def floor_under_smoke() -> Expected:
-    """Of a sky's radiance L, exp(-sigma_t h / mu) arrives at the cosine mu; its irradiance is 2 pi L
-    times the exponential integral E3.  Shadow rays go through the layer's boundary."""
+    """Of a sky's radiance L, exp(-sigma_t h / mu) arrives at the cosine mu; its irradiance is 2
+    pi L times the exponential integral E3.  Shadow rays go through the layer's boundary."""
     depth = 0.5 * SMOKE
     shade = RHO * SKY * 2.0 * expn(3, depth)
     return Expected(pixel_means(lambda x, y: shade * left(_down(x, y), depth), 32, 32))
@@ -194,7 +196,8 @@ def ink_in_glass() -> Expected:
 
 
 @case(
-    r"$R L + \frac{(1 - F)^2 T}{1 - F^2 T^2} L_{lamp}$, $R = F + \frac{(1 - F)^2 F T^2}{1 - F^2 T^2}$",
+    r"$R L + \frac{(1 - F)^2 T}{1 - F^2 T^2} L_{lamp}$, "
+    r"$R = F + \frac{(1 - F)^2 F T^2}{1 - F^2 T^2}$",
     "a slab of coloured glass", "Fresnel's equations; Beer's law",
 )  # fmt: skip
 def stained_slab() -> Expected:
@@ -228,5 +231,5 @@ def milk_in_glass() -> Expected:
 
 @case(r"$\frac{L}{1 - \rho}$", "a medium of albedo 1 fills a closed room")
 def foggy_room() -> Expected:
-    """As `closed_room`: the radiance is the same from everywhere, so that the fog changes nothing."""
+    """As `closed_room`: the radiance is the same from everywhere, and the fog changes nothing."""
     return _uniform(np.array([0.3, 0.5, 1.0]) / (1.0 - RHO))
