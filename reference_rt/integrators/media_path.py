@@ -34,6 +34,7 @@ from reference_rt.core.vec3 import (
     dot,
     is_black,
     length,
+    max_abs,
     max_component,
     to_local,
     to_world,
@@ -63,6 +64,11 @@ class MediaPathSetup(NamedTuple):
     path: PathSetup
     media: Media
     camera: int
+
+
+_FARTHEST = 2.0**500
+"""How far a path flies at most, so that distances from there can be squared.  It ends there: what
+scatters in a medium without end that far away is lit by nothing."""
 
 
 class Passed(NamedTuple):
@@ -136,7 +142,7 @@ def fly(
             sigma = media.sigma_t[medium, hue]
             before = component(passed.sampled, hue)
             if before + thickness(sigma, hit.t) > left:
-                t = max(0.0, left - before) / sigma
+                t = min(max(0.0, left - before) / sigma, _FARTHEST)
                 there = _in_space(at(ray, t), ray.d)
                 return Flight(True, ray, hit, there, medium, _further(media, medium, passed, t))
         passed = _further(media, medium, passed, hit.t)
@@ -283,6 +289,8 @@ def radiance(setup: MediaPathSetup, scene: KernelScene, ray: Ray, sampler: Sampl
         throughput = throughput * _left(passed.all, taken)
         ratio = ratio * _left(passed.sampled, taken)
         if flight.is_scattered:
+            if max_abs(point.p) > 0.5 * _FARTHEST:
+                break
             inverse = 1.0 / media.sigma_t[medium, hue]
             throughput = throughput * row_of(media.scattered, medium) * inverse
             ratio = ratio * row_of(media.sigma_t, medium) * inverse
