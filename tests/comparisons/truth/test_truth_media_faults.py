@@ -132,7 +132,7 @@ FAULTS = (
         "            throughput = throughput * (1.0 / survival)\n"
         "            pdf = vertex.pdf * survival\n"
         "            vertex = Vertex(vertex.p, vertex.normal, pdf, vertex.mean)\n",
-        ("foggy_room", "half_space_sky_2"),
+        ("foggy_room", "half_space_sky_1"),
     ),
     Fault(
         "roulette without its weight", PATH, "throughput = throughput * (1.0 / survival)",
