@@ -50,7 +50,8 @@ def path_lengths(scene: Scene, threads: int | None = None) -> Lengths | None:
             other = "without a limit" if length is None else f"with max_depth {length}"
             evidence = f"so does our picture change if rendered {other}; the scene has {had}"
             yield Hypothesis("path length", name, evidence, reference + change, 0, REST)
-        yield from mistaken_paths(scene, reference, threads)
+        if not scene.has_media:
+            yield from mistaken_paths(scene, reference, threads)
 
     return hypotheses
 
