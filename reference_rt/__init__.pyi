@@ -39,8 +39,8 @@ from .materials import Emissive as Emissive
 from .materials import GltfPbr as GltfPbr
 from .materials import Mask as Mask
 from .materials import Mirror as Mirror
-from .materials import NoSurface as NoSurface
 from .materials import NormalMap as NormalMap
+from .materials import NoSurface as NoSurface
 from .materials import Phong as Phong
 from .materials import Plastic as Plastic
 from .materials import Principled as Principled

@@ -456,9 +456,9 @@ Positive = Annotated[float, Field(gt=0)]
 
 
 def types_of(union: Any) -> tuple[Any, ...]:
-    """The types of descriptions in a union, such as `AnyShape`, in its order."""
+    """The types of descriptions in a union, such as `AnyShape`, in its order; or the one type."""
     of = get_args(union)[0] if get_origin(union) is Annotated else union
-    return get_args(of)
+    return get_args(of) or (of,)
 
 
 def name_of(description: type[Description]) -> str:

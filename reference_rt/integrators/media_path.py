@@ -28,9 +28,17 @@ from reference_rt import materials as any_material
 from reference_rt import sampling
 from reference_rt.accel.geometry import closest_hit
 from reference_rt.core.ray import Hit, Ray, SurfacePoint, at, ray_from
-from reference_rt.core.vec3 import Vec3, component, dot, is_black, length, max_component
+from reference_rt.core.vec3 import (
+    Vec3,
+    component,
+    dot,
+    is_black,
+    length,
+    max_component,
+    to_local,
+    to_world,
+)
 from reference_rt.core.vec3 import row as row_of
-from reference_rt.core.vec3 import to_local, to_world
 from reference_rt.integrators.direct_light import light_selection_normal, power_heuristic
 from reference_rt.integrators.path import (
     BOTH,
@@ -42,8 +50,9 @@ from reference_rt.integrators.path import (
 from reference_rt.integrators.scene_tables import KernelScene, surface
 from reference_rt.integrators.shading import shade_point
 from reference_rt.jit.kernel import kernel, local_floats
-from reference_rt.lights import LightSample, shadow_ray
-from reference_rt.media.phase import phase, turned
+from reference_rt.lights import NO_LIGHT, Background, LightSample, shadow_ray
+from reference_rt.materials import Scattered
+from reference_rt.media.phase import BELOW_ONE, phase, turned
 from reference_rt.media.tables import Media, medium_beyond, thickness
 from reference_rt.sampling import Sample, draw_pair
 
@@ -193,43 +202,72 @@ class Vertex(NamedTuple):
 
 
 @kernel
-def _found(
-    path: PathSetup, vertex: Vertex, ratio: Vec3, light: Vec3, density: float, taken: float
+def _met(
+    path: PathSetup, vertex: Vertex, ratio: Vec3, taken: float, throughput: Vec3, light: Background
 ) -> Vec3:
-    """Emission that an edge has met, weighted.  density: of the light's samples, per solid angle,
-    from the vertex;  taken: the optical thickness that the edge has passed in the path's colour, of
-    media that scatter."""
+    """Emission that an edge has met, weighted.  light: its radiance, and the density of light
+    samples there, per solid angle, from the vertex;  taken: the optical thickness, in the path's
+    colour, of the media on the edge that scatter."""
     mean, weight = _mean(ratio), 1.0
     if vertex.pdf > 0.0:
-        reached = mean * math.exp(-taken)
-        weight = _weight(path, BSDF_SAMPLING, vertex.pdf * reached, density * vertex.mean)
-    return light * (weight / mean)
+        reached = vertex.pdf * (mean * math.exp(-taken))
+        weight = _weight(path, BSDF_SAMPLING, reached, light.density * vertex.mean)
+    return throughput * light.radiance * (weight / mean)
+
+
+class Picked(NamedTuple):
+    """A light sample, and the probability of its light."""
+
+    light: LightSample
+    probability: float
 
 
 @kernel
-def _lit(
-    path: PathSetup, light: LightSample, picked: float, ratio: Vec3, way: Way, pdf: float
+def _light_for(scene: KernelScene, p: Vec3, n: Vec3, u: float, at: tuple[float, float]) -> Picked:
+    """A light for a point, picked by u, and the sample `at` of it.  n: see `lights.pick`."""
+    picked = any_light.pick(scene.lights, p, n, u)
+    if picked.probability == 0.0:
+        return Picked(NO_LIGHT, 0.0)
+    k, u0, u1 = picked.light, at[0], at[1]
+    found = any_light.sample_one(scene.lights, k, scene.shapes, scene.textures, p, u0, u1)
+    return Picked(found, picked.probability)
+
+
+@kernel
+def _connect(
+    setup: MediaPathSetup,
+    scene: KernelScene,
+    point: SurfacePoint,
+    medium: int,
+    ratio: Vec3,
+    picked: Picked,
+    scattered: Scattered,
 ) -> Vec3:
-    """The factor on what is scattered of a light sample.  picked: the probability of the light;
-    pdf: the density with which scattering draws its direction."""
-    mean, weight = _mean(ratio), 1.0
-    density = light.pdf * picked * mean
+    """What a light sample adds, over the throughput; 0 where a surface is between.  medium: in
+    which its ray begins;  scattered: what the point scatters of it."""
+    light = picked.light
+    if is_black(scattered.value):
+        return Vec3(0.0, 0.0, 0.0)
+    way = _look(scene, setup.media, shadow_ray(point, light), medium)
+    if not way.is_open:
+        return Vec3(0.0, 0.0, 0.0)
+    density, weight = light.pdf * picked.probability * _mean(ratio), 1.0
     if not light.is_delta:
-        reached = _mean(ratio * _left(way.passed.sampled, 0.0))
-        weight = _weight(path, LIGHT_SAMPLING, density, pdf * reached)
-    return light.radiance * _left(way.passed.all, 0.0) * (weight / density)
+        reached = scattered.density * _mean(ratio * _left(way.passed.sampled, 0.0))
+        weight = _weight(setup.path, LIGHT_SAMPLING, density, reached)
+    return scattered.value * light.radiance * _left(way.passed.all, 0.0) * (weight / density)
 
 
 @kernel
 def radiance(setup: MediaPathSetup, scene: KernelScene, ray: Ray, sampler: Sample) -> Vec3:
-    """An unbiased estimate of the radiance along a camera ray."""
-    path, media = setup.path, setup.media
-    materials, lights, textures = scene.materials, scene.lights, scene.textures
-    shapes, kept = scene.shapes, local_floats(any_material.scratch_floats(materials))
-    total, throughput, eta = Vec3(0.0, 0.0, 0.0), Vec3(1.0, 1.0, 1.0), 1.0
+    """An unbiased estimate of the radiance along a camera ray.  Where there are no media, it has
+    the bits of `simple_path.radiance`."""
+    path, media, materials, lights = setup.path, setup.media, scene.materials, scene.lights
+    kept, black = local_floats(any_material.scratch_floats(materials)), Vec3(0.0, 0.0, 0.0)
+    total, throughput, eta = black, Vec3(1.0, 1.0, 1.0), 1.0
     ratio, hue, medium = Vec3(1.0, 1.0, 1.0), 0, setup.camera
     if media.is_grey == 0:
-        # The roulette of the first edge uses the pair's other number.
+        # The other number of the pair that decides the first roulette.
         _, u_hue = draw_pair(sampler, sampling.ROULETTE)
         hue = min(int(3.0 * u_hue), 2)
     vertex = Vertex(ray.o, ray.d, 0.0, 1.0)
@@ -238,83 +276,66 @@ def radiance(setup: MediaPathSetup, scene: KernelScene, ray: Ray, sampler: Sampl
         u_light, u_lobe = draw_pair(sampler, dimension + sampling.LIGHT_AND_LOBE)
         hides = depth == 0 and path.hides_lamps
         flight = fly(scene, media, ray, medium, hue, u_lobe, hides)
-        medium, passed = flight.medium, flight.passed
+        ray, medium, passed, point = flight.ray, flight.medium, flight.passed, flight.point
         taken = component(passed.sampled, hue)
         throughput = throughput * _left(passed.all, taken)
         ratio = ratio * _left(passed.sampled, taken)
-        point, hit = flight.point, flight.hit
         if flight.is_scattered:
             inverse = 1.0 / media.sigma_t[medium, hue]
             throughput = throughput * row_of(media.scattered, medium) * inverse
             ratio = ratio * row_of(media.sigma_t, medium) * inverse
-        elif hit.kind < 0:
-            if not hides:
-                found = any_light.background_of(lights, flight.ray.d)
-                density = any_light.environment_density(
-                    lights, vertex.p, vertex.normal, found.density
-                )
-                arriving = _found(path, vertex, ratio, found.radiance, density, taken)
-                total = total + throughput * arriving
-            return total
+        elif flight.hit.kind < 0:
+            if hides:
+                return total
+            found = any_light.background_of(lights, ray.d)
+            density = any_light.environment_density(lights, vertex.p, vertex.normal, found.density)
+            sky = Background(found.radiance, density)
+            return total + _met(path, vertex, ratio, taken, throughput, sky)
         if is_black(throughput):
-            return total
-        u0, u1 = draw_pair(sampler, dimension + sampling.LIGHT_POINT)
-        v0, v1 = draw_pair(sampler, dimension + sampling.BSDF_DIRECTION)
+            break
+        at_light = draw_pair(sampler, dimension + sampling.LIGHT_POINT)
+        u0, u1 = draw_pair(sampler, dimension + sampling.BSDF_DIRECTION)
 
         if flight.is_scattered:
             if depth + 1 == path.max_depth:
                 break
-            zero = Vec3(0.0, 0.0, 0.0)
-            picked = any_light.pick(lights, point.p, zero, u_light)
-            if picked.probability > 0.0:
-                lit = any_light.sample_one(lights, picked.light, shapes, textures, point.p, u0, u1)
-                if lit.pdf > 0.0:
-                    way = _look(scene, media, shadow_ray(point, lit), medium)
-                    if way.is_open:
-                        value = phase(media.lobes, medium, dot(ray.d, lit.wi))
-                        arriving = _lit(path, lit, picked.probability, ratio, way, value)
-                        total = total + throughput * arriving * value
-            d = turned(media.lobes, medium, ray.d, v0, v1)
-            value = phase(media.lobes, medium, dot(ray.d, d))
-            vertex = Vertex(point.p, zero, value, _mean(ratio))
+            picked = _light_for(scene, point.p, black, u_light, at_light)
+            if picked.light.pdf > 0.0:
+                value = phase(media.lobes, medium, dot(ray.d, picked.light.wi))
+                scattered = Scattered(Vec3(value, value, value), value)
+                added = _connect(setup, scene, point, medium, ratio, picked, scattered)
+                total = total + throughput * added
+            d = turned(media.lobes, medium, ray.d, u0, u1)
+            vertex = Vertex(point.p, black, phase(media.lobes, medium, dot(ray.d, d)), _mean(ratio))
         else:
-            # What is left of the number that has not scattered the path.
-            u_lobe = 1.0 - (1.0 - u_lobe) * math.exp(taken)
-            u_lobe = min(max(u_lobe, 0.0), _BELOW_ONE)
-            shading = shade_point(scene, flight.ray, hit, point, kept)
+            if taken > 0.0:  # what is left of the number that has not scattered the path
+                u_lobe = min(max(1.0 - (1.0 - u_lobe) * math.exp(taken), 0.0), BELOW_ONE)
+            shading = shade_point(scene, ray, flight.hit, point, kept)
             if any_light.is_area(point):
-                density = any_light.area_pdf(lights, shapes, vertex.p, vertex.normal, point)
                 emitted = any_light.emitted(lights, point, shading.at, -ray.d)
-                arriving = _found(path, vertex, ratio, emitted, density, taken)
-                total = total + throughput * arriving
+                density = any_light.area_pdf(lights, scene.shapes, vertex.p, vertex.normal, point)
+                lamp = Background(emitted, density)
+                total = total + _met(path, vertex, ratio, taken, throughput, lamp)
             if depth + 1 == path.max_depth:
                 break
             normal = light_selection_normal(scene, point)
             if any_material.is_smooth(materials, point.material):
-                picked = any_light.pick(lights, point.p, normal, u_light)
-                if picked.probability > 0.0:
-                    lit = any_light.sample_one(
-                        lights, picked.light, shapes, textures, point.p, u0, u1
+                picked = _light_for(scene, point.p, normal, u_light, at_light)
+                if picked.light.pdf > 0.0:
+                    wi = picked.light.wi
+                    scattered = any_material.eval_pdf(
+                        materials, shading, to_local(shading.frame, wi)
                     )
-                    if lit.pdf > 0.0:
-                        wi = to_local(shading.frame, lit.wi)
-                        scattered = any_material.eval_pdf(materials, shading, wi)
-                        if not is_black(scattered.value):
-                            beyond = medium_beyond(media, point, lit.wi, medium)
-                            way = _look(scene, media, shadow_ray(point, lit), beyond)
-                            if way.is_open:
-                                arriving = _lit(
-                                    path, lit, picked.probability, ratio, way, scattered.density
-                                )
-                                total = total + throughput * arriving * scattered.value
-            bounce = any_material.sample(materials, shading, u_lobe, v0, v1)
+                    beyond = medium_beyond(media, point, wi, medium)
+                    added = _connect(setup, scene, point, beyond, ratio, picked, scattered)
+                    total = total + throughput * added
+            bounce = any_material.sample(materials, shading, u_lobe, u0, u1)
             if bounce.pdf == 0.0:
                 break
             throughput, eta = throughput * bounce.weight, eta * bounce.eta
             d = to_world(shading.frame, bounce.wi)
             medium = medium_beyond(media, point, d, medium)
-            pdf = 0.0 if bounce.is_delta else bounce.pdf
-            vertex = Vertex(point.p, normal, pdf, _mean(ratio))
+            vertex = Vertex(point.p, normal, 0.0 if bounce.is_delta else bounce.pdf, _mean(ratio))
 
         if depth + 1 >= path.rr_depth:
             survival = min(max_component(throughput) / _mean(ratio) * eta * eta, ROULETTE_CAP)
@@ -324,6 +345,3 @@ def radiance(setup: MediaPathSetup, scene: KernelScene, ray: Ray, sampler: Sampl
             throughput = throughput * (1.0 / survival)
         ray = ray_from(point, d)
     return total
-
-
-_BELOW_ONE = 1.0 - 2.0**-53

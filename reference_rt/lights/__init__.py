@@ -44,6 +44,7 @@ from reference_rt.lights.emitters.constant import Environment as Environment
 from reference_rt.lights.emitters.environment_map import EnvironmentMaps as EnvironmentMaps
 from reference_rt.lights.light import LIGHT_FLOATS as LIGHT_FLOATS
 from reference_rt.lights.light import LIGHT_INTEGERS as LIGHT_INTEGERS
+from reference_rt.lights.light import NO_LIGHT as NO_LIGHT
 from reference_rt.lights.light import Background as Background
 from reference_rt.lights.light import LightBlock as LightBlock
 from reference_rt.lights.light import LightSample as LightSample

@@ -136,14 +136,15 @@ def turned(lobes: Lobes, k: int, d: Vec3, u0: float, u1: float) -> Vec3:
         u0 -= lobes.share[i]
         i += 1
     if lobes.share[i] > 0.0:
-        u0 = min(u0 / lobes.share[i], _BELOW_ONE)
+        u0 = min(u0 / lobes.share[i], BELOW_ONE)
     cosine, rest = _cosine(lobes.code[i], lobes.g[i], u0)
     sine = math.sqrt(max(0.0, rest))
     x, y = on_circle(u1)
     return to_world(frame_from_normal(d), Vec3(sine * x, sine * y, cosine))
 
 
-_BELOW_ONE = 1.0 - 2.0**-53
+BELOW_ONE = 1.0 - 2.0**-53
+"""The largest number below 1."""
 
 
 @kernel
@@ -157,13 +158,13 @@ def _cosine(code: int, g: float, u: float) -> tuple[float, float]:
         cosine = math.copysign(root - 1.0 / root, half)
         cosine = min(1.0, max(-1.0, cosine))
         return cosine, 1.0 - cosine * cosine
-    # The textbook's form (PBR 4ed, 11.14) solved for the distance from the peak, 1 - |cosine| there,
+    # The textbook's form (PBR 4ed, 11.14), solved for the distances from both ends, 1 -+ |cosine|,
     # so that nothing cancels where |g| is near 1.
     a = abs(g)
-    v = 1.0 - u if g > 0.0 else u
-    below = 1.0 + a - 2.0 * a * v
-    near = 1.0 - a
-    rest = 2.0 * v * near * near * (1.0 + a * (1.0 - v)) / (below * below)
-    rest = min(rest, 2.0)
-    cosine = 1.0 - rest
-    return (cosine if g > 0.0 else -cosine), rest * (2.0 - rest)
+    v, rest = (1.0 - u, u) if g > 0.0 else (u, 1.0 - u)
+    near, far = 1.0 - a, 1.0 + a
+    below = near + 2.0 * a * rest
+    from_peak = 2.0 * v * (1.0 + a * rest) * (near / below) * (near / below)
+    from_back = 2.0 * rest * (near + a * rest) * (far / below) * (far / below)
+    cosine = 1.0 - from_peak
+    return (cosine if g > 0.0 else -cosine), from_peak * from_back

@@ -70,12 +70,10 @@ def media_table(
 @kernel
 def medium_beyond(media: Media, point: SurfacePoint, d: Vec3, medium: int) -> int:
     """The medium in which a ray goes on along d from a surface at which it arrives in `medium`."""
-    inside = media.inside[point.material]
+    inside, outside = media.inside[point.material], media.outside[point.material]
     if inside == UNCHANGED:
         return medium
-    if dot(d, point.n) < 0.0:
-        return inside
-    return media.outside[point.material]
+    return int(inside if dot(d, point.n) < 0.0 else outside)
 
 
 @kernel

@@ -68,7 +68,7 @@ from reference_rt.rendering.query.tracing import (
 )
 from reference_rt.sampling import AnySampler, Grid
 from reference_rt.scene.build import BuiltScene
-from reference_rt.scene.examples import examples, write_files
+from reference_rt.scene.examples import NAMED, examples, write_files
 from reference_rt.shapes import Mesh, Primitive, Sphere, Triangle
 from reference_rt.shapes.csg import Union
 from reference_rt.shapes.instances import Instance
@@ -107,8 +107,9 @@ _INTEGRATORS = PathTracing(), Light(), Direct(light_samples=2), Whitted(), RayCa
 
 
 def _pictures(scene: BuiltScene) -> Iterator[Call]:
-    """The kernels of its pictures by all integrators, with its sampler where that fits."""
-    for integrator in _INTEGRATORS:
+    """The kernels of its pictures by all integrators that can render it, with its sampler where
+    that fits."""
+    for integrator in (PathTracing(),) if scene.has_media else _INTEGRATORS:
         fits = integrator.deterministic or not isinstance(scene.sampler, Grid)
         samplers = [scene.sampler if fits else None]
         if isinstance(integrator, Direct) and not fits:
@@ -282,6 +283,9 @@ def _scenes(folder: Path) -> Iterator[BuiltScene]:
         if names:
             yield scene(textures=textures | {"product": Product(of=(*names,))}, materials=_FEW)
     yield scene(materials=_LEAVES)
+    for sampler in _SAMPLERS:
+        if not isinstance(sampler, Grid):
+            yield scene(materials=_FEW | _NESTED, media=NAMED["media"], sampler=sampler)
     cycled = zip(_FILTERS, cycle(_CAMERAS), cycle(_SAMPLERS), cycle(_SKIES), strict=False)
     for of_film, camera, sampler, sky in cycled:
         yield scene(

@@ -48,12 +48,12 @@ of 1/2 fit the strata of the samples.
 
 
 def light_tables(
-    scene: SceneModel, geometry: Geometry, palette: Palette, rows: Iterable[Boundary]
+    scene: SceneModel, geometry: Geometry, palette: Palette, boundaries: Iterable[Boundary]
 ) -> Lights:
     """All lights, selected in proportion to their power.  Writes the primitives' `light` columns.
-    rows: of the materials.  Raises SceneError."""
+    boundaries: the rows of the materials.  Raises SceneError."""
     radius = scene_radius(geometry)
-    materials = [scene.materials.get(boundary.material or "") for boundary in rows]
+    materials = [scene.materials.get(boundary.material or "") for boundary in boundaries]
     areas, powers = _area_lights(scene, geometry, palette, materials)
     kinds, rows, weights = [AREA] * len(powers), [*range(len(powers))], [powers]
     tables: dict[str, Any] = {}

@@ -28,17 +28,17 @@ DEFAULT = "\0"
 
 
 def material_tables(
-    scene: SceneModel, palette: Palette, default: bool, rows: Iterable[Boundary]
+    scene: SceneModel, palette: Palette, default: bool, boundaries: Iterable[Boundary]
 ) -> Materials:
     """The materials of a scene in its order; then the default material, if it is used (`default`)
-    or there is no other; then those of `rows` once more that bound media.
+    or there is no other; then those of `boundaries` once more that bound media.
 
     An emissive material has the BSDF of its base.  Raises SceneError.
     """
     materials: dict[str, Material] = {**scene.materials}
     if default or not materials:
         materials[DEFAULT] = Diffuse()
-    for boundary in [*rows][len(scene.materials) + 1 :]:
+    for boundary in [*boundaries][len(scene.materials) + 1 :]:
         materials[f"{DEFAULT}{len(materials)}"] = materials[boundary.material or DEFAULT]
     leaves, flat_leaves = _Leaves(materials, palette), FlattenedBuilder(palette)
     kinds, rows, found_traits, shown = [], [], [], []

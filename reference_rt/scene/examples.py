@@ -8,6 +8,7 @@ import numpy as np
 from reference_rt.core.model import types_of
 from reference_rt.core.transform import Scale
 from reference_rt.materials import Diffuse, Mirror
+from reference_rt.media import Homogeneous
 from reference_rt.shapes import Box, Sphere
 from reference_rt.textures import Bitmap
 
@@ -17,6 +18,7 @@ NAMED: dict[str, dict[str, Any]] = {
         "small": Bitmap(file="image.npy", encoding="raw", scale=0.25),
     },
     "materials": {"base": Diffuse(), "other": Mirror()},
+    "media": {"medium": Homogeneous(sigma_t=(0.5, 0.5, 0.5), albedo=(0.5, 0.5, 0.5))},
     "groups": {"group": (Sphere(radius=0.8), Box(transform=(Scale(scale=(0.5, 0.5, 0.5)),)))},
 }
 """Fields of a scene with all that examples name but files."""

@@ -15,6 +15,7 @@ from reference_rt.lights import AnyLight
 from reference_rt.lights import tables as lights
 from reference_rt.materials import AnyMaterial
 from reference_rt.materials.bsdfs import tables as bsdfs
+from reference_rt.media import AnyMedium, AnyPhase
 from reference_rt.sampling import AnySampler
 from reference_rt.scene.examples import NAMED, examples, write_files
 from reference_rt.shapes import TABLES, Primitive
@@ -26,6 +27,8 @@ from reference_rt.textures import tables as textures
 KINDS = {
     "shapes": AnyShape,
     "materials": AnyMaterial,
+    "media": AnyMedium,
+    "phases": AnyPhase,
     "textures": AnyTexture,
     "lights": AnyLight,
     "cameras": AnyCamera,
@@ -35,7 +38,10 @@ KINDS = {
 }
 TYPES = [of for kind in KINDS.values() for of in types_of(kind)]
 
-COMMON = {"type", "material", "transform", "uv", "uv_set", "eye", "target", "up", "near", "far"}
+COMMON = {
+    *("type", "material", "transform", "interior", "exterior", "uv", "uv_set"),
+    *("eye", "target", "up", "near", "far", "medium"),
+}
 """Fields that types share, some of which only some need examples of."""
 
 IN_FILES = {("mesh", "file"), ("bitmap", "layer"), ("environment_map", "layer")}
@@ -64,7 +70,7 @@ def test_a_scene_of_all_examples(tmp_path):
     """Is valid, says itself in YAML and JSON, and has tables."""
     write_files(tmp_path)
     named = dict(NAMED)
-    for kind in ("textures", "materials"):
+    for kind in ("textures", "materials", "media"):
         more = {f"{of.type} {k}": of for k, of in enumerate(examples(KINDS[kind]))}
         named[kind] = NAMED[kind] | more
     sky = [light for light in examples(AnyLight) if light.type != "environment_map"]
@@ -72,7 +78,7 @@ def test_a_scene_of_all_examples(tmp_path):
         **named,
         shapes=tuple(examples(AnyShape)),
         lights=tuple(sky),
-        integrator=rt.Whitted(),  # which takes any Phong material
+        integrator=rt.RayCast(),  # which takes any Phong material, and media
         sampler=rt.Independent(),
     )
     file = tmp_path / "scene.json"
