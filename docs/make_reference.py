@@ -85,6 +85,18 @@ def sections() -> list[tuple[str, str, list[str]]]:
             "They name other materials, and may be nested.",
             wrappers,
         ),
+        (
+            "Media",
+            "`media` gives each of these a name, by which shapes have an `interior` and an "
+            "`exterior`, and the camera its `medium`. Path tracing alone follows light through "
+            "media.",
+            of_kind("media"),
+        ),
+        (
+            "Phase functions",
+            "`phase` of a medium is one of these.",
+            list(dict.fromkeys(_targets(TYPES["Homogeneous"]["properties"]["phase"]))),
+        ),
         ("Textures", "`textures` gives each of these a name.", [*of_kind("textures"), "UvMap"]),
         (
             "Lights",

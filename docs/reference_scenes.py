@@ -43,7 +43,7 @@ def merged(base: Mapping[str, Any], parts: Mapping[str, Any]) -> dict[str, Any]:
     for key, value in parts.items():
         if isinstance(value, list):
             found[key] = [*base.get(key, ()), *value]
-        elif key in ("textures", "materials", "groups"):
+        elif key in ("textures", "materials", "media", "groups"):
             found[key] = {**base.get(key, {}), **value}
         else:
             found[key] = value

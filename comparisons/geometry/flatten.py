@@ -123,8 +123,10 @@ def member_of(shape: Shape, number: int) -> Member:
     leaves: list[Leaf] = []
     tree = _tree(shape, affine.IDENTITY, None, leaves)
     assert isinstance(tree, Tree)
-    of_solid = {"interior": shape.interior, "exterior": shape.exterior}
-    placed = (leaf._replace(part=number + leaf.part, **of_solid) for leaf in leaves)
+    inner, outer = shape.interior, shape.exterior
+    placed = (
+        leaf._replace(part=number + leaf.part, interior=inner, exterior=outer) for leaf in leaves
+    )
     return Member(tuple(placed), tree)
 
 

@@ -3,10 +3,10 @@
 `phases.py` has a row for each type of phase function, `homogeneous.py` the only type of media.  To
 add a phase function: a row in `phases.PHASES`.
 
-Contract: a shape's `interior` and `exterior`, and the camera's medium, are parts of Mitsuba's
-dictionaries, each with a medium of its own.  Mitsuba's `volpathmis` follows them, and so does our
-`comparisons.mitsuba.plugins.media_of_solids`.  Its `path`, `direct` and `ptracer` do not: a file
-with one of these is read as if it had no media.
+Contract: the media inside and outside of a shape, and the camera's medium, are parts of Mitsuba's
+dictionaries, each with a medium of its own.  Mitsuba's volpath and volpathmis follow them, and so
+does our `comparisons.mitsuba.plugins.media_of_solids`.  Its other integrators do not: a file with
+one of these is read as if it had no media.
 """
 
 from comparisons.media.homogeneous import HOMOGENEOUS as HOMOGENEOUS

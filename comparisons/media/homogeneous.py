@@ -81,8 +81,8 @@ def _read(reading: Reading, node: Node) -> Homogeneous:
 
 
 NOT_FOLLOWED = (
-    "is in a medium, or bounds one, which is left out: Mitsuba's integrator follows none, unless it "
-    "is volpath or volpathmis"
+    "is in a medium, or bounds one, which is left out: Mitsuba's integrator follows none, unless "
+    "it is volpath or volpathmis"
 )
 
 

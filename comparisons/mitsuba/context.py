@@ -35,11 +35,11 @@ class UntranslatableError(NoCounterpartError):
 
 @dataclass(frozen=True)
 class TranslationContext:
-    """The context of a translation: the scene's materials, textures and media, by name; the folder of
-    its files;  has_colours: whether the material belongs to a mesh with vertex colours;  native: use
-    Mitsuba's own materials even where our plugins are more exact;  images: cache of Mitsuba's
-    bitmaps;  files: those of the scene file that is written, None in memory;  notes: what the
-    reader of that file should know."""
+    """The context of a translation: the scene's materials, textures and media, by name; the folder
+    of its files;  has_colours: whether the material belongs to a mesh with vertex colours;
+    native: use Mitsuba's own materials even where our plugins are more exact;  images: cache of
+    Mitsuba's bitmaps;  files: those of the scene file that is written, None in memory;  notes: what
+    the reader of that file should know."""
 
     materials: Mapping[str, Material]
     textures: Mapping[str, Texture]

@@ -18,8 +18,8 @@ from comparisons.rungs.rays.any_hit import any_hits
 from comparisons.rungs.rays.camera import compare_camera
 from comparisons.rungs.rays.coincidence import coincident, in_one_place
 from comparisons.rungs.rays.comparer import DISCRETE, KINDS, Comparer
-from comparisons.rungs.rays.media import media_along
 from comparisons.rungs.rays.judgement import MOST_JUDGED, Judgement, judged
+from comparisons.rungs.rays.media import media_along
 from comparisons.rungs.rays.rays import Rays, described, joined, mixed_rays
 from comparisons.rungs.rays.resolution import resolution
 from reference_rt.cameras.film import Film

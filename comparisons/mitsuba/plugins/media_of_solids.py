@@ -94,7 +94,7 @@ def register(mi: Any) -> None:
             while dr.any(active):
                 si, of_solid = lit.trace(ray, active)
                 hidden = mi.Mask(self.hides) & (depth == 0)
-                mei, t, is_inside, passed = self.flight(sampler, ray, si.t, medium, active)
+                mei, is_inside, passed = self.flight(sampler, ray, si.t, medium, active)
                 throughput *= dr.select(active, passed, 1.0)
                 # Emission; density 0: the ray is the camera's, or of a delta lobe.
                 arrives = active & ~is_inside
@@ -152,9 +152,9 @@ def register(mi: Any) -> None:
 
         def flight(
             self, sampler: Any, ray: Any, end: Any, medium: Any, active: Any
-        ) -> tuple[Any, Any, Any, Any]:
-            """Where rays scatter before the distance `end`: the interaction, the distance, whether
-            they do, and the factor on their light."""
+        ) -> tuple[Any, Any, Any]:
+            """Where rays scatter before the distance `end`: the interaction, whether they do, and
+            the factor on their light."""
             mei = dr.zeros(mi.MediumInteraction3f, dr.width(ray))
             mei.wi, mei.sh_frame = -ray.d, mi.Frame3f(-ray.d)
             mei.time, mei.wavelengths, mei.medium = ray.time, ray.wavelengths, medium
@@ -162,7 +162,9 @@ def register(mi: Any) -> None:
             sampled = dr.select(dr.max(sigma_s) > 0.0, sigma_t, 0.0)
             u_colour, u = sampler.next_1d(active), sampler.next_1d(active)
             chosen = dr.select(
-                u_colour < 1.0 / 3.0, sampled.x, dr.select(u_colour < 2.0 / 3.0, sampled.y, sampled.z)
+                u_colour < 1.0 / 3.0,
+                sampled.x,
+                dr.select(u_colour < 2.0 / 3.0, sampled.y, sampled.z),
             )
             free = dr.select(chosen > 0.0, -dr.log(1.0 - u) / chosen, dr.inf)
             inside = active & (free < end)
@@ -172,7 +174,7 @@ def register(mi: Any) -> None:
             mei.t = dr.select(inside, t, dr.inf)
             mei.p = dr.select(inside, ray(t), 0.0)
             mean = dr.mean(density)  # 0 on an endless way, of which nothing is left
-            return mei, t, inside, dr.select(mean > 0.0, passed / mean, 0.0)
+            return mei, inside, dr.select(mean > 0.0, passed / mean, 0.0)
 
         def place(self, si: Any, mei: Any, is_inside: Any) -> Any:
             """Points of surfaces and of media as one interaction; those of media have no normal."""
@@ -210,9 +212,7 @@ def register(mi: Any) -> None:
             distant = mi.has_flag(drawn.emitter.flags(), mi.EmitterFlags.Infinite)
             return light * self.way(lit, here.at, drawn, distant, medium, active)
 
-        def way(
-            self, lit: Any, at: Any, drawn: Any, distant: Any, medium: Any, active: Any
-        ) -> Any:
+        def way(self, lit: Any, at: Any, drawn: Any, distant: Any, medium: Any, active: Any) -> Any:
             """What is left of light on its way from a lamp: nothing behind a surface."""
             passed = mi.Color3f(1.0)
             going = mi.Mask(active)

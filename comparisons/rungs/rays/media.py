@@ -101,9 +101,7 @@ def _differ(a: FloatArray, b: FloatArray, allowed: FloatArray) -> Any:
     return (np.abs(a - b) > allowed[:, None] * (1.0 + a)).any(axis=1)
 
 
-def _slack(
-    sizes: ShapeSizes, counterpart: Counterpart, rays: Rays, diagonal: float
-) -> FloatArray:
+def _slack(sizes: ShapeSizes, counterpart: Counterpart, rays: Rays, diagonal: float) -> FloatArray:
     """(n,): how far Mitsuba may be off in the length of a way: by its ray epsilon where a ray goes
     on behind each of some surfaces that it meets at a slant, and by meshes that stand in."""
     reach = np.abs(rays.o - np.array(sizes.frame.center)).max(axis=1) + diagonal
@@ -143,10 +141,8 @@ def absorbing(scene: Scene, names: list[str], sigma: float) -> Scene:
     colour each, by sigma per length, and the others nothing."""
     media = {}
     for name in scene.media:
-        colour = [0.0, 0.0, 0.0]
-        if name in names:
-            colour[names.index(name)] = sigma
-        media[name] = Homogeneous(sigma_t=tuple(colour), albedo=(0.0, 0.0, 0.0))
+        red, green, blue = (sigma if names[k : k + 1] == [name] else 0.0 for k in range(3))
+        media[name] = Homogeneous(sigma_t=(red, green, blue), albedo=(0.0, 0.0, 0.0))
     return scene.changed(
         media=media,
         materials={"none": NoSurface()},
