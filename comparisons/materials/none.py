@@ -4,7 +4,7 @@ from comparisons.materials.mask import absent
 from comparisons.materials.material import MaterialType
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.plugin_table import PluginTable
-from comparisons.renderers.vocabulary import CyclesWriter, Data, Params, PbrtWriter
+from comparisons.renderers.vocabulary import Params, PbrtWriter
 from reference_rt.materials import Mask, NoSurface
 
 TABLE = PluginTable("null")
@@ -14,10 +14,6 @@ def _from_mitsuba(reading: Reading, node: Node) -> NoSurface | Mask:
     """To Mitsuba's integrators without media it is a surface that lets all light pass: shadow rays
     end there, and it counts as an edge of a path."""
     return NoSurface() if reading.follows_media else absent(reading)
-
-
-def _to_cycles(material: NoSurface, writing: CyclesWriter) -> Data:
-    return {"type": "none"}
 
 
 def _to_pbrt(material: NoSurface, writing: PbrtWriter, both_sides: bool) -> Params:
@@ -31,7 +27,7 @@ NO_SURFACE = MaterialType(
     from_mitsuba={"null": _from_mitsuba},
     note=None,
     errors=None,
-    to_cycles=_to_cycles,
+    to_cycles=None,
     to_gltf=None,
     to_pbrt=_to_pbrt,
 )

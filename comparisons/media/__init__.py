@@ -17,3 +17,11 @@ from comparisons.media.homogeneous import translate_medium as translate_medium
 from comparisons.media.phases import PHASES as PHASES
 from comparisons.media.phases import PhaseType as PhaseType
 from comparisons.media.phases import type_of as type_of
+from comparisons.renderers import NoCounterpartError
+from reference_rt.scene.model import SceneModel
+
+
+def refuse_media(scene: SceneModel) -> None:
+    """For renderers that are given none.  Raises NoCounterpartError."""
+    if scene.media:
+        raise NoCounterpartError("media")
