@@ -87,15 +87,14 @@ def sections() -> list[tuple[str, str, list[str]]]:
         ),
         (
             "Media",
-            "`media` gives each of these a name, by which shapes have an `interior` and an "
-            "`exterior`, and the camera its `medium`. Path tracing alone follows light through "
-            "media.",
+            "`media` gives each of these a name. A shape's `interior` and `exterior`, and the "
+            "camera's `medium`, are such names.",
             of_kind("media"),
         ),
         (
             "Phase functions",
             "`phase` of a medium is one of these.",
-            list(dict.fromkeys(_targets(TYPES["Homogeneous"]["properties"]["phase"]))),
+            [name for name in _targets(TYPES["Homogeneous"]) if name != "Homogeneous"],
         ),
         ("Textures", "`textures` gives each of these a name.", [*of_kind("textures"), "UvMap"]),
         (

@@ -33,7 +33,7 @@ class Camera(Description):
     """The far clipping plane, likewise: nothing behind it is seen but the environment.  Default:
     none."""
     medium: str | None = None
-    """Name of the medium in which the camera stands.  Default: none."""
+    """Name of the medium in which the camera's rays begin.  Default: none."""
 
     @model_validator(mode="after")
     def _check_orientation(self) -> Self:

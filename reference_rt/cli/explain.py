@@ -15,6 +15,7 @@ from rich.table import Table
 
 from reference_rt.accel import bvh
 from reference_rt.cli.limits import in_words, limits_of
+from reference_rt.cli.media_sides import contradictions
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import Signature, is_compiled
@@ -54,6 +55,7 @@ def explain(scene: Scene, tables: SceneTables) -> tuple[Lines, Lines]:
     _meshes(scene, used, pruned)
     _hierarchy(scene, tables, used, pruned)
     _materials(tables, used, pruned)
+    _media(scene, used, pruned)
     _textures(tables, used, pruned)
     _lights(scene, tables, used, pruned)
     _integration(scene, tables, used, pruned)
@@ -180,6 +182,18 @@ def _layers(layers: FlattenedMaterials | None, used: Lines, pruned: Lines) -> No
             pruned.append((name, f"no material is a {what}"))
         else:
             used.append((name, f"{_rows(table):,}"))
+
+
+def _media(scene: Scene, used: Lines, pruned: Lines) -> None:
+    if not scene.has_media:
+        pruned.append(("media", "the scene has none: paths go from surface to surface"))
+    for name, medium in scene.media.items():
+        sigma_t = [medium.scale * one for one in medium.sigma_t]
+        free = ", ".join(f"{1.0 / one:.4g}" if one > 0.0 else "no end" for one in sigma_t)
+        how = medium.phase.type if any(medium.albedo) else "only absorbs"
+        used.append((f"medium {name}", f"{how}; mean free paths {free}"))
+    if scene.has_media and isinstance(scene.integrator, RayCast):
+        pruned.append(("light in media", "ray casting shows the first surfaces, boundaries too"))
 
 
 def _textures(tables: SceneTables, used: Lines, pruned: Lines) -> None:
@@ -359,6 +373,7 @@ _TABLES = {
 }
 """Classes of tables, likewise."""
 
+_INSIDE = {"MediaPathSetup": "path through media"}
 _DRIVERS = {
     "render_tile": "driver of the picture",
     "first_hits_tile": "driver of albedo and normal",
@@ -387,7 +402,11 @@ def _named(kernel: str, signature: Signature) -> tuple[str, str]:
     arguments = signature if isinstance(signature, tuple) else signature.args
     if not isinstance(arguments[0], types.CPointer):
         classes = [getattr(of, "instance_class", type(None)).__name__ for of in arguments]
-        inside = [name.removesuffix("Setup").lower() for name in classes if name.endswith("Setup")]
+        inside = [
+            _INSIDE.get(name, name.removesuffix("Setup").lower())
+            for name in classes
+            if name.endswith("Setup")
+        ]
         return _DRIVERS.get(kernel, _words(kernel)), ", ".join(inside) or "one ray per pixel"
     table = arguments[0].dtype.instance_class.__name__
     name = kernel.strip("_").removesuffix("_nested")
@@ -406,7 +425,7 @@ def print_page(scene: Scene) -> None:
     near, beyond = margins(scene)
     mistakes = [
         (str(scene.error("", *mistake.path)), mistake.message)
-        for mistake in likely_mistakes(scene, scene.tables)
+        for mistake in (*likely_mistakes(scene, scene.tables), *contradictions(scene))
     ]
     console = Console()
     for title, lines in (

@@ -20,6 +20,7 @@ from reference_rt.rendering.picture import Picture
 from reference_rt.rendering.ray_tree import SHADOW, ray_trees
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
+from reference_rt.scene.build_media import boundaries
 from reference_rt.util.errors import UsageError, printable
 from reference_rt.util.files import replacing
 
@@ -84,19 +85,23 @@ def heading(tree: Tree) -> list[str]:
 
 def lines_of(scene: Scene, ray: dict[str, Any]) -> Iterator[str]:
     """What is said of a ray, line by line."""
-    names = [*scene.materials]
+    rows, media = [*boundaries(scene)], [*scene.media]
     numbers = dict(ray["numbers"])
     to = f" to {_light(scene, numbers.pop('light'))}" if "light" in numbers else ""
     yield f"{ray['kind']} ray{to}, weight {_numbers(ray['weight'])}"
     yield f"from {_numbers(ray['o'])} along {_numbers(ray['d'])}"
     if ray["kind"] == SHADOW:
         yield "occluded" if ray["occluded"] else "not occluded"
+    elif ray.get("is_scattered"):
+        where = f"at {_numbers(ray['end'])}, t {ray['t']:.6g}"
+        yield f"is scattered by the medium '{media[ray['medium']]}', {where}"
     elif ray["hit"] is None:
         yield "hits nothing"
     else:
         hit = ray["hit"]
         shape, material = scene.shapes[hit["shape"]].type, hit["material"]
-        name = f"material '{names[material]}'" if material < len(names) else "default material"
+        named = rows[material].material
+        name = "default material" if named is None else f"material '{named}'"
         copy = f", copy {hit['instance']}" if hit["instance"] >= 0 else ""
         yield (
             f"hits shapes[{hit['shape']}], {shape}{copy}, {name}, at {_numbers(hit['p'])}, "

@@ -34,6 +34,7 @@ from reference_rt.core.vec3 import (
     dot,
     is_black,
     length,
+    max_abs,
     max_component,
     to_local,
     to_world,
@@ -63,6 +64,11 @@ class MediaPathSetup(NamedTuple):
     path: PathSetup
     media: Media
     camera: int
+
+
+_FARTHEST = 2.0**500
+"""How far a path flies at most, so that distances from there can be squared.  It ends there: what
+scatters in a medium without end that far away is lit by nothing."""
 
 
 class Passed(NamedTuple):
@@ -136,7 +142,7 @@ def fly(
             sigma = media.sigma_t[medium, hue]
             before = component(passed.sampled, hue)
             if before + thickness(sigma, hit.t) > left:
-                t = max(0.0, left - before) / sigma
+                t = min(max(0.0, left - before) / sigma, _FARTHEST)
                 there = _in_space(at(ray, t), ray.d)
                 return Flight(True, ray, hit, there, medium, _further(media, medium, passed, t))
         passed = _further(media, medium, passed, hit.t)
@@ -216,9 +222,10 @@ def _met(
 
 
 class Picked(NamedTuple):
-    """A light sample, and the probability of its light."""
+    """A light sample, and the number and the probability of its light."""
 
     light: LightSample
+    number: int
     probability: float
 
 
@@ -227,10 +234,10 @@ def _light_for(scene: KernelScene, p: Vec3, n: Vec3, u: float, at: tuple[float, 
     """A light for a point, picked by u, and the sample `at` of it.  n: see `lights.pick`."""
     picked = any_light.pick(scene.lights, p, n, u)
     if picked.probability == 0.0:
-        return Picked(NO_LIGHT, 0.0)
+        return Picked(NO_LIGHT, 0, 0.0)
     k, u0, u1 = picked.light, at[0], at[1]
     found = any_light.sample_one(scene.lights, k, scene.shapes, scene.textures, p, u0, u1)
-    return Picked(found, picked.probability)
+    return Picked(found, k, picked.probability)
 
 
 @kernel
@@ -248,7 +255,8 @@ def _connect(
     light = picked.light
     if is_black(scattered.value):
         return Vec3(0.0, 0.0, 0.0)
-    way = _look(scene, setup.media, shadow_ray(point, light), medium)
+    shadow = shadow_ray(point, light)
+    way = _look(scene, setup.media, shadow, medium)
     if not way.is_open:
         return Vec3(0.0, 0.0, 0.0)
     density, weight = light.pdf * picked.probability * _mean(ratio), 1.0
@@ -281,6 +289,8 @@ def radiance(setup: MediaPathSetup, scene: KernelScene, ray: Ray, sampler: Sampl
         throughput = throughput * _left(passed.all, taken)
         ratio = ratio * _left(passed.sampled, taken)
         if flight.is_scattered:
+            if max_abs(point.p) > 0.5 * _FARTHEST:
+                break
             inverse = 1.0 / media.sigma_t[medium, hue]
             throughput = throughput * row_of(media.scattered, medium) * inverse
             ratio = ratio * row_of(media.sigma_t, medium) * inverse

@@ -12,6 +12,8 @@ Each ray is a dictionary:
 - weight: the share of its radiance in the sample: of a path the throughput;
 - hit: shape, instance, part, face, material, p, n of the surface, None for a miss;  of a shadow ray
   instead occluded;
+- medium: of a ray through media alone: the number of that in which it ends, -1 for none;
+  is_scattered: whether a medium scatters it at its end;
 - adds: (what, value) of each term that it adds to the sample's radiance;
 - numbers: by name, the pdfs, MIS weights and probabilities behind these terms;
 - steps: the nodes of the BVH that a ray meets when it is traced alone, each with its box in world
@@ -42,12 +44,13 @@ from reference_rt.accel.bvh import CENTER, CHILDREN, child_of, size_of
 from reference_rt.accel.leaf import nearer_primitive, nearest_of_triangle_leaf
 from reference_rt.accel.single_ray import enter
 from reference_rt.core.ray import Ray, at, hit_of, point_of, ray_of
-from reference_rt.core.vec3 import Vec3, is_black
+from reference_rt.core.vec3 import Vec3, is_black, length
 from reference_rt.integrators import (
     Light,
     RayCast,
     direct,
     direct_light,
+    media_path,
     path,
     ray_cast,
     scene_tables,
@@ -215,6 +218,9 @@ class _Recorder:
             scene_tables.surfaces: self._edge,
             path.go_on: self._scattered,
             block_query.any_hits: self._any_hits,
+            media_path.fly: self._flight,
+            media_path._met: self._emission_of_flight,
+            media_path._connect: self._light_of_flight,
             ray_cast.cast: self._cast,
         }
         _watch(kernel, handlers)
@@ -322,6 +328,36 @@ class _Recorder:
             numbers["sampled pdf"] = r.own["drawn"].pdf
             numbers |= {k: r.own[k] for k in ("survival",) if k in r.own}
 
+    # ---- path tracing through media --------------------------------------------------------------
+
+    def _flight(self, r: _Return) -> None:
+        outer, flight = r.outer, r.result
+        kind = CAMERA if outer["depth"] == 0 else SCATTERED
+        record = self._ray(kind, self._surface, outer["ray"], outer["throughput"])
+        record |= {"medium": flight.medium, "is_scattered": flight.is_scattered}
+        record["numbers"]["optical thickness"] = max(flight.passed.all)
+        if flight.is_scattered or flight.hit.kind >= 0:
+            record["end"] = flight.point.p
+        if not flight.is_scattered:
+            record |= {"found": flight.hit, "point": flight.point}
+
+    def _emission_of_flight(self, r: _Return) -> None:
+        record = self.rays[-1]
+        record["numbers"]["MIS weight"] = r.own["weight"]
+        _add(record, "emitted" if record["found"].kind >= 0 else "background", r.result)
+
+    def _light_of_flight(self, r: _Return) -> None:
+        if "shadow" in r.own:
+            is_open, picked = r.own["way"].is_open, r.own["picked"]
+            record = self._shadow(r.own["shadow"], not is_open)
+            record["numbers"] = {
+                "light": picked.number,
+                "selection": picked.probability,
+                "light pdf": picked.light.pdf,
+            }
+            if is_open:
+                _add(record, "direct light", r.outer["throughput"] * r.result)
+
     def _cast(self, r: _Return) -> None:
         record = self._ray(CAMERA, None, r.own["ray"], _WHOLE, found=r.own["hit"])
         record["point"] = r.own.get("point")
@@ -358,11 +394,15 @@ def _described(record: RayRecord, scene: KernelScene) -> RayRecord:
     ray, hit = record.pop("ray"), record.pop("found", None)
     point = record.pop("point", None)
     is_hit = hit is not None and hit.kind >= 0
-    record |= {"o": ray.o, "d": ray.d, "t_max": ray.t_max, "hit": None, "t": None, "end": None}
+    way: dict[str, Any] = {"o": ray.o, "d": ray.d, "t_max": ray.t_max, "hit": None, "t": None}
+    record |= way | {"end": record.get("end")}
+    if record["end"] is not None:  # behind boundaries without a surface
+        record["t"] = length(record["end"] - ray.o)
     if is_hit:
         ids = geometries.owner(scene.geometry, hit)._asdict()
         record["hit"] = ids | {"material": point.material, "p": point.p, "n": point.n}
-        record["t"], record["end"] = hit.t, point.p
+        if record["end"] is None:
+            record["t"], record["end"] = hit.t, point.p
     elif record["kind"] == SHADOW and ray.t_max < math.inf:
         record["end"] = at(ray, ray.t_max)
     return record | _met(ray, record["kind"] == SHADOW, scene)

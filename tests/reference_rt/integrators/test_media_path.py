@@ -69,21 +69,28 @@ def optical_depth(scene, o, d):
     return depth
 
 
-@pytest.mark.parametrize("hierarchy", ["none", "sah"])
+@pytest.mark.parametrize("way", ["none", "sah", "copies"])
 @pytest.mark.parametrize("mirrored", [False, True])
-def test_absorption_in_every_closed_shape(hierarchy, mirrored):
-    """Beer and Lambert's law, without noise, along the crossings of each ray."""
+def test_absorption_in_every_closed_shape(way, mirrored):
+    """Beer and Lambert's law, without noise, along the crossings of each ray: of shapes themselves,
+    and of instances of groups that have one each."""
     rng = np.random.default_rng(11)
-    shapes, centres = [], 9.0 * np.arange(len(CLOSED))
+    shapes, groups, centres = [], {}, 9.0 * np.arange(len(CLOSED))
     for k, shape in enumerate(CLOSED.values()):
         flip = rt.transform.Scale(scale=(-1.0 if mirrored else 1.0, 1.0, 1.0))
-        shapes.append(filled(shape, k, flip, *placed(rng, 1.2, 0.2), at(float(centres[k]))))
+        steps = (flip, *placed(rng, 1.2, 0.2), at(float(centres[k])))
+        if way == "copies":
+            groups[f"group {k}"] = (filled(shape, k),)
+            shapes.append(rt.Instance(group=f"group {k}", transform=steps))
+        else:
+            shapes.append(filled(shape, k, *steps))
     scene = rt.Scene(
         materials=EDGE,
         media=inks(len(shapes)),
         shapes=tuple(shapes),
+        groups=groups,
         lights=(SKY,),
-        hierarchy=hierarchy,
+        hierarchy="auto" if way == "copies" else way,
     )
     targets = np.repeat(centres, 40)[:, None] * [1.0, 0.0, 0.0] + 0.5 * rng.normal(size=(360, 3))
     o = targets + 60.0 * unit_vectors(rng, len(targets))
@@ -332,3 +339,20 @@ def test_a_derivative_by_the_medium():
         found = rt.derivative(scene, path)
         # Richardson's two steps leave a few 1e-7 of such a smooth function.
         np.testing.assert_allclose(found.picture, expected, rtol=1e-4)
+
+
+def test_a_thin_medium_without_end():
+    """A path may fly beyond what can be squared: no light comes from there, and no NaN."""
+    haze = rt.Homogeneous(sigma_t=(1e-300, 1e-200, 1e-9), albedo=1.0)
+    camera = rt.Perspective(eye=(0, 0, 4), target=(0, 0, 0), medium="haze")
+    scene = seen(
+        rt.Sphere(),
+        media={"haze": haze},
+        camera=camera,
+        lights=(rt.Point(position=(3, 4, 5), intensity=50),),
+    )
+    colour = rt.render(scene).colour
+    assert np.isfinite(colour).all()
+    clear = rt.render(scene.changed(media={"haze": haze.model_copy(update={"scale": 0.0})})).colour
+    # What scatters within the scene's 10 units is 1e-8 of the light.
+    np.testing.assert_allclose(colour[8, 8], clear[8, 8], rtol=1e-5)

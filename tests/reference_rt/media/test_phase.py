@@ -19,7 +19,9 @@ PHASES = {
     "narrow": rt.HenyeyGreenstein(g=0.98),
     "back": rt.HenyeyGreenstein(g=-0.95),
     "first alone": rt.BlendPhase(first=rt.Rayleigh(), second=rt.HenyeyGreenstein(g=0.9), weight=0),
-    "second alone": rt.BlendPhase(first=rt.Rayleigh(), second=rt.HenyeyGreenstein(g=-0.9), weight=1),
+    "second alone": rt.BlendPhase(
+        first=rt.Rayleigh(), second=rt.HenyeyGreenstein(g=-0.9), weight=1
+    ),
 }
 
 

@@ -32,6 +32,30 @@ def cornell_box(folder):
     return rt.Scene.load(SCENES / "cornell_box.yaml").changed(film=SMALL)
 
 
+def fog(folder):
+    """A lamp in a coloured cloud over a floor, and glass with something in it."""
+    return rt.Scene(
+        camera=rt.Perspective(eye=(0, 1, 5), target=(0, 0, 0), fov=40),
+        film=SMALL,
+        sampler=rt.Sobol(spp=4),
+        media={
+            "fog": rt.Homogeneous(sigma_t=(0.5, 1.0, 2.0), albedo=0.9),
+            "ink": rt.Homogeneous(sigma_t=(0.5, 0.1, 2.0), albedo=0.0),
+        },
+        materials={
+            "edge": rt.NoSurface(),
+            "glass": rt.Dielectric(),
+            "lamp": rt.Emissive(radiance=(9, 8, 7)),
+        },
+        shapes=(
+            rt.Sphere(radius=1.4, material="edge", interior="fog"),
+            rt.Sphere(radius=0.2, center=(0.4, 0.3, 0.5), material="lamp"),
+            rt.Box(material="glass", interior="ink", exterior="fog", transform=({"scale": 0.5},)),
+            rt.Rectangle(transform=({"scale": 9},)),
+        ),
+    )
+
+
 WHITTED = {"integrator": rt.Whitted(), "sampler": rt.Grid(spp=4)}
 HIDDEN = {"integrator": rt.Path(hide_emitters=True, rr_depth=1, sampling="bsdf")}
 CASES = {
@@ -49,6 +73,8 @@ CASES = {
         cornell_box,
         {"film": rt.Film(width=6, height=4, filter=rt.LanczosFilter())},
     ),
+    "fog, path": (fog, {}),
+    "fog, roulette at once": (fog, {"integrator": rt.Path(rr_depth=1, hide_emitters=True)}),
     "cornell box, direct": (cornell_box, {"integrator": rt.Direct(hide_emitters=True)}),
 }
 
