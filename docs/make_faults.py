@@ -2,10 +2,12 @@
 
 Each fault changes the scene of every case, or its picture, as a wrong renderer or a wrong export
 would. `reference_rt` renders the scene with its own samples, and the case judges the picture.
-NAME: cases, areas or patterns, as for `reference-rt truth`. (default: all)
+NAME: cases, areas or patterns, as for `reference-rt truth`; what the page has of others is kept.
+(default: all)
 """
 
 import json
+import re
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -18,7 +20,7 @@ from docs_pages import DOCS
 from comparisons.report.table import table_of
 from comparisons.report.templates import check, rewrite
 from comparisons.runs.provenance import ours as provenance
-from comparisons.truth.case import AREAS, Case, chosen
+from comparisons.truth.case import AREAS, Case, cases, chosen
 from comparisons.truth.judge import judge
 from comparisons.truth.renderers import ours
 from reference_rt import Scene
@@ -68,9 +70,9 @@ def turned(scene: Any) -> Any:
         s | {"transform": [about, *s.get("transform", [])]}
         if s["type"] in ("rectangle", "disk")
         else s
-        for s in scene["shapes"]
+        for s in scene.get("shapes", [])
     ]
-    return scene | {"shapes": shapes}
+    return scene | {"shapes": shapes} if shapes else scene
 
 
 OF_SCENES: dict[str, Callable[[Any], Any]] = {
@@ -146,18 +148,30 @@ def tables(matrix: Mapping[Case, list[str]]) -> list[str]:
     return [*lines, "```"]
 
 
+def on_page(text: str) -> tuple[dict[str, list[str]], list[str]]:
+    """The signs of each case that a page has, and its lines about who measured them."""
+    signs = f"[{SEEN}{MISSED}{ABSENT}]"
+    rows = re.findall(rf"^(\w+) +((?:{signs} *)+)$", text, re.MULTILINE)
+    lines = re.findall(r"^`python docs/make_faults\.py.*CPU seconds\.$", text, re.MULTILINE)
+    return {name: row.split() for name, row in rows}, lines
+
+
 def main() -> None:
     """Measure, and write the tables."""
     check(PAGE, "faults")
-    begun, matrix = time.process_time(), {}
+    begun, measured = time.process_time(), {}
     for case in chosen(sys.argv[1:]):
-        matrix[case] = signs(case)
-        print(case.name, *matrix[case], flush=True)
+        measured[case] = signs(case)
+        print(case.name, *measured[case], flush=True)
+    there, lines = on_page(read_text(PAGE))
+    known = {case: measured.get(case, there.get(case.name)) for case in cases().values()}
+    matrix = {case: row for case, row in known.items() if row}
     facts, seconds = provenance(), time.process_time() - begun
     where = f"{facts['machine']}, {facts['cores']} cores, {facts['date'][:10]}"
     command = " ".join(["python docs/make_faults.py", *sys.argv[1:]])
     where = f"`{command}`; {where}, {seconds:.0f} CPU seconds."
-    rewrite(PAGE, "faults", "\n".join([*tables(matrix), "", where, ""]))
+    lines = [*lines, where] if set(matrix) > set(measured) else [where]
+    rewrite(PAGE, "faults", "\n".join([*tables(matrix), "", *lines, ""]))
 
 
 if __name__ == "__main__":
