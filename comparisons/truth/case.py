@@ -21,6 +21,9 @@ AREAS = {
     "whitted": "recursive ray tracing",
     "solids": "solids, instances, meshes",
     "signal": "signal",
+    "media": "media",
+    "scattering": "scattering",
+    "atmospheres": "half spaces and slabs",
 }
 """The areas: the module of each, and its title."""
 

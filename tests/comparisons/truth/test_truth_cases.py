@@ -41,7 +41,12 @@ def test_formulas_can_be_typeset_and_read_without():
 
 
 def test_formulas_share_nothing_with_renderers():
-    own = ("comparisons.truth.case", "comparisons.truth.film", "comparisons.truth.optics")
+    own = (
+        "comparisons.truth.case",
+        "comparisons.truth.film",
+        "comparisons.truth.optics",
+        "comparisons.truth.scattering",
+    )
     allowed = (*own, "comparisons.truth.areas", "numpy", "scipy", "collections", "typing",
                "itertools", "dataclasses",
                "functools", "fnmatch", "importlib")  # fmt: skip
