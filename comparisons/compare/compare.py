@@ -297,7 +297,7 @@ def _deterministic_rungs(
             rung = RungResult(name, "not-applicable", f"the {broken.name} rung below is broken")
         elif of_light and isinstance(scene.integrator, RayCast):
             rung = RungResult(name, "not-applicable", _NO_LIGHT)
-        elif name in ("direct", "transport", "whitted") and scene.has_media:
+        elif of_light and scene.has_media:
             rung = RungResult(name, "not-applicable", _MEDIA)
         elif of_light and counterpart.no_light_reason:
             rung = RungResult(name, "not-comparable", counterpart.no_light_reason)

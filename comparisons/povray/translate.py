@@ -23,9 +23,9 @@ from comparisons.integrators import type_of as type_of_integrator
 from comparisons.lights import type_of as type_of_light
 from comparisons.lights.constant import ambient_of
 from comparisons.materials import type_of as type_of_material
+from comparisons.media import refuse_media
 from comparisons.povray.inside import region_at, region_of
 from comparisons.referee.sizes import ShapeSizes
-from comparisons.media import refuse_media
 from comparisons.renderers import NoCounterpartError, Reasons
 from comparisons.renderers.vocabulary import PovLook, pov_vector
 from comparisons.textures import type_of as type_of_texture

@@ -18,11 +18,11 @@ class Site(NamedTuple):
 
     place: the maps of its solid and its instance, applied after its own transform;  parts: the
     BSDF, the emitter, if it is emissive, and the media that it bounds;  coloured: the same for a
-    mesh with vertex colours;  textured: whether the material depends on uv or tangents;  oriented: on tangents;  material: its
-    name;  copies: the number of copies of the leaf;  shared: data shared by the leaves of one
-    scene, by key (a group, the triangles of a file);  reach: about the largest coordinate of the
-    scene;  native: whether Mitsuba's own materials are used;  media: the names of the media inside
-    and outside.
+    mesh with vertex colours;  textured: whether the material depends on uv or tangents;  oriented:
+    on tangents;  material: its name;  copies: the number of copies of the leaf;  shared: data
+    shared by the leaves of one scene, by key (a group, the triangles of a file);  reach: about the
+    largest coordinate of the scene;  native: whether Mitsuba's own materials are used;  media: the
+    names of the media inside and outside.
     """
 
     place: TabulationContext

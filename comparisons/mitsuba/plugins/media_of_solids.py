@@ -5,10 +5,11 @@ Mitsuba's `volpathmis` traces Mitsuba's scene, in which there are no solids, and
 pass masks and thin panes.  This one traces a `LitScene`, and takes all else from Mitsuba: the
 camera, random numbers, BSDFs, emitters, phase functions and coefficients.
 
-At each flight a colour is chosen again, and the flight is weighted by the mean of the three
-colours' densities: another estimator than that of `reference_rt.integrators.media_path`, and than
-Mitsuba's, which keep a colour along the whole path.  Samples of lights and those of BSDFs and phase
-functions are combined by the power heuristic of their densities of directions alone.
+A path flies by the density of one colour, and is weighted by the mean of the densities that the
+three colours have for all its flights together.  (Choosing a colour anew for each flight is as
+right, but its weights multiply: in milk the variance has no end.)  Samples of lights and those of
+BSDFs and phase functions are combined by the power heuristic of their densities of directions
+alone, in which no flight counts: another one than that of `reference_rt.integrators.media_path`.
 """
 
 from collections.abc import Callable
@@ -91,18 +92,28 @@ def register(mi: Any) -> None:
             before, pdf, depth = dr.zeros(mi.Interaction3f), mi.Float(0.0), mi.UInt32(0)
             valid, black = mi.Mask(False), mi.Color3f(0.0)
             active &= self.max_depth > 0
+            # The densities of all flights so far, in each colour, over that in the path's own.
+            ratio, u_colour = mi.Color3f(1.0), sampler.next_1d(active)
+            own = mi.Color3f(
+                dr.select(u_colour < 1.0 / 3.0, 1.0, 0.0),
+                dr.select((u_colour >= 1.0 / 3.0) & (u_colour < 2.0 / 3.0), 1.0, 0.0),
+                dr.select(u_colour >= 2.0 / 3.0, 1.0, 0.0),
+            )
             while dr.any(active):
                 si, of_solid = lit.trace(ray, active)
                 hidden = mi.Mask(self.hides) & (depth == 0)
-                mei, is_inside, passed = self.flight(sampler, ray, si.t, medium, active)
+                flown = self.flight(sampler, ray, si.t, medium, own, active)
+                mei, is_inside, passed, density = flown
                 throughput *= dr.select(active, passed, 1.0)
+                ratio *= dr.select(active, density, 1.0)
+                shared = dr.rcp(dr.mean(ratio))
                 # Emission; density 0: the ray is the camera's, or of a delta lobe.
                 arrives = active & ~is_inside
                 competes = arrives & (pdf > 0.0) & ~of_solid
                 of_light = mi.DirectionSample3f(scene, si, before)
                 light_pdf = scene.pdf_emitter_direction(before, of_light, competes)
                 share = dr.select(competes, weight(pdf, light_pdf), 1.0)
-                emitted = throughput * share * lit.emitted(si, arrives)
+                emitted = throughput * shared * share * lit.emitted(si, arrives)
                 total += dr.select(arrives & ~hidden, emitted, black)
                 active &= is_inside | si.is_valid()
                 valid |= active
@@ -119,7 +130,7 @@ def register(mi: Any) -> None:
                 here = Here(self.place(si, mei, is_inside), si, mei, medium, is_inside)
                 on_surface = scatters & ~is_inside
                 lit_by = self.next_event(lit, sampler, here, scatters)
-                total += dr.select(scatters, throughput * lit_by, black)
+                total += dr.select(scatters, throughput * shared * lit_by, black)
 
                 u, uv = sampler.next_1d(active), sampler.next_2d(active)
                 drawn, value = si.bsdf().sample(mi.BSDFContext(), si, u, uv, on_surface)
@@ -142,39 +153,40 @@ def register(mi: Any) -> None:
                     setattr(before, name, dr.select(scatters, now, was))
                 active &= dr.max(throughput) > 0.0
                 ending = active & scatters & (depth >= self.rr_depth)
-                survival = dr.minimum(dr.max(throughput) * dr.square(eta), SURVIVAL)
+                survival = dr.max(throughput) * shared * dr.square(eta)
+                survival = dr.minimum(survival, SURVIVAL)
                 goes_on = sampler.next_1d(active) < survival
                 active &= ~ending | goes_on
                 throughput *= dr.select(ending, dr.rcp(survival), 1.0)
                 sampler.schedule_state()
-                dr.eval(ray, active, total, throughput, eta, pdf, before, medium, depth, valid)
+                dr.eval(
+                    ray, active, total, throughput, ratio, eta, pdf, before, medium, depth, valid
+                )
             return total, valid, []
 
         def flight(
-            self, sampler: Any, ray: Any, end: Any, medium: Any, active: Any
-        ) -> tuple[Any, Any, Any]:
-            """Where rays scatter before the distance `end`: the interaction, whether they do, and
-            the factor on their light."""
+            self, sampler: Any, ray: Any, end: Any, medium: Any, own: Any, active: Any
+        ) -> tuple[Any, Any, Any, Any]:
+            """Where rays scatter before the distance `end`: the interaction, whether they do, the
+            factor on their light over the density of the path's own colour (1 there, else 0), and
+            the densities of all over that."""
             mei = dr.zeros(mi.MediumInteraction3f, dr.width(ray))
             mei.wi, mei.sh_frame = -ray.d, mi.Frame3f(-ray.d)
             mei.time, mei.wavelengths, mei.medium = ray.time, ray.wavelengths, medium
             sigma_s, sigma_t = coefficients(mei, medium, active)
             sampled = dr.select(dr.max(sigma_s) > 0.0, sigma_t, 0.0)
-            u_colour, u = sampler.next_1d(active), sampler.next_1d(active)
-            chosen = dr.select(
-                u_colour < 1.0 / 3.0,
-                sampled.x,
-                dr.select(u_colour < 2.0 / 3.0, sampled.y, sampled.z),
-            )
+            chosen = dr.sum(own * sampled)
+            u = sampler.next_1d(active)
             free = dr.select(chosen > 0.0, -dr.log(1.0 - u) / chosen, dr.inf)
             inside = active & (free < end)
             t = dr.select(inside, free, end)
             density = left(sampled, t) * dr.select(inside, sampled, 1.0)
             passed = left(sigma_t, t) * dr.select(inside, sigma_s, 1.0)
+            of_own = dr.sum(own * density)
+            over = dr.select(of_own > 0.0, dr.rcp(of_own), 0.0)
             mei.t = dr.select(inside, t, dr.inf)
             mei.p = dr.select(inside, ray(t), 0.0)
-            mean = dr.mean(density)  # 0 on an endless way, of which nothing is left
-            return mei, inside, dr.select(mean > 0.0, passed / mean, 0.0)
+            return mei, inside, passed * over, dr.select(of_own > 0.0, density * over, 1.0)
 
         def place(self, si: Any, mei: Any, is_inside: Any) -> Any:
             """Points of surfaces and of media as one interaction; those of media have no normal."""
@@ -219,7 +231,6 @@ def register(mi: Any) -> None:
             while dr.any(going):
                 to_lamp, away = at.spawn_ray_to(drawn.p), at.spawn_ray(drawn.d)
                 ray = dr.select(distant, away, to_lamp)
-                ray.d = drawn.d  # the direction to the lamp's point from here is rounded
                 si, _ = lit.trace(ray, going)
                 met = going & si.is_valid()
                 # Mitsuba's shadow rays end short of the lamp, but the medium does not.
