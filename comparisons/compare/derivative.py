@@ -287,7 +287,8 @@ def judged(
     found = replace(found, name="derivative")
     if found.status == "agree" and seen > limit:
         reason = f"what the step adds is not known better than to {seen:.2%}; {found.reason}"
-        return replace(found, status="inconclusive", reason=reason)
+        numbers = found.numbers | {"step_adds": seen}
+        return replace(found, status="inconclusive", reason=reason, numbers=numbers)
     return found
 
 

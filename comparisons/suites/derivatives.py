@@ -1,7 +1,7 @@
 """The suite of derivatives: parameters of scenes, each by several of Mitsuba's integrators."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from importlib import resources
 from pathlib import Path
@@ -82,37 +82,55 @@ def plain(text: str) -> str:
     return re.sub(r"[^\w]+", ".", text).strip(".")
 
 
-def table(cases: Sequence[Case]) -> Table[Case]:
-    """A row for each case: the verdict, the bias of the channel that is farthest off, and the
-    seconds in which Mitsuba's noise falls to a percent of the derivative's size in the image
-    mean."""
-    columns: tuple[Column[Case], ...] = (
-        Column("parameter and integrator", lambda case: case.scene),
-        Column("verdict", lambda case: case.verdict),
-        Column("likeliest cause", lambda case: "" if case.cause is None else case.cause.name),
-        Column("bias of the image mean", _bias),
-        Column("seconds to 1 %", _seconds, lambda x: "" if x is None else f"{x:.2g}", right=True),
-    )
-    return Table(columns, list(cases))
+def table(planned: Plan, cases: Sequence[Case]) -> Table[tuple[str, str]]:
+    """A row for each parameter of a scene, and a column for each integrator."""
+    verdicts = {case.scene: verdict_on(case) for case in cases}
+    cells: dict[tuple[str, str], dict[str, str]] = {}
+    integrators: dict[str, None] = {}
+    for work in planned.work:
+        asked = work.budget.derivative
+        assert asked is not None
+        by = Differentiator(asked.integrator, asked.guiding).words
+        integrators[by] = None
+        row = cells.setdefault((work.path.stem, asked.parameter), {})
+        row[by] = verdicts.get(work.name, "not run")
+
+    def column(by: str) -> Column[tuple[str, str]]:
+        return Column(by, lambda row: cells[row].get(by, ""))
+
+    scene: Column[tuple[str, str]] = Column("scene", lambda row: row[0])
+    moved: Column[tuple[str, str]] = Column("parameter", lambda row: f"`{row[1]}`")
+    return Table([scene, moved, *map(column, integrators)], list(cells))
 
 
-def _numbers(case: Case) -> dict[str, Any]:
-    return next((rung.numbers for rung in case.rungs if rung.name == "derivative"), {})
+def verdict_on(case: Case) -> str:
+    """A cell of the table: the verdict; of a difference the cause, or else the bias of the channel
+    that is farthest off; where noise hides the answer, the factor of samples that would decide it;
+    and the seconds in which Mitsuba's noise falls to a percent of the derivative's size."""
+    numbers = next((rung.numbers for rung in case.rungs if rung.name == "derivative"), {})
+    if case.verdict == "not-comparable":
+        return "refused"
+    if case.verdict == "inconclusive":
+        if (added := numbers.get("step_adds")) is not None:
+            return f"our step adds up to {percent(added)}"
+        factor = numbers.get("samples_factor")
+        return f"too noisy: x {factor:.2g}" if factor else "too noisy: x ?"
+    told = {"agree": "agrees", "differ": "differs"}.get(case.verdict, case.verdict)
+    if case.verdict == "differ":
+        told = f"{told}: {_bias(numbers) if case.cause is None else case.cause.name}"
+    error, taken = numbers.get("candidate_error"), case.seconds.get("candidate", {}).get("render")
+    if error is None or taken is None:
+        return told
+    return f"{told} ({taken * (error / 0.01) ** 2:.2g} s)"
 
 
-def _bias(case: Case) -> str:
-    """Of the channel farthest from 0, with its interval, or why there is none."""
-    numbers = _numbers(case)
-    found, width = (numbers.get(key) or {} for key in ("relative_bias", "half_width_of_bias"))
+def _bias(numbers: Mapping[str, Any]) -> str:
+    """Of the channel farthest from 0, with its interval."""
+    image = numbers.get("image") or {}
+    found, width = (image.get(key) or {} for key in ("relative_bias", "half_width_of_bias"))
     known = {channel: value for channel, value in found.items() if value is not None}
     if not known:
-        return case.rungs[0].reason if case.verdict == "not-comparable" else ""
+        return "no channel changes on one side"
     channel = max(known, key=lambda c: abs(known[c]))
     half = width.get(channel)
     return f"{channel} {100.0 * known[channel]:+.3g}" + (f" ± {percent(half)}" if half else " %")
-
-
-def _seconds(case: Case) -> float | None:
-    error = _numbers(case).get("candidate_error")
-    taken = case.seconds.get("candidate", {}).get("render")
-    return None if error is None or taken is None else taken * (error / 0.01) ** 2
