@@ -142,10 +142,12 @@ def pilot(side: Side, seconds: float, seed: int) -> tuple[float, float, float]:
     return float(np.var(values, ddof=1)) * spp, spent / spp, float(np.mean(values))
 
 
-def measured(name: str, seconds: float) -> dict[str, Any]:
-    """A row of the store."""
+def measured(name: str, seconds: float, last: dict[str, Any]) -> dict[str, Any]:
+    """A row of the store.  last: the one that was not enough, whose noise is better known than a
+    pilot's; {} for none."""
     scene = Scene.load(SCENES / f"{name}.yaml")
-    own = FIRST_SEED + (zlib.crc32(name.encode()) << 12)  # so that scenes have unrelated noise
+    # So that scenes have unrelated noise, and each look at one.
+    own = FIRST_SEED + (zlib.crc32(f"{name} {seconds:g}".encode()) << 12)
     if scene.tables.lights.choice is None:
         return {"scene": name, "refused": "no lamp"}
     try:
@@ -256,7 +258,7 @@ def main() -> None:
         if "refused" in last or is_within(last):
             continue
         if max(last["needed"], 2.0 * last.get("asked", 0.0)) <= asked.seconds:
-            rows[name] = measured(name, asked.seconds)
+            rows[name] = measured(name, asked.seconds, last)
             print(json.dumps(rows[name]), flush=True)
             with asked.store.open("a") as file:
                 file.write(json.dumps(rows[name]) + "\n")

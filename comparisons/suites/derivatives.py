@@ -1,17 +1,17 @@
 """The suite of derivatives: parameters of scenes, each by several of Mitsuba's integrators."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field
 
 from comparisons.compare.budget import Asked, Budget, PixelSize, Seconds, usual
 from comparisons.report.table import Column, Table
-from comparisons.results.case import Case
+from comparisons.results.case import Case, RungResult
 from comparisons.statistics.wording import percent
 from comparisons.suites.suite import Changes, Plan, Work, read
 from comparisons.translator.derivative import Differentiator
@@ -104,33 +104,40 @@ def table(planned: Plan, cases: Sequence[Case]) -> Table[tuple[str, str]]:
 
 
 def verdict_on(case: Case) -> str:
-    """A cell of the table: the verdict; of a difference the cause, or else the bias of the channel
-    that is farthest off; where noise hides the answer, the factor of samples that would decide it;
-    and the seconds in which Mitsuba's noise falls to a percent of the derivative's size."""
-    numbers = next((rung.numbers for rung in case.rungs if rung.name == "derivative"), {})
+    """A cell of the table: the verdict; of a difference the cause, or else what differs; where
+    noise hides the answer, the factor of samples that would decide it; of what is right the seconds
+    in which Mitsuba's noise falls to a percent of the derivative's size."""
+    rungs = {rung.name: rung for rung in case.rungs}
+    found = rungs["derivative"]
     if case.verdict == "not-comparable":
         return "refused"
     if case.verdict == "inconclusive":
-        if (added := numbers.get("step_adds")) is not None:
+        if (added := found.numbers.get("step_adds")) is not None:
             return f"our step adds up to {percent(added)}"
-        factor = numbers.get("samples_factor")
+        factor = found.numbers.get("samples_factor")
         return f"too noisy: x {factor:.2g}" if factor else "too noisy: x ?"
     told = {"agree": "agrees", "differ": "differs"}.get(case.verdict, case.verdict)
-    if case.verdict == "differ":
-        told = f"{told}: {_bias(numbers) if case.cause is None else case.cause.name}"
-    error, taken = numbers.get("candidate_error"), case.seconds.get("candidate", {}).get("render")
-    if error is None or taken is None:
+    if case.cause is not None:
+        told = f"{told}: {case.cause.name}"
+    elif "adjoint" in rungs and rungs["adjoint"].status == "differ":
+        told = f"{told}: forward and reverse mode"
+    elif case.verdict == "differ":
+        told = f"{told}: {_difference(found)}"
+    error = found.numbers.get("candidate_error")
+    taken = case.seconds.get("candidate", {}).get("render")
+    if error is None or taken is None or case.verdict != "agree":
         return told
     return f"{told} ({taken * (error / 0.01) ** 2:.2g} s)"
 
 
-def _bias(numbers: Mapping[str, Any]) -> str:
-    """Of the channel farthest from 0, with its interval."""
-    image = numbers.get("image") or {}
-    found, width = (image.get(key) or {} for key in ("relative_bias", "half_width_of_bias"))
-    known = {channel: value for channel, value in found.items() if value is not None}
-    if not known:
-        return "no channel changes on one side"
+def _difference(found: RungResult) -> str:
+    """The bias of the channel that is farthest off, with its interval, where the image mean
+    differs; else where it is seen."""
+    image = found.numbers.get("image") or {}
+    if not image.get("differs"):
+        return found.reason.partition(",")[0].partition(";")[0]
+    biases, widths = (image.get(key) or {} for key in ("relative_bias", "half_width_of_bias"))
+    known = {channel: value for channel, value in biases.items() if value is not None}
     channel = max(known, key=lambda c: abs(known[c]))
-    half = width.get(channel)
+    half = widths.get(channel)
     return f"{channel} {100.0 * known[channel]:+.3g}" + (f" ± {percent(half)}" if half else " %")
