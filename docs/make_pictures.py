@@ -50,6 +50,14 @@ SAMPLES = 128
 """Least samples per pixel of pictures with noise."""
 
 GROUPS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
+    (
+        "Media",
+        "What fills the space between surfaces: fog, smoke, milk and coloured glass.",
+        (
+            *("absorbing_glass", "cloud_of_instances", "coloured_fog", "csg_smoke", "fog"),
+            *("milk_glass", "nested_media"),
+        ),
+    ),
     ("Solids", "Set operations on shapes: union, intersection, difference.", ("csg_",)),
     ("Materials", "One material each, on the same shapes.", ("material_", "texture")),
     ("Lights", "", ("light_", "environment", "many_lights", "soft_shadows", "tilted_lamps")),

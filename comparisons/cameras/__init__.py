@@ -14,6 +14,7 @@ from comparisons.cameras.perspective import PERSPECTIVE
 from comparisons.cameras.pinhole import PINHOLE
 from comparisons.cameras.samplers import read_sampler
 from comparisons.cameras.thin_lens import THIN_LENS
+from comparisons.media import medium_of_sensor
 from comparisons.mitsuba.context import TranslationContext, UntranslatableError
 from comparisons.mitsuba.node import Node, Reading
 from reference_rt.cameras import AnyCamera, Perspective
@@ -63,8 +64,7 @@ def read_sensor(reading: Reading, node: Node | None) -> View:
     if node.plugin not in _BY_PLUGIN:
         why = _NO_CAMERAS.get(node.plugin, "")
         raise node.unsupported(f"{why}expected one of: {', '.join(sorted(_BY_PLUGIN))}")
-    for medium in node.children("Medium"):
-        raise medium.unsupported("expected a scene without media")
+    medium = medium_of_sensor(reading, node)
     # The shutter has no effect: nothing moves.
     node.ignore("shutter_open", "shutter_close")
     frame, film = read_film(reading, node.only("Film"))
@@ -72,4 +72,6 @@ def read_sensor(reading: Reading, node: Node | None) -> View:
     with node.checking():
         camera = _BY_PLUGIN[node.plugin](reading, node, frame)
     node.finish()
+    if medium:
+        camera = camera.model_copy(update=medium)
     return View(camera, film, sampler)

@@ -42,6 +42,8 @@ __all__ = ["Evidence", "Say", "Subject", "budgeted", "compare_scene", "gather"]
 
 _NO_LIGHT = "ray casting shows surfaces, not light"
 
+_MEDIA = "path tracing alone follows light through media, and what is no surface"
+
 Say = Callable[[str], None]
 """Called with a line of text about each step."""
 
@@ -295,6 +297,8 @@ def _deterministic_rungs(
             rung = RungResult(name, "not-applicable", f"the {broken.name} rung below is broken")
         elif of_light and isinstance(scene.integrator, RayCast):
             rung = RungResult(name, "not-applicable", _NO_LIGHT)
+        elif of_light and scene.has_media:
+            rung = RungResult(name, "not-applicable", _MEDIA)
         elif of_light and counterpart.no_light_reason:
             rung = RungResult(name, "not-comparable", counterpart.no_light_reason)
         else:

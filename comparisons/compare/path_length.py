@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.diagnosis.misfit import REST
+from comparisons.compare.media_mistakes import media_mistakes
 from comparisons.compare.mistaken_paths import mistaken_paths
 from comparisons.results.case import FloatArray
 from reference_rt.integrators import Path
@@ -50,7 +51,8 @@ def path_lengths(scene: Scene, threads: int | None = None) -> Lengths | None:
             other = "without a limit" if length is None else f"with max_depth {length}"
             evidence = f"so does our picture change if rendered {other}; the scene has {had}"
             yield Hypothesis("path length", name, evidence, reference + change, 0, REST)
-        yield from mistaken_paths(scene, reference, threads)
+        mistakes = media_mistakes if scene.has_media else mistaken_paths
+        yield from mistakes(scene, reference, threads)
 
     return hypotheses
 

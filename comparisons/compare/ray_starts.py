@@ -60,8 +60,9 @@ Say = Callable[[str], None]
 
 
 def may_matter(scene: Scene, counterpart: Counterpart) -> bool:
-    """Whether paths are long enough in glass, and Mitsuba traces many rays at a time."""
-    if not isinstance(scene.integrator, Path) or not is_wide(mitsuba()):
+    """Whether paths are long enough in glass, and Mitsuba traces many rays at a time; none of the
+    integrators that start rays close to a surface follow media."""
+    if not isinstance(scene.integrator, Path) or not is_wide(mitsuba()) or scene.has_media:
         return False
     depth = scene.integrator.max_depth
     glass = any(isinstance(m, Dielectric | RoughDielectric) for m in scene.materials.values())

@@ -25,6 +25,7 @@ from comparisons.geometry.frame import SHARE, round32
 from comparisons.integrators import type_of as type_of_integrator
 from comparisons.lights import type_of as type_of_light
 from comparisons.materials import type_of as type_of_material
+from comparisons.media import refuse_media
 from comparisons.renderers import NoCounterpartError, Reasons
 from comparisons.renderers.vocabulary import Data, plain_rgb
 from comparisons.shapes.soup import Soup
@@ -109,6 +110,8 @@ def write(scene: Scene, folder: Path, threads: int | None = None) -> None:
             isinstance(m, rt.Mirror | rt.Conductor) for m in scene.materials.values()
         ):
             raise NoCounterpartError(f"mirrors along paths of more than {MOST_MIRRORINGS} edges")
+    with writing.reasons.collected():
+        refuse_media(scene)
     with writing.reasons.collected():
         found["camera"] = camera_of(scene.camera, scene.film)
     for light in scene.lights:

@@ -21,12 +21,15 @@ from reference_rt.shapes.shape import Shape, TabulationContext
 class Leaf(NamedTuple):
     """A primitive shape: its description;  outer: the map applied after its own transform;  the
     name of its material;  part: its number in its solid, or in its group, where the operands of
-    solids count one by one."""
+    solids count one by one;  interior, exterior: the names of the media that it bounds, or that its
+    solid does."""
 
     shape: Shape
     outer: Affine
     material: str | None
     part: int
+    interior: str | None = None
+    exterior: str | None = None
 
 
 class Tree(NamedTuple):
@@ -114,12 +117,17 @@ def maps_of(instance: Instance, folder: Path) -> list[Affine]:
 def member_of(shape: Shape, number: int) -> Member:
     """The member for a shape that is no instance;  number: of its first leaf in its group."""
     if not isinstance(shape, Solid):
-        leaf = Leaf(shape, affine.IDENTITY, shape.material, number)
+        sides = shape.interior, shape.exterior
+        leaf = Leaf(shape, affine.IDENTITY, shape.material, number, *sides)
         return Member((leaf,), None)
     leaves: list[Leaf] = []
     tree = _tree(shape, affine.IDENTITY, None, leaves)
     assert isinstance(tree, Tree)
-    return Member(tuple(leaf._replace(part=number + leaf.part) for leaf in leaves), tree)
+    inner, outer = shape.interior, shape.exterior
+    placed = (
+        leaf._replace(part=number + leaf.part, interior=inner, exterior=outer) for leaf in leaves
+    )
+    return Member(tuple(placed), tree)
 
 
 def _tree(shape: Shape, outer: Affine, material: str | None, leaves: list[Leaf]) -> Tree | int:

@@ -107,6 +107,9 @@ class _Document(Surfaces):
                 self.light(light, k)
         with self.collected("camera"):
             self.camera()
+        with self.collected("media"):
+            if self.scene.media:
+                raise UnwritableError("media")
         for kind, distance in self.off.items():
             if distance > 0.0:
                 self.note(f"a shape '{kind}' is written as triangles, up to {distance:.1g} off it")

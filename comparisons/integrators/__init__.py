@@ -36,12 +36,13 @@ def type_of(integrator: Any) -> IntegratorType[Any]:
     return found
 
 
-def translate_integrator(integrator: Any) -> Data | None:
-    """An integrator's dict; None if there is no picture to compare.
+def translate_integrator(integrator: Any, has_media: bool = False) -> Data | None:
+    """An integrator's dict; None if there is no picture to compare.  has_media: of the scene.
 
     Raises UntranslatableError.
     """
-    to_mitsuba = type_of(integrator).to_mitsuba
+    of_type = type_of(integrator)
+    to_mitsuba = of_type.through_media if has_media else of_type.to_mitsuba
     return None if to_mitsuba is None else to_mitsuba(integrator)
 
 
@@ -65,6 +66,16 @@ def from_other_end(scene: SceneModel) -> Light | Path:
     if integrator.caustics_of_points and any(type_of_light(x).has_no_extent for x in scene.lights):
         raise NoCounterpartError("caustics of lamps without extent, which no path finds")
     return as_path(integrator)
+
+
+FOLLOWING_MEDIA = ("volpath", "volpathmis")
+"""Mitsuba's integrators that follow light through media."""
+
+
+def follows_media(node: Node) -> bool:
+    """Whether an integrator, or the one inside it, follows light through media."""
+    inside = node.clone().children("Integrator")
+    return node.plugin in FOLLOWING_MEDIA or any(map(follows_media, inside))
 
 
 def read_integrator(reading: Reading, node: Node | None) -> tuple[AnyIntegrator, tuple[str, ...]]:

@@ -30,6 +30,11 @@ class IntegratorType(Generic[I]):
     scenes with solids, with masks, and with hidden lamps.  Raises as `to_mitsuba` does."""
     from_mitsuba: Mapping[str, Callable[[Reading, Node], AnyIntegrator]]
     """By Mitsuba's plugin: the integrator of an element.  Raises SceneError."""
+    through_media: Callable[[I], Data] | None = None
+    """Its dictionary for a scene with media.  None: our description refuses them."""
+    media_of_solids: Callable[[I], Data] | None = None
+    """The same where `of_solids` would take its place: that of our plugin
+    `comparisons.mitsuba.plugins.media_of_solids`."""
     edges: Callable[[I], int | None] | None
     """The most edges of a path that it takes, None for no end: for renderers that know path tracing
     alone.  Raises NoCounterpartError for what they lack."""

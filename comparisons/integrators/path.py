@@ -1,4 +1,4 @@
-"""Path tracing: Mitsuba's `path`, and its `volpath` without media."""
+"""Path tracing: Mitsuba's `path`, and its `volpath` and `volpathmis`, which follow media."""
 
 from comparisons.integrators.integrator import Data, IntegratorType, hiding
 from comparisons.mitsuba.node import Node, Reading
@@ -31,15 +31,16 @@ def _from_mitsuba(reading: Reading, node: Node) -> Path:
     return Path(max_depth=None if depth < 0 else depth, rr_depth=min(roulette, MOST_ROULETTE))
 
 
-def _without_media(reading: Reading, node: Node) -> Path:
-    """`volpath` is `path` then, but that its shadow rays pass surfaces that bend none."""
+def _through_media(reading: Reading, node: Node) -> Path:
+    """`volpath` and `volpathmis`: without media they are `path`, but that their shadow rays pass
+    surfaces that bend none."""
     node.ignore("use_spectral_mis")
     found = _from_mitsuba(reading, node)
     for name, material in reading.materials.items():
         if isinstance(material, Mask | ThinDielectric):
             raise node.error(
                 f"its shadow rays pass the material '{name}', ours do not; expected the integrator "
-                "path, or a scene without mask, null and thindielectric"
+                "path, or a scene without mask and thindielectric"
             )
     return found
 
@@ -50,8 +51,10 @@ PATH = IntegratorType(
     of_solids=_of_solids,
     from_mitsuba={
         "path": _from_mitsuba,
-        "volpath": _without_media,
-        "volpathmis": _without_media,
+        "volpath": _through_media,
+        "volpathmis": _through_media,
     },
+    through_media=lambda integrator: {**translate_path(integrator), "type": "volpathmis"},
+    media_of_solids=lambda integrator: {**translate_path(integrator), "type": "media_of_solids"},
     edges=lambda integrator: integrator.max_depth,
 )

@@ -55,6 +55,7 @@ def read_light(reading: Reading, node: Node) -> None:
         known = ", ".join(sorted(_BY_PLUGIN))
         raise node.unsupported(f"expected one of: {known}, or area in shapes")
     node.ignore("sampling_weight")
+    node.children("Medium")  # of particles from it, which no integrator of ours follows in media
     with node.checking():
         light = _BY_PLUGIN[node.plugin](reading, node)
     node.finish()

@@ -14,6 +14,7 @@ def emission(reading: Reading, node: Node) -> Rgb | str:
     """The radiance of a shape's emitter.  Raises SceneError for all but `area`."""
     if not belongs_to_shape(node):
         raise node.unsupported("expected 'area', as the emitter of a shape")
+    node.children("Medium")  # of particles from it
     node.ignore("sampling_weight")  # which lights are sampled does not change the picture
     radiance = colour_or_texture(reading, node, "radiance", 1.0, "emission")
     node.finish()

@@ -15,6 +15,7 @@ from comparisons.materials.gltf_pbr import GLTF_PBR
 from comparisons.materials.mask import MASK
 from comparisons.materials.material import MaterialType
 from comparisons.materials.mirror import MIRROR
+from comparisons.materials.none import NO_SURFACE
 from comparisons.materials.normal_map import NORMAL_MAP
 from comparisons.materials.phong import PHONG
 from comparisons.materials.plastic import PLASTIC
@@ -31,7 +32,7 @@ from reference_rt.materials import Material
 MATERIALS = (
     *(DIFFUSE, MIRROR, CONDUCTOR, ROUGH_CONDUCTOR, DIELECTRIC, THIN_DIELECTRIC, ROUGH_DIELECTRIC),
     *(PLASTIC, ROUGH_PLASTIC, PRINCIPLED, PRINCIPLED_THIN, GLTF_PBR, PHONG, EMISSIVE),
-    *(MASK, BLEND, TWO_SIDED, BUMP, NORMAL_MAP),
+    *(NO_SURFACE, MASK, BLEND, TWO_SIDED, BUMP, NORMAL_MAP),
 )
 """All types of materials."""
 

@@ -1,4 +1,4 @@
-"""Masks; Mitsuba's plugin without a material, `null`, is a mask, too."""
+"""Masks, and surfaces that let all light pass."""
 
 from typing import Any
 
@@ -29,7 +29,8 @@ BLACK = "black"
 """The name of the material that scatters nothing."""
 
 
-def _null(reading: Reading, node: Node) -> Mask:
+def absent(reading: Reading) -> Mask:
+    """A surface that lets all light pass."""
     if "black" not in reading.names:
         name = reading.unused(BLACK, BLACK, reading.materials)
         reading.materials[name] = Diffuse(reflectance=(0.0, 0.0, 0.0))
@@ -47,7 +48,7 @@ MASK = MaterialType(
     description=Mask,
     table=TABLE,
     to_mitsuba=_to_mitsuba,
-    from_mitsuba={"mask": _from_mitsuba, "null": _null},
+    from_mitsuba={"mask": _from_mitsuba},
     note=lambda material, context: "shadow rays treat masks as opaque, in both renderers",
     errors=None,
     to_cycles=None,

@@ -16,6 +16,7 @@ from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray
 from reference_rt.core.exr import write_exr
 from reference_rt.materials.material import Material
+from reference_rt.media import AnyMedium
 from reference_rt.rendering.scene import Scene
 from reference_rt.textures import Texture
 
@@ -34,15 +35,16 @@ class UntranslatableError(NoCounterpartError):
 
 @dataclass(frozen=True)
 class TranslationContext:
-    """The context of a translation: the scene's materials and textures, by name; the folder of its
-    files;  has_colours: whether the material belongs to a mesh with vertex colours;  native: use
-    Mitsuba's own materials even where our plugins are more exact;  images: cache of Mitsuba's
-    bitmaps;  files: those of the scene file that is written, None in memory;  notes: what the
-    reader of that file should know."""
+    """The context of a translation: the scene's materials, textures and media, by name; the folder
+    of its files;  has_colours: whether the material belongs to a mesh with vertex colours;
+    native: use Mitsuba's own materials even where our plugins are more exact;  images: cache of
+    Mitsuba's bitmaps;  files: those of the scene file that is written, None in memory;  notes: what
+    the reader of that file should know."""
 
     materials: Mapping[str, Material]
     textures: Mapping[str, Texture]
     folder: Path
+    media: Mapping[str, AnyMedium] = field(default_factory=dict)
     has_colours: bool = False
     native: bool = False
     images: dict[Any, Any] = field(default_factory=dict)
@@ -51,7 +53,8 @@ class TranslationContext:
 
     @classmethod
     def of(cls, scene: Scene, native: bool = False, files: Files | None = None) -> Self:
-        return cls(scene.materials, scene.textures, scene.folder, native=native, files=files)
+        parts = scene.materials, scene.textures, scene.folder, scene.media
+        return cls(*parts, native=native, files=files)
 
     def note(self, text: str) -> None:
         if text not in self.notes:

@@ -76,7 +76,8 @@ class Counterpart:
     def no_pictures_reason(self) -> str:
         """Why pictures with noise cannot be compared; empty if they can."""
         if self.has_our_integrator and not is_wide(mitsuba()):
-            what = "solids (CSG)" if self.solids else "hidden lamps and partly opaque masks"
+            others = "hidden lamps, partly opaque masks, and lamps behind what is no surface"
+            what = "solids (CSG)" if self.solids else others
             return (
                 f"{what}: Mitsuba's scalar variant would take hours for their pictures, which our "
                 "plugin traces ray by ray; its variant llvm_ad_rgb takes seconds (docs/install.md)"

@@ -304,10 +304,13 @@ class Reading:
     material_name: Callable[["Reading", Node], str]
     textures: dict[str, Any] = field(default_factory=dict)
     materials: dict[str, Any] = field(default_factory=dict)
+    media: dict[str, Any] = field(default_factory=dict)
     groups: dict[str, Any] = field(default_factory=dict)
     shapes: list[Any] = field(default_factory=list)
     lights: list[Any] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    follows_media: bool = False
+    """Whether Mitsuba's integrator follows light through media, and through what is no surface."""
     mirrored_for: Node | None = None
     """The sensor that mirrors the picture, if there is one."""
     names: dict[Any, str] = field(default_factory=dict)

@@ -10,7 +10,7 @@ from typing import Any, get_args
 from comparisons.results.differentiators import DifferentiatorName
 
 PLUGINS = (
-    *("scene", "path", "direct", "ptracer", "aov"),
+    *("scene", "path", "volpathmis", "direct", "ptracer", "aov"),
     *("perspective", "thinlens", "orthographic", "hdrfilm"),
     *("independent", "stratified", "multijitter"),
     *("box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos"),
@@ -19,6 +19,7 @@ PLUGINS = (
     *("diffuse", "conductor", "roughconductor", "dielectric", "roughdielectric", "thindielectric"),
     *("plastic", "roughplastic", "principled", "principledthin"),
     *("blendbsdf", "mask", "twosided", "bumpmap", "normalmap"),
+    *("null", "homogeneous", "isotropic", "hg", "rayleigh", "blendphase"),
     *("bitmap", "checkerboard", "mesh_attribute"),
 )
 """Of Mitsuba's own, those that our dictionaries name."""

@@ -80,8 +80,9 @@ def sampler_of(sampler: Any) -> str:
     return words("Sampler", sampler.type, params=values)
 
 
-def integrator_of(integrator: Any) -> str:
-    """pbrt counts the surfaces between the camera and a light, we the edges."""
+def integrator_of(integrator: Any, has_media: bool = False) -> str:
+    """pbrt counts the surfaces between the camera and a light, and where media scatter, we the
+    edges."""
     if getattr(integrator, "hide_emitters", False):
         raise UnwritableError("lamps that cameras do not see")
     edges_of = type_of_integrator(integrator).edges
@@ -92,7 +93,8 @@ def integrator_of(integrator: Any) -> str:
     except NoCounterpartError as error:
         raise UnwritableError(str(error)) from None
     depth = ENDLESS if edges is None else edges - 1
-    return words("Integrator", "path", params={"integer maxdepth": depth, "bool regularize": False})
+    plugin = "volpath" if has_media else "path"
+    return words("Integrator", plugin, params={"integer maxdepth": depth, "bool regularize": False})
 
 
 # ---- lights --------------------------------------------------------------------------------------
@@ -174,7 +176,7 @@ def _leaf(
     *path: str | int,
 ) -> list[str]:
     name, radiance = writing.surface(leaf.material)
-    head = [words("NamedMaterial", name)]
+    head = [words("NamedMaterial", name), *writing.interface(leaf.interior, leaf.exterior)]
     if radiance is not None:
         front = {"rgb L": radiance, "bool twosided": False}
         head.append(words("AreaLightSource", "diffuse", params=front))
@@ -246,10 +248,11 @@ def write_pbrt(scene: Scene, path: Path) -> tuple[int, list[str]]:
     def text(files: Files) -> str:
         writing = Writing(scene, files)
         head = ['Option "disabletexturefiltering" true']
+        around = scene.camera.medium
         with writing.collected("camera"):
-            head += camera_of(scene)
+            head += [*writing.interface(None, around), *camera_of(scene)]
         with writing.collected("integrator"):
-            head.append(integrator_of(scene.integrator))
+            head.append(integrator_of(scene.integrator, scene.has_media))
             with writing.collected("sampler"):
                 head.append(sampler_of(scene.resolved_sampler))
         head += film_of(scene.film, f"{path.stem}.exr")
@@ -264,6 +267,7 @@ def write_pbrt(scene: Scene, path: Path) -> tuple[int, list[str]]:
         comments = [f"Written by reference-rt from the scene {scene.name}."]
         comments += [f"Note: {note}." for note in notes]
         lines = [f"# {' '.join(line.split())}" for line in comments]
+        lines += writing.media  # before the camera, which may stand in one
         return "\n".join([*lines, *head, "WorldBegin", *world, *writing.lines, *shapes, ""])
 
     return write_files(scene, path, text), notes

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.materials import type_of
+from comparisons.media import type_of as type_of_phase
 from comparisons.mitsuba.files import Files, Losses, UnwritableError
 from comparisons.renderers.vocabulary import ALONG, BLACK_PARAMS, Params
 from comparisons.textures import type_of as type_of_texture
@@ -35,13 +36,15 @@ _word = partial(json.dumps, ensure_ascii=False)
 
 @dataclass
 class Writing(Losses):
-    """A scene being written.  lines: of textures and materials;  names: those that are taken, by
+    """A scene being written.  lines: of textures and materials;  media: those of
+    media;  names: those that are taken, by
     the part that has each;  oriented: the names of materials that need texture coordinates;
     one_sided: materials that are black from behind."""
 
     files: Files
     target: str = field(default="pbrt-v4", kw_only=True)
     lines: list[str] = field(default_factory=list)
+    media: list[str] = field(default_factory=list)
     names: dict[tuple[str, ...], str] = field(default_factory=dict)
     oriented: set[str] = field(default_factory=set)
     one_sided: set[str] = field(default_factory=set)
@@ -103,6 +106,42 @@ class Writing(Losses):
 
     def black(self) -> str:
         return self.names.get(("", "black")) or self.define(BLACK_PARAMS, "", "black")
+
+    # ---- media ----------------------------------------------------------------------------------
+
+    def medium(self, name: str | None) -> str:
+        """The name of a medium in the file, which it is written to when it is first used; empty for
+        none.  pbrt renders spectra, which it makes of our colours."""
+        if name is None:
+            return ""
+        path = ("media", name)
+        if path not in self.names:
+            medium, g = self.scene.media[name], 0.0
+            with self.collected(*path):
+                if (asymmetry := type_of_phase(medium.phase).asymmetry) is None:
+                    raise UnwritableError(f"a phase function '{medium.phase.type}'")
+                g = asymmetry(medium.phase)
+            sigma_t, albedo = np.array(medium.sigma_t), np.array(medium.albedo)
+            params: Params = {
+                "string type": "homogeneous",
+                "rgb sigma_a": tuple((sigma_t * (1.0 - albedo)).tolist()),
+                "rgb sigma_s": tuple((sigma_t * albedo).tolist()),
+                "float scale": medium.scale,
+                "float g": g,
+            }
+            if np.ptp(sigma_t) or np.ptp(albedo):
+                self.note(
+                    f"the medium '{name}' has a colour, which pbrt makes a spectrum of: light that "
+                    "goes far through it has a slightly different one"
+                )
+            self.media.append(words("MakeNamedMedium", self.name_for(*path), params=params))
+        return self.names[path]
+
+    def interface(self, inside: str | None, outside: str | None) -> list[str]:
+        """The media on the sides of a surface; none where both are as around it."""
+        if inside is None and outside is None:
+            return []
+        return [words("MediumInterface", self.medium(inside), self.medium(outside))]
 
     # ---- textures -------------------------------------------------------------------------------
 

@@ -23,6 +23,7 @@ from comparisons.integrators import type_of as type_of_integrator
 from comparisons.lights import type_of as type_of_light
 from comparisons.lights.constant import ambient_of
 from comparisons.materials import type_of as type_of_material
+from comparisons.media import refuse_media
 from comparisons.povray.inside import region_at, region_of
 from comparisons.referee.sizes import ShapeSizes
 from comparisons.renderers import NoCounterpartError, Reasons
@@ -128,6 +129,8 @@ def picture(scene: Scene) -> str:
     writing = Writing(moved(scene, frame_of(scene)))
     scene, settings = writing.scene, ""
     lines: list[str] = []
+    with writing.reasons.collected():
+        refuse_media(scene)
     with writing.reasons.collected():
         if (to_povray := type_of_integrator(scene.integrator).to_povray) is None:
             raise NoCounterpartError(f"the integrator {scene.integrator.type}")

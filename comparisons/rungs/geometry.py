@@ -19,6 +19,7 @@ from comparisons.rungs.rays.camera import compare_camera
 from comparisons.rungs.rays.coincidence import coincident, in_one_place
 from comparisons.rungs.rays.comparer import DISCRETE, KINDS, Comparer
 from comparisons.rungs.rays.judgement import MOST_JUDGED, Judgement, judged
+from comparisons.rungs.rays.media import media_along
 from comparisons.rungs.rays.rays import Rays, described, joined, mixed_rays
 from comparisons.rungs.rays.resolution import resolution
 from reference_rt.cameras.film import Film
@@ -126,12 +127,18 @@ def geometry(
     if resolved and not isinstance(scene.integrator, RayCast):
         found = resolution(scene, tables, counterpart, seed)
         numbers |= {"resolution": found._asdict(), "is_limited": found.is_limited}
+    along = media_along(scene, counterpart, sizes) if scene.media else None
+    if along is not None:
+        numbers |= {f"media_{key}": value for key, value in along._asdict().items()}
     if camera.problem:
         return RungResult("geometry", "differ", camera.problem, numbers)
     status, reason = _outcome(traced, verdict, is_aimed, numbers, say)
     if shadows.wrong and status != "differ":
         status = "differ"
         reason = f"{shadows.wrong} of {shadows.rays} shadow rays are wrong; {shadows.first}"
+    if along is not None and along.too_many and status != "differ":
+        status = "differ"
+        reason = f"{along.wrong} of {along.rays} rays are in other media; {along.first}"
     return RungResult("geometry", status, reason, numbers)
 
 

@@ -71,6 +71,8 @@ def transport(scene: Scene, tables: SceneTables, threads: int | None = None) -> 
         return RungResult(
             "transport", "not-applicable", "there is no lamp that particles could leave"
         )
+    if scene.has_media:
+        return RungResult("transport", "not-applicable", "particles follow no media")
     paths = _small(scene)
     try:
         light = particles_of(paths.integrator)

@@ -6,6 +6,7 @@ import numpy as np
 
 from comparisons.lights.area import emission
 from comparisons.materials.reading import material_name
+from comparisons.media import media_names
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.parse import as_transform
 from comparisons.shapes import SHAPES
@@ -70,15 +71,14 @@ def shape(reading: Reading, node: Node, in_group: bool = False) -> Shape:
         known = ", ".join(sorted([*READERS, "instance", "shapegroup"]))
         raise node.unsupported(f"expected one of: {known}")
     node.ignore("silhouette_sampling_weight")
-    for medium in node.children("Medium"):
-        raise medium.unsupported("expected a scene without media")
+    media = media_names(reading, node)
     for sensor in node.children("Sensor"):
         raise sensor.error("belongs to a shape, which is not supported; expected a camera")
     material = _material(reading, node, in_group)
     with node.checking():
         found = READERS[node.plugin](reading, node, material)
     node.finish()
-    return found
+    return found.model_copy(update=media) if media else found
 
 
 def _material(reading: Reading, node: Node, in_group: bool) -> str | None:

@@ -16,12 +16,13 @@ from reference_rt.shapes.shape import TabulationContext
 class Site(NamedTuple):
     """The placement and the material of a leaf.
 
-    place: the maps of its solid and its instance, applied after its own transform;  parts: the BSDF
-    and, if it is emissive, the emitter;  coloured: the same for a mesh with vertex colours;
-    textured: whether the material depends on uv or tangents;  oriented: on tangents;  material: its
-    name;  copies: the number of copies of the leaf;  shared: data shared by the leaves of one
-    scene, by key (a group, the triangles of a file);  reach: about the largest coordinate of the
-    scene;  native: whether Mitsuba's own materials are used.
+    place: the maps of its solid and its instance, applied after its own transform;  parts: the
+    BSDF, the emitter, if it is emissive, and the media that it bounds;  coloured: the same for a
+    mesh with vertex colours;  textured: whether the material depends on uv or tangents;  oriented:
+    on tangents;  material: its name;  copies: the number of copies of the leaf;  shared: data
+    shared by the leaves of one scene, by key (a group, the triangles of a file);  reach: about the
+    largest coordinate of the scene;  native: whether Mitsuba's own materials are used;  media: the
+    names of the media inside and outside.
     """
 
     place: TabulationContext
@@ -34,6 +35,7 @@ class Site(NamedTuple):
     shared: dict[Any, Any]
     reach: float
     native: bool = False
+    media: tuple[str | None, str | None] = (None, None)
 
     @property
     def mirrored(self) -> bool:
@@ -67,10 +69,10 @@ def with_mesh_light(site: Site, normals: bool = False, stands_in: bool = False) 
 
 def instance_of(name: str, member: Any, m: affine.Affine, site: Site) -> Plugin:
     """A Mitsuba shape (see `ShapeGroup.member`) under any affine map: an instance of a group of its
-    own, one for each `name` and material."""
+    own, one for each `name`, material and pair of media."""
     if "emitter" in site.parts:
         raise UntranslatableError("emissive material of an instance", "material")
-    key = (name, site.material)
+    key = (name, site.material, site.media)
     if key not in site.shared:
         if isinstance(member, dict):
             member = {**member, **site.parts}

@@ -33,6 +33,7 @@ from comparisons.materials.translate import (
     is_textured,
     parts_of,
 )
+from comparisons.media import media_of_shape, translate_medium
 from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.context import TranslationContext, UntranslatableError
 from comparisons.mitsuba.counterpart import Counterpart, InstancedGroup
@@ -124,8 +125,10 @@ def _translated(scene: Scene, native: bool = False) -> _Translated:
     sensor = translate_camera(scene.camera, scene.film, context)
     sensor["film"] = translate_film(scene.film)
     sensor["sampler"] = translate_sampler(scene.resolved_sampler)
+    if scene.camera.medium is not None:
+        sensor["medium"] = translate_medium(scene.media[scene.camera.medium])
     plain: dict[str, Any] = {"type": "scene", **ROBUST, "sensor": sensor}
-    integrator = translate_integrator(scene.integrator)
+    integrator = translate_integrator(scene.integrator, scene.has_media)
     if integrator is not None:
         plain["integrator"] = integrator
         if counts_lights_often(scene):
@@ -193,13 +196,15 @@ def _add(
         operands = []
         for leaf in member.leaves:
             place = place_of(scene, leaf, copy.outer)
-            parts = parts_of(leaf.material, context)
+            sides = media_of_shape(leaf, scene.media)
+            parts = parts_of(leaf.material, context) | sides
             if "emitter" in parts and _never_samples(scene.integrator, copy, member, leaf, place):
                 parts["emitter"]["sampling_weight"] = 0.0
+            coloured = coloured_parts_of(leaf.material, context)
             site = Site(
                 place=place,
                 parts=parts,
-                coloured=coloured_parts_of(leaf.material, context) or parts,
+                coloured=parts if coloured is None else coloured | sides,
                 textured=is_textured(leaf.material, context),
                 oriented=is_oriented(leaf.material, context),
                 material=leaf.material,
@@ -207,6 +212,7 @@ def _add(
                 shared=shared,
                 reach=reach,
                 native=context.native,
+                media=(leaf.interior, leaf.exterior),
             )
             plugins = translate_shape(leaf.shape, site)
             if site.textured and not all(plugin.has_our_uv for plugin in plugins):

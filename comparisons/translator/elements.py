@@ -19,6 +19,7 @@ from comparisons.integrators.whitted import AMBIENT
 from comparisons.lights import translate_light
 from comparisons.lights.constant import ambient_of
 from comparisons.materials.translate import translate_material
+from comparisons.media.homogeneous import SIDES, translate_medium
 from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.files import Element, Files, Reference, Rgb, Vector, matrix_step
 from comparisons.mitsuba.plugins.whitted import MOST_COMPONENTS
@@ -39,17 +40,18 @@ OUR_PLUGINS = ("textbook_phong", "gltf_pbr", "view_rectangle", "whitted", "mesh_
 TEXTURES = (*READERS, "uniform")
 """Plugins that are elements of their own, however often they are used."""
 
-TAGS = ("film", "rfilter", "sampler", "integrator", "emitter")
+TAGS = ("film", "rfilter", "sampler", "integrator", "emitter", "phase")
 """Names of nested plugins that are their elements' tags, too."""
 
 
 class Surfaces:
-    """The materials of a scene: each is an element once, which shapes refer to."""
+    """The materials and media of a scene: each is an element once, which shapes refer to."""
 
     def __init__(self, scene: Scene, files: Files) -> None:
         self.scene, self.files = scene, files
         self.elements: dict[Any, Element] = {}
         self.textures: dict[str, Element] = {}
+        self.media: dict[str, Element] = {}
         self.ids: set[str] = set()
         self.context = TranslationContext.of(scene, native=True, files=files)
 
@@ -79,6 +81,19 @@ class Surfaces:
             self.elements[key] = element
         return Reference(self.elements[key].id)
 
+    def medium(self, name: str) -> Reference:
+        """The medium with this name."""
+        if name not in self.media:
+            element = self.element(translate_medium(self.scene.media[name]), "medium")
+            element.id = self.id_for(name)
+            self.media[name] = element
+        return Reference(self.media[name].id)
+
+    def media_of(self, shape: Any) -> dict[str, Reference]:
+        """The media that a shape bounds, by side."""
+        names = {side: getattr(shape, side) for side in SIDES}
+        return {side: self.medium(name) for side, name in names.items() if name is not None}
+
     def _uses_colours(self) -> bool:
         return any(isinstance(t, VertexColours) for t in self.scene.textures.values())
 
@@ -91,7 +106,8 @@ class Surfaces:
         element = Element(tag, plugin)
         for key, part in value.items():
             if isinstance(part, dict) and part["type"] not in ("rgb", *TEXTURES):
-                element.children.append(self.element(part, key if key in TAGS else "bsdf"))
+                inner = "phase" if tag == "phase" else "bsdf"
+                element.children.append(self.element(part, key if key in TAGS else inner))
             elif key != "type":
                 element.values[key] = self.value(part)
         return element
@@ -126,7 +142,10 @@ def sensor(scene: Scene, surfaces: Surfaces) -> Element:
     values = translate_camera(scene.camera, scene.film, surfaces.context)
     values["film"] = translate_film(scene.film)
     values["sampler"] = translate_sampler(scene.resolved_sampler, in_file=True)
-    return surfaces.element(values, "sensor")
+    found = surfaces.element(values, "sensor")
+    if scene.camera.medium is not None:
+        found.values["medium"] = surfaces.medium(scene.camera.medium)
+    return found
 
 
 def integrator(scene: Scene, surfaces: Surfaces) -> Element:
@@ -134,7 +153,7 @@ def integrator(scene: Scene, surfaces: Surfaces) -> Element:
     chosen = scene.integrator
     if isinstance(chosen, RayCast):
         return surfaces.element(shown_by(chosen), "integrator")
-    found = dict(translate_integrator(chosen) or {})
+    found = dict(translate_integrator(chosen, scene.has_media) or {})
     if isinstance(chosen, Whitted):
         ambient = zip(AMBIENT, ambient_of(scene.lights), strict=True)
         found |= {name: x for name, x in ambient if x != 0.0}

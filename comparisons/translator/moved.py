@@ -58,6 +58,10 @@ def moved(scene: Scene, frame: Frame) -> Scene:
             else material
             for name, material in scene.materials.items()
         },
+        media={
+            name: medium.model_copy(update={"scale": medium.scale / frame.scale})
+            for name, medium in scene.media.items()
+        },
     )
 
 
@@ -137,7 +141,7 @@ def with_float32_vertices(scene: Scene) -> tuple[Scene, float, Callable[[], Scen
             table = shape.tabulate(TabulationContext(folder=scene.folder, warn=warn))
         except ValueError:
             continue
-        rounded, moved = _rounded(_by_corners(table), shape.material, frame)
+        rounded, moved = _rounded(_by_corners(table), shape, frame)
         if 0.0 < moved <= SHARE * _edge(table):
             shapes[k], changed[k], largest = rounded, table, max(largest, moved)
             for message in warned:
@@ -153,7 +157,7 @@ def with_float32_vertices(scene: Scene) -> tuple[Scene, float, Callable[[], Scen
             assert isinstance(shape, Mesh | Triangle)
             second = soup_of(shape, scene.folder).at_corners()
             if not second.is_like(_by_corners(table)):
-                shapes[k], same = _rounded(second, shape.material, frame)[0], False
+                shapes[k], same = _rounded(second, shape, frame)[0], False
         return found if same else scene.changed(shapes=tuple(shapes))
 
     return found, largest, theirs
@@ -168,8 +172,9 @@ def _by_corners(table: Triangles) -> Soup:
     return Soup(*at_corners, numbers=table.face.astype(np.int64), more_uvs=more)
 
 
-def _rounded(soup: Soup, material: str | None, frame: Frame) -> tuple[Mesh, float]:
-    """Triangles, by corners, as a mesh with rounded vertices, and how far a vertex moves."""
+def _rounded(soup: Soup, shape: Mesh | Triangle, frame: Frame) -> tuple[Mesh, float]:
+    """Triangles of a shape, by corners, as a mesh with rounded vertices, and how far a vertex
+    moves."""
     corners, numbers = soup.positions, soup.numbers
     assert numbers is not None
     vertices = frame.rounded(corners)
@@ -178,7 +183,9 @@ def _rounded(soup: Soup, material: str | None, frame: Frame) -> tuple[Mesh, floa
     faces = np.zeros((int(numbers.max()) + 1, 3), np.int64)
     faces[numbers] = np.arange(len(corners)).reshape(-1, 3)
     mesh = Mesh(
-        material=material,
+        material=shape.material,
+        interior=shape.interior,
+        exterior=shape.exterior,
         vertices=vertices,
         faces=faces,
         normals=soup.normals,

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from comparisons.cameras import read_sensor
-from comparisons.integrators import read_integrator
+from comparisons.integrators import follows_media, read_integrator
 from comparisons.lights import read_light
 from comparisons.lights.area import belongs_to_shape
 from comparisons.materials.reading import material_name
@@ -136,17 +136,17 @@ def _scene(parsed: Parsed, cls: type[M]) -> M:
     root.ignore("compact_acceleration_structures")
     nodes = root.children(*_KINDS)
     root.children("BSDF", "Texture", "Film", "Sampler", "ReconstructionFilter")  # used by others
+    root.children("Medium", "Volume", "PhaseFunction")
     sensors = [node for node in nodes if node.kind == "Sensor"]
     if len(sensors) > 1:
         reading.note(sensors[0], f"is the first of {len(sensors)} sensors; the others are left out")
+    integrators = [node for node in nodes if node.kind == "Integrator"]
+    reading.follows_media = any(map(follows_media, integrators))
     for node in nodes:
-        if node.kind in ("Medium", "Volume", "PhaseFunction"):
-            raise node.unsupported("expected a scene without media")
         if node.kind == "Shape":
             read_shape(reading, node)
         elif node.kind == "Emitter" and not belongs_to_shape(node):
             read_light(reading, node)
-    integrators = [node for node in nodes if node.kind == "Integrator"]
     if len(integrators) > 1:
         raise integrators[1].error("is a second integrator; expected one")
     integrator, layers = read_integrator(reading, integrators[0] if integrators else None)
@@ -168,6 +168,7 @@ def _scene(parsed: Parsed, cls: type[M]) -> M:
             integrator=integrator,
             textures=reading.textures,
             materials=reading.materials,
+            media=reading.media,
             groups=reading.groups,
             shapes=tuple(reading.shapes),
             lights=tuple(reading.lights),
@@ -178,4 +179,4 @@ def _scene(parsed: Parsed, cls: type[M]) -> M:
     return scene
 
 
-_KINDS = ("Sensor", "Shape", "Emitter", "Integrator", "Medium", "Volume", "PhaseFunction")
+_KINDS = ("Sensor", "Shape", "Emitter", "Integrator")

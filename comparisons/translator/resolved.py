@@ -175,12 +175,13 @@ class _Document:
             "format": FORMAT,
             "version": VERSION,
             "description": scene.description,
-            "camera": camera_of(scene),
+            "camera": self.camera(),
             "film": scene.film.model_dump(mode="json"),
             "sampler": scene.resolved_sampler.model_dump(mode="json"),
             "integrator": scene.integrator.model_dump(mode="json"),
             "textures": {name: self.texture(name) for name in scene.textures},
             "materials": {k: m.model_dump(mode="json") for k, m in scene.materials.items()},
+            "media": {k: m.model_dump(mode="json") for k, m in scene.media.items()},
             "meshes": self.meshes,
             "shapes": shapes,
             "lights": [self.light(light, k) for k, light in enumerate(scene.lights)],
@@ -200,6 +201,10 @@ class _Document:
             found["file"] = self.files.copy(light.file, "lights", number, "file")
             found["transform"] = transform.affine(light.transform).tolist()
         return found
+
+    def camera(self) -> dict[str, Any]:
+        medium = self.scene.camera.medium
+        return camera_of(self.scene) | ({} if medium is None else {"medium": medium})
 
     def shapes(self) -> list[dict[str, Any]]:
         """Every copy of every shape."""
@@ -236,12 +241,12 @@ class _Document:
         m = transform.compose(leaf.outer, outer)
         if isinstance(leaf.shape, Plane):
             m = transform.compose(transform.affine(leaf.shape.transform), m)
-            return {"plane": m.tolist(), "material": leaf.material}
-        return {
-            "mesh": self.mesh(leaf),
-            "transform": m.tolist(),
-            "material": leaf.material,
-        }
+            found = {"plane": m.tolist(), "material": leaf.material}
+        else:
+            place = m.tolist()
+            found = {"mesh": self.mesh(leaf), "transform": place, "material": leaf.material}
+        sides = {"interior": leaf.interior, "exterior": leaf.exterior}
+        return found | {side: name for side, name in sides.items() if name is not None}
 
     def mesh(self, leaf: Leaf) -> int:
         """The number of a shape's mesh, which is made once."""

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.geometry.flatten import Copy, copies_of, place_of
+from comparisons.geometry.flatten import Copy, Leaf, copies_of, place_of
 from comparisons.materials.translate import is_textured
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.context import UntranslatableError, transform_steps
@@ -92,17 +92,19 @@ class Shapes:
             return None
         plugin, numbers = own
         found = Element("shape", plugin, {**numbers, **values})
-        return self._with_material(found, shape.material)
+        return self._with_material(found, shape)
 
     def _with_material(
         self,
         element: Element,
-        name: str | None,
+        shape: Shape | Leaf,
         has_colours: bool = False,
         has_normals: bool = False,
     ) -> Element:
-        """The shape with its BSDF, and its emitter;  has_colours, has_normals: of a mesh's
-        vertices."""
+        """The shape with its BSDF, its emitter, and the media that it bounds;  has_colours,
+        has_normals: of a mesh's vertices."""
+        name = shape.material
+        element.values |= self.surfaces.media_of(shape)
         if name is None:
             return element
         material = self.scene.materials[name]
@@ -128,7 +130,7 @@ class Shapes:
             values["face_normals"] = True
         found = Element("shape", "ply", values)
         has_normals = "face_normals" not in values
-        return self._with_material(found, shape.material, data.colours is not None, has_normals)
+        return self._with_material(found, shape, data.colours is not None, has_normals)
 
     def _mesh_file(self, shape: Mesh) -> str:
         data = shape.data(self.scene.folder)
@@ -186,7 +188,7 @@ class Shapes:
                     kind = type(leaf.shape).__name__
                     raise UntranslatableError(f"{kind} under a texture, with other uv,", "shape")
                 name = type(leaf.shape).__name__.lower()
-                found.append(self._of_plugin(plugin, name, leaf.material))
+                found.append(self._of_plugin(plugin, name, leaf))
         return found
 
     def _site(self, material: str | None, place: Any, copy: Copy) -> Site:
@@ -205,14 +207,14 @@ class Shapes:
             reach=0.0,
         )
 
-    def _of_plugin(self, plugin: Plugin, name: str, material: str | None) -> Element:
+    def _of_plugin(self, plugin: Plugin, name: str, leaf: Leaf) -> Element:
         if plugin.stand_in is not None:
             self.surfaces.note(
                 f"a mesh of {plugin.stand_in.triangles:,} triangles stands in for a {name}; it is "
                 f"at most {plugin.stand_in.sag:.2g} off"
             )
         if plugin.group is not None:
-            return self._of_group(plugin, material)
+            return self._of_group(plugin, leaf)
         if not isinstance(plugin.value, dict):
             file = self.surfaces.files.write(
                 f"{name}.ply", lambda path: plugin.value.write_ply(str(path))
@@ -220,16 +222,16 @@ class Shapes:
             values: dict[str, Any] = {"filename": file}
             if not plugin.value.has_vertex_normals():
                 values["face_normals"] = True
-            return self._with_material(Element("shape", "ply", values), material)
-        return self._with_material(_of_dict(plugin.value), material)
+            return self._with_material(Element("shape", "ply", values), leaf)
+        return self._with_material(_of_dict(plugin.value), leaf)
 
-    def _of_group(self, plugin: Plugin, material: str | None) -> Element:
+    def _of_group(self, plugin: Plugin, leaf: Leaf) -> Element:
         """An instance of a group with one shape: Mitsuba's own only have similar ones."""
         assert plugin.group is not None
         member = plugin.group.member
         assert isinstance(member, dict)
         name = self.surfaces.id_for(plugin.group.name)
-        inside = self._with_material(_of_dict(member), material)
+        inside = self._with_material(_of_dict(member), leaf)
         self.groups[name] = Element("shape", "shapegroup", {}, [inside], name)
         found = _of_dict({key: x for key, x in plugin.value.items() if key != "group"})
         found.children.append(Reference(name))
@@ -272,6 +274,7 @@ def write_xml(scene: Scene, path: Path) -> tuple[int, list[str]]:
             elements.sensor(scene, surfaces),
             *surfaces.textures.values(),
             *surfaces.elements.values(),
+            *surfaces.media.values(),
             *shapes,
             *lights,
         ]

@@ -70,7 +70,9 @@ class Framebuffer:
         self._writer.shutdown()
 
     def samples(self) -> IntArray:
-        """The samples (pixels,) of each pixel."""
+        """The samples (pixels,) of each pixel, read only."""
+        if len(set(self.done.tolist())) == 1:  # no array of as many numbers as the picture has
+            return np.broadcast_to(self.done[0], self.pixels)
         return np.repeat(self.done, self.chunk)[: self.pixels]
 
     # ---- units ----------------------------------------------------------------------------------

@@ -32,11 +32,17 @@ def statistics(before: FloatArray, after: FloatArray, samples: int, chunk: int) 
     before, after: the sums of colour (n, 3) of its pixels;  samples: how many it adds to each.
     """
     with np.errstate(all="ignore"):  # infinite radiance
-        added = np.square(after - before).sum(axis=1) / samples
-        values = (added, np.square(after).sum(axis=1), after.sum(axis=1))
+        added = _over_channels(np.square(after - before)) / samples
+        values = (added, _over_channels(np.square(after)), _over_channels(after))
         starts = np.arange(0, len(after), chunk)
         between, energy, total = (np.add.reduceat(one, starts) for one in values)
         return np.stack([between, np.ones_like(between), energy, total], axis=1)
+
+
+def _over_channels(values: FloatArray) -> FloatArray:
+    """The sums (n,) of values (n, 3).  By columns: `sum(axis=1)` takes six times as long, which
+    was a twentieth of a picture of one sample a pixel (measured)."""
+    return values[:, 0] + values[:, 1] + values[:, 2]
 
 
 def relative_error(found: FloatArray, done: IntArray, pixels: int) -> float | None:

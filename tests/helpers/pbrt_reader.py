@@ -32,6 +32,7 @@ ACCEPTED = {
     "Camera orthographic": SCREEN,
     "Sampler independent": SAMPLED,
     "Sampler sobol": f"{SAMPLED}, string randomization",
+    "Integrator volpath": "integer maxdepth, string lightsampler, bool regularize",
     "Integrator path": "integer maxdepth, string lightsampler, bool regularize",
     "PixelFilter box": RADII,
     "PixelFilter triangle": RADII,
@@ -51,6 +52,9 @@ ACCEPTED = {
     "MakeNamedMaterial conductor": f"string type, rgb eta, rgb k, rgb reflectance, {ROUGH}",
     "MakeNamedMaterial dielectric": f"string type, float eta, {ROUGH}",
     "MakeNamedMaterial thindielectric": "string type, float eta, texture displacement",
+    "MakeNamedMaterial interface": "string type",
+    "MakeNamedMedium homogeneous": "string type, rgb sigma_a, rgb sigma_s, rgb Le, float scale, "
+    "float Lescale, string preset, float g",
     "MakeNamedMaterial mix": "string type, string materials, texture|float amount",
     "Texture spectrum checkerboard": f"{MAPPED}, rgb tex1, rgb tex2, integer dimension",
     "Texture float checkerboard": f"{MAPPED}, float tex1, float tex2, integer dimension",
@@ -68,6 +72,7 @@ BEFORE = {"Camera", "Sampler", "Integrator", "PixelFilter", "Film", "Option"}
 """Only before `WorldBegin`."""
 
 ANYWHERE = {"Scale", "LookAt", "Transform", "Translate", "Rotate", "WorldBegin"}
+ANYWHERE |= {"MakeNamedMedium", "MediumInterface"}
 
 VALUES = {"float": float, "integer": int, "rgb": float, "point3": float, "point2": float}
 VALUES |= {"normal": float, "string": str, "texture": str, "bool": bool}
@@ -88,6 +93,7 @@ class Shape:
     material: str
     light: dict[str, Any] | None
     outer: np.ndarray = field(default_factory=lambda: np.eye(4))
+    media: tuple[str, str] = ("", "")
 
 
 @dataclass
@@ -95,6 +101,8 @@ class File:
     options: dict[str, tuple[str, dict[str, Any]]] = field(default_factory=dict)
     camera_from_world: np.ndarray = field(default_factory=lambda: np.eye(4))
     materials: dict[str, dict[str, Any]] = field(default_factory=dict)
+    media: dict[str, dict[str, Any]] = field(default_factory=dict)
+    camera_medium: str = ""
     textures: dict[str, tuple[str, dict[str, Any]]] = field(default_factory=dict)
     lights: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
     shapes: list[Shape] = field(default_factory=list)
@@ -171,7 +179,7 @@ def read(path: Path) -> File:
     before they are used."""
     reader, file = _Reader(path), File()
     world, stack, groups, group = False, [], {}, None
-    at, turned, material, light = np.eye(4), False, "", None
+    at, turned, material, light, sides = np.eye(4), False, "", None, ("", "")
     while reader.left:
         word = reader.left.pop()
         assert word in ANYWHERE or (word in BEFORE) != world, word
@@ -186,11 +194,19 @@ def read(path: Path) -> File:
             assert (name, value) == ("disabletexturefiltering", "true")
         elif word == "WorldBegin":
             assert not world
-            world, at = True, np.eye(4)
+            world, at, sides = True, np.eye(4), ("", "")
+        elif word == "MediumInterface":
+            sides = tuple(reader.strings(2))
+            assert all(name in file.media for name in sides if name)
+        elif word == "MakeNamedMedium":
+            (name,) = reader.strings(1)
+            assert name not in file.media
+            params = reader.params()
+            file.media[name] = checked(f"{word} {params['string type'][0]}", params)
         elif word == "AttributeBegin":
-            stack.append((at, turned, material, light))
+            stack.append((at, turned, material, light, sides))
         elif word == "AttributeEnd":
-            at, turned, material, light = stack.pop()
+            at, turned, material, light, sides = stack.pop()
         elif word == "ReverseOrientation":
             turned = not turned
         elif word == "ObjectEnd":
@@ -227,7 +243,7 @@ def read(path: Path) -> File:
             (plugin,) = reader.strings(1)
             params = checked(f"{word} {plugin}", reader.params())
             if word == "Shape":
-                shape = Shape(plugin, params, at, turned, material, light)
+                shape = Shape(plugin, params, at, turned, material, light, media=sides)
                 assert material
                 (file.shapes if group is None else group).append(shape)
             elif word == "LightSource":
@@ -238,7 +254,7 @@ def read(path: Path) -> File:
                 assert word not in file.options
                 file.options[word] = plugin, params
                 if word == "Camera":
-                    file.camera_from_world = at
+                    file.camera_from_world, file.camera_medium = at, sides[1]
     assert world
     assert not stack
     assert group is None

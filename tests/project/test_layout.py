@@ -18,7 +18,8 @@ FLOORS = {
     ),
     "comparisons": (
         *("results", "geometry", "statistics", "renderers", "mitsuba", "textures", "materials"),
-        *("cameras", "lights", "integrators", "shapes", "referee", "translator", "pbrt", "gltf"),
+        *("media", "cameras", "lights", "integrators", "shapes", "referee", "translator"),
+        *("pbrt", "gltf"),
         *("runs", "raysect", "cycles", "povray", "rungs", "report", "compare", "gate", "truth"),
         *("suites", "experiments", "commands"),
     ),

@@ -8,6 +8,9 @@ from typing import Any
 Data = dict[str, Any]
 """A scene, or a part of one, as its file's data."""
 
+NAMED = ("textures", "materials", "media", "groups")
+"""The keys of a scene whose parts have names."""
+
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
 _WORDS = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}
 
@@ -45,7 +48,7 @@ def text_of(scene: Data) -> str:
     """YAML, one line for each shape, material, light and so on."""
     lines: list[str] = []
     for key, value in scene.items():
-        if isinstance(value, dict) and key in ("textures", "materials", "groups"):
+        if isinstance(value, dict) and key in NAMED:
             if value:
                 lines.append(f"{key}:")
                 lines += [f"  {_flow(name)}: {_flow(part)}" for name, part in value.items()]

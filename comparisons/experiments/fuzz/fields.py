@@ -63,7 +63,7 @@ def rounded(x: float) -> float:
 
 
 def values(cls: type[Description], draw: Draw, names: Names) -> Data:
-    """The fields of a description but those that name materials, which the caller adds.
+    """The fields of a description but those that name materials and media, which the caller adds.
 
     A required field is always there, any other one half the time.
     """
@@ -72,7 +72,8 @@ def values(cls: type[Description], draw: Draw, names: Names) -> Data:
     if special is not None:
         return {"type": own, **special(draw)}
     schema = _schema(cls)
-    bases = (*getattr(cls, "bases", ()), "base", "material", "transform")
+    named = ("base", "material", "transform", "interior", "exterior", "medium")
+    bases = (*getattr(cls, "bases", ()), *named)
     found: Data = {"type": own} if "type" in schema["properties"] else {}
     for key, part in schema["properties"].items():
         if key == "type" or key in bases:

@@ -13,7 +13,7 @@ from comparisons.experiments.fuzz.data import Data, text_of
 from comparisons.experiments.fuzz.fields import Draw, Names, rounded, values
 from comparisons.experiments.fuzz.finding import Grammar
 from comparisons.experiments.fuzz.parts import REACH, RefusedError
-from comparisons.experiments.fuzz.schema import GROUPS, kind_of, types
+from comparisons.experiments.fuzz.schema import GROUPS, NO_SURFACE, kind_of, of_media, types
 from reference_rt.integrators import RayCast
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
@@ -27,6 +27,9 @@ from reference_rt.util.errors import SceneWarning
 
 INTEGRATORS = {"path": 6.0, "direct": 2.0, "whitted": 1.5, "ray_cast": 0.7}
 """How often an integrator is drawn; one that is not named here: 1."""
+
+WITH_MEDIA = 0.12
+"""The share of scenes of path tracing that have media: Mitsuba's follows them slowly."""
 
 WITH_SOLIDS = 0.25
 """The share of scenes that may have solids: with them Mitsuba compares hits, not light."""
@@ -60,7 +63,8 @@ class Assembly:
             found["hierarchy"] = draw.pick(("auto", "sah", "median", "spatial", "none"))
         found |= {"textures": self.textures, "materials": self.materials, "groups": self.groups}
         found |= {"shapes": shapes, "lights": lights}
-        return {key: value for key, value in found.items() if value}
+        found = {key: value for key, value in found.items() if value}
+        return self._with_media(found) if self._has_media(found) else found
 
     # ---- one of a kind --------------------------------------------------------------------------
 
@@ -72,9 +76,8 @@ class Assembly:
         return str(known[int(self.draw.rng.choice(len(known), p=share / share.sum()))])
 
     def _integrator(self) -> Data:
-        found = values(
-            types("integrator")[self._one_of("integrator", INTEGRATORS)], self.draw, self.names
-        )
+        kind = "path" if self._wants_media() else self._one_of("integrator", INTEGRATORS)
+        found = values(types("integrator")[kind], self.draw, self.names)
         if "sampling" in found and self.draw.chance(0.8):
             found["sampling"] = "both"
         if self.draw.chance(0.8):  # else Mitsuba's own integrator is hardly compared
@@ -127,12 +130,13 @@ class Assembly:
     def _some(self, kind: str, low: int, high: int) -> list[str]:
         """A random subset of a kind's types: a scene with few types shows what they do together,
         and of all types at once each would hide the others."""
-        known = [*types(kind)]
+        known = [name for name in types(kind) if (kind, name) != NO_SURFACE]
         count = min(int(self.draw.rng.integers(low, high + 1)), len(known))
         return [known[i] for i in self.draw.rng.permutation(len(known))[:count]]
 
     def _add_materials(self) -> None:
-        wanted = [*self.wanted.get("material", ()), *self._some("material", 1, 5)]
+        wanted = [name for name in self.wanted.get("material", ()) if name != NO_SURFACE[1]]
+        wanted += self._some("material", 1, 5)
         known = types("material")
         # What is made of others comes last; of two such the order is random.
         wanted.sort(key=lambda kind: bool(_bases(known[kind])))
@@ -229,6 +233,35 @@ class Assembly:
         below = {"translate": [0.0, self.draw.between(-3.0, -1.5), 0.0]}
         found["transform"] = [*size, up, below]
         return found
+
+    # ---- media ----------------------------------------------------------------------------------
+
+    def _wants_media(self) -> bool:
+        return any(of_media(kind, name) for kind, names in self.wanted.items() for name in names)
+
+    def _has_media(self, scene: Data) -> bool:
+        is_path = scene["integrator"]["type"] == "path" and scene["sampler"]["type"] != "grid"
+        return is_path and (self._wants_media() or self.draw.chance(WITH_MEDIA))
+
+    def _with_media(self, scene: Data) -> Data:
+        """The scene with one to three media, most of them in shapes, some of which are no surface
+        then.  Shapes need not be closed: a way out of a medium there is none in both renderers."""
+        draw, kinds = self.draw, [*self.wanted.get("phase", ())]
+        count = max(len(kinds), int(draw.rng.integers(1, 4)))
+        media = {f"v{k}": parts.medium(draw, kinds[k : k + 1]) for k in range(count)}
+        materials = {**scene.get("materials", {}), NO_SURFACE[1]: {"type": NO_SURFACE[1]}}
+        lamps = [name for name, one in materials.items() if one["type"] == "emissive"]
+        solid = [*scene.get("shapes", ()), *(s for g in self.groups.values() for s in g)]
+        solid = [one for one in solid if one["type"] not in ("instance", "plane")]
+        chosen = [one for one in solid if draw.chance(0.5)] or solid[:1]
+        for one in chosen:
+            sides = draw.pick((["interior"], ["interior"], ["exterior"], ["interior", "exterior"]))
+            one |= {side: draw.pick([*media]) for side in sides}
+            if one.get("material") not in lamps and draw.chance(0.6):
+                one["material"] = NO_SURFACE[1]
+        if draw.chance(0.2):
+            scene["camera"]["medium"] = draw.pick([*media])
+        return scene | {"media": media, "materials": materials}
 
     # ---- lights ---------------------------------------------------------------------------------
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.experiments import relations
-from comparisons.experiments.fuzz.data import Data, named_in, shapes_of
+from comparisons.experiments.fuzz.data import NAMED, Data, named_in, shapes_of
 from comparisons.experiments.fuzz.finding import Finding
 from comparisons.experiments.relations import HIERARCHIES, REACH, Motion, differ, identities_of
 from comparisons.geometry.frame import Frame
@@ -142,9 +142,9 @@ def written(original: Original) -> str | Finding:
 
 @identity
 def renamed(original: Original) -> str | Finding:
-    """Other names for materials, textures and groups, defined in another order."""
+    """Other names for materials, textures, media and groups, defined in another order."""
     data = _data(original.scene)
-    for section in ("materials", "textures", "groups"):
+    for section in NAMED:
         table = data.get(section, {})
         data[section] = {f"z{name}": table[name] for name in reversed(table)}
     names = {*data["materials"], *data["textures"]}
@@ -156,9 +156,11 @@ def renamed(original: Original) -> str | Finding:
         if "of" in texture:
             texture["of"] = [f"z{name}" for name in texture["of"]]
     for shape in shapes_of(data):
-        for field in ("material", "group"):
+        for field in ("material", "group", "interior", "exterior"):
             if shape.get(field) is not None:
                 shape[field] = f"z{shape[field]}"
+    if data["camera"].get("medium") is not None:
+        data["camera"]["medium"] = f"z{data['camera']['medium']}"
     return _same_picture("renamed", original, _again(original.scene, data))
 
 

@@ -250,6 +250,31 @@ def camera(draw: Draw, kind: str, width: int, height: int) -> Data:
     return found
 
 
+def medium(draw: Draw, kinds: list[str]) -> Data:
+    """A medium;  kinds: of its phase function, if it is not to be drawn."""
+    sigma_t = draw.log(1e-3, 30.0) if draw.extreme else draw.log(0.1, 2.0)
+    found: Data = {"type": "homogeneous", "sigma_t": sigma_t}
+    if draw.chance(0.6):
+        found["sigma_t"] = [rounded(sigma_t * draw.log(0.3, 3.0)) for _ in range(3)]
+    found["albedo"] = draw.pick((0.0, 1.0, draw.between(0.0, 1.0)))
+    if draw.chance(0.5):
+        found["albedo"] = [draw.between(0.0, 1.0) for _ in range(3)]
+    if draw.chance(0.2):
+        found["scale"] = draw.log(0.3, 3.0)
+    kind = kinds[0] if kinds else draw.pick([*types("phase"), None])
+    return found if kind is None else found | {"phase": _phase(draw, kind)}
+
+
+def _phase(draw: Draw, kind: str) -> Data:
+    if kind == "blend":
+        first, second = (_phase(draw, draw.pick(("isotropic", "hg", "rayleigh"))) for _ in range(2))
+        return {"type": kind, "first": first, "second": second, "weight": draw.between(0.0, 1.0)}
+    if kind != "hg":
+        return {"type": kind}
+    g = draw.pick((-0.99, 0.99)) if draw.extreme and draw.chance(0.3) else draw.between(-0.9, 0.9)
+    return {"type": kind, "g": g}
+
+
 def light(draw: Draw, kind: str, names: Names) -> Data:
     """A light of a type, outside of the shapes, that shines on the middle."""
     cls = types("light")[kind]

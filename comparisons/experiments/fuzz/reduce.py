@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 from comparisons.experiments.fuzz.data import (
+    NAMED,
     Data,
     Way,
     at,
@@ -31,12 +32,14 @@ _WRAPPED = {"base": "base", "first": "first", "second": "second", "back": "back"
 
 
 def without_unused(scene: Data) -> Data:
-    """The scene without materials, textures and groups that nothing names, and without empty
-    sections."""
+    """The scene without materials, textures, media and groups that nothing names, and without
+    empty sections."""
     found: Data = copy_of(scene)
     while True:
         before = copy_of(found)
-        used = {s[k] for s in shapes_of(found) for k in ("material", "group") if s.get(k)}
+        named = ("material", "group", "interior", "exterior")
+        used = {s[k] for s in shapes_of(found) for k in named if s.get(k)}
+        used.add(found.get("camera", {}).get("medium"))
         for light in found.get("lights", ()):
             used |= {at[key] for at, key in named_in(light)}
         for name, material in found.get("materials", {}).items():
@@ -44,7 +47,7 @@ def without_unused(scene: Data) -> Data:
             used |= {name} if name in used else set()
         for name, texture in found.get("textures", {}).items():
             used |= {*texture.get("of", ())} if name in used else set()
-        for section in ("materials", "textures", "groups"):
+        for section in NAMED:
             table = {k: v for k, v in found.get(section, {}).items() if k in used}
             found.pop(section, None)
             if table:
@@ -204,7 +207,7 @@ def fixes_view(path: Way) -> bool:
 
 def _is_named(path: Way) -> bool:
     """Whether the path's keys are names, not fields."""
-    return len(path) == 1 and path[0] in ("materials", "textures", "groups")
+    return len(path) == 1 and path[0] in NAMED
 
 
 def fewer_vertices(scene: Data) -> Iterator[Data]:

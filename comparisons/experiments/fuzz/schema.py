@@ -12,6 +12,7 @@ from reference_rt.core.transform import Step
 from reference_rt.integrators import Direct, Path, RayCast, Whitted
 from reference_rt.lights import AnyLight
 from reference_rt.materials import AnyMaterial
+from reference_rt.media import AnyMedium, AnyPhase
 from reference_rt.sampling import AnySampler
 from reference_rt.shapes.csg import AnyShape
 from reference_rt.textures import AnyTexture
@@ -27,6 +28,8 @@ KINDS: dict[str, Any] = {
     "sampler": AnySampler,
     "filter": AnyFilter,
     "step": Step,
+    "medium": AnyMedium,
+    "phase": AnyPhase,
 }
 """The unions of types in the schema, by kind."""
 
@@ -43,6 +46,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "textures": ("bitmap", "checker", "vertex_colours", "product"),
     "nested": ("mask", "two_sided", "blend", "bump", "normal_map"),
     "sky": ("constant", "environment_map"),
+    "media": ("homogeneous", "none", "hg", "rayleigh"),
 }
 """Names for several types, which `--features` takes beside the names of types."""
 
@@ -90,8 +94,12 @@ def types_in(scene: Data) -> set[tuple[str, str]]:
     for shape in shapes_of(scene):
         found.add(("shape", shape["type"]))
         found |= {("step", key) for step in shape.get("transform", ()) for key in step}
-    for key, kind in (("materials", "material"), ("textures", "texture")):
+    for key, kind in (("materials", "material"), ("textures", "texture"), ("media", "medium")):
         found |= {(kind, one["type"]) for one in scene.get(key, {}).values()}
+    for medium in scene.get("media", {}).values():
+        phase = medium.get("phase", {"type": "isotropic"})
+        phases = (phase, *(phase[key] for key in ("first", "second") if key in phase))
+        found |= {("phase", one["type"]) for one in phases}
     for light in scene.get("lights", ()):
         found.add(("light", light["type"]))
         found |= {("step", key) for step in light.get("transform", ()) for key in step}
@@ -108,6 +116,17 @@ def possible_pairs() -> list[tuple[tuple[str, str], tuple[str, str]]]:
     return [pair for pair in combinations(all_types(), 2) if _together(*pair)]
 
 
+OF_MEDIA = ("medium", "phase")
+"""Kinds of which path tracing alone knows anything, as of NO_SURFACE."""
+
+NO_SURFACE = ("material", "none")
+
+
+def of_media(kind: str, name: str) -> bool:
+    """Whether a type asks for path tracing through media."""
+    return kind in OF_MEDIA or (kind, name) == NO_SURFACE
+
+
 _SKIES = {("light", "constant"), ("light", "environment_map")}
 
 
@@ -117,6 +136,9 @@ def _together(a: tuple[str, str], b: tuple[str, str]) -> bool:
     if {a, b} == _SKIES:
         return False
     pair = {a, b}
+    if any(of_media(*one) for one in pair):
+        others = [name for kind, name in pair if kind == "integrator"]
+        return others in ([], ["path"]) and ("sampler", "grid") not in pair
     if ("sampler", "grid") in pair:
         (other,) = pair - {("sampler", "grid")}
         integrator = types("integrator").get(other[1])

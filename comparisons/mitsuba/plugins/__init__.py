@@ -12,6 +12,7 @@ from comparisons.mitsuba.plugins import (
     exact_coat,
     exact_coordinates,
     materials,
+    media_of_solids,
     mesh_area,
     path_of_solids,
     view_rectangle,
@@ -23,7 +24,7 @@ def register(mi: Any) -> None:
     """Register the plugins of this folder for the current variant."""
     plugins = (
         *(exact_coat, exact_coordinates, materials),
-        *(mesh_area, path_of_solids, view_rectangle, whitted),
+        *(media_of_solids, mesh_area, path_of_solids, view_rectangle, whitted),
     )
     for plugin in plugins:
         plugin.register(mi)

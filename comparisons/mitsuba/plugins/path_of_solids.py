@@ -16,10 +16,10 @@ from typing import Any
 from comparisons.mitsuba.plugins.base import PlainScene
 from comparisons.mitsuba.plugins.whitted import clearance, leave
 
-_MOST_RAYS = 1 << 20
+MOST_RAYS = 1 << 20
 """Rays that are traced together: each takes a kilobyte in wide variants."""
 
-_SURVIVAL = 0.95
+SURVIVAL = 0.95
 """The highest survival probability of Russian roulette."""
 
 
@@ -48,7 +48,7 @@ def register(mi: Any) -> None:
             self.hides = properties.get("hide_emitters", False)
             self.close = properties.get("starts_close", False)
             self.lit: Callable[[Any], PlainScene] = partial(PlainScene, mi)
-            self.most_rays = _MOST_RAYS
+            self.most_rays = MOST_RAYS
             self.height: Callable[[Any], Any] = lambda si: 0.0
 
         def sample(
@@ -101,7 +101,7 @@ def register(mi: Any) -> None:
                 before.t, before.p, before.n = si.t, si.p, si.n
                 active &= dr.max(throughput) > 0.0
                 if depth >= self.rr_depth:
-                    survival = dr.minimum(dr.max(throughput) * dr.square(eta), _SURVIVAL)
+                    survival = dr.minimum(dr.max(throughput) * dr.square(eta), SURVIVAL)
                     active &= sampler.next_1d(active) < survival
                     throughput *= dr.select(active, 1.0 / survival, 0.0)
                 sampler.schedule_state()

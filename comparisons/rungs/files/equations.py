@@ -27,7 +27,8 @@ def check_equation(where: str, shape: Shape, findings: Findings) -> None:
     target = middle + half * rng.uniform(-0.95, 0.95, (RAYS, 3))
     begin = middle + 4.0 * size * _unit(rng.normal(size=(RAYS, 3)))
     o, d = begin @ linear.T + offset, (target - begin) @ linear.T
-    hits = Scene(shapes=(shape.model_copy(update={"material": None}),)).intersect(o, d)
+    bare = dict.fromkeys(("material", "interior", "exterior"))
+    hits = Scene(shapes=(shape.model_copy(update=bare),)).intersect(o, d)
     findings.count(of.table.field if of.table else f"{type(shape).__name__.lower()}s")
     if not hits.hit.any():
         if surface.is_full:

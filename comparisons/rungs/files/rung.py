@@ -74,8 +74,8 @@ def _first(findings: Findings) -> str:
     return findings.differences[0] + (f"; and {more} more" if more else "")
 
 
-ALONE = ("camera", "film", "sampler", "integrator")
-"""Keys whose values refer to no other key's."""
+ALONE = ("camera", "film", "sampler", "integrator", "media")
+"""Keys whose values refer to none of the others: the camera's is in a medium."""
 
 
 def _check_description(scene: Scene, findings: Findings) -> int:

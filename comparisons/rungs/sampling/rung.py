@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from comparisons.results.case import RungResult
-from comparisons.rungs.sampling import lights, materials, roulette
+from comparisons.rungs.sampling import lights, materials, media, roulette
 from reference_rt.integrators import Direct, Path, RayCast, Whitted
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.rendering.scene import Scene
@@ -27,6 +27,8 @@ def sampling(scene: Scene, tables: SceneTables) -> RungResult:
         parts.append(lambda: materials.check(scene, tables))
     if isinstance(integrator, Path):
         parts.append(roulette.check)
+    if scene.media:
+        parts.append(lambda: media.check(scene))
     found: list[RungResult] = []
     for part in parts:
         found.append(part())

