@@ -53,7 +53,7 @@ def results(folder="out"):
 def test_truth_writes_its_outputs(run):
     Path("page.md").write_text("<!-- truth -->\n<!-- end -->\n")
     code, output = run(
-        "truth", "perspective", "point_*", "--renderer", "ours", "--spp", 64,
+        "truth", "perspective", "point_over_*", "--renderer", "ours", "--spp", 64,
         "--out", "out", "--markdown", "page.md",
     )  # fmt: skip
     assert code == 0, output
