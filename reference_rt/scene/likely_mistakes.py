@@ -58,7 +58,7 @@ def _as_radians(what: str, degrees: float) -> str:
 
 
 def _shapes(scene: SceneModel, tables: SceneTables) -> Iterator[Mistake]:
-    if not scene.shapes and tables.lights.environment is None:
+    if not scene.shapes and tables.lights.environment is None and scene.camera.medium is None:
         yield Mistake("the scene has no shapes: the picture is empty; expected a key 'shapes'", ())
 
 
