@@ -8,6 +8,7 @@ from comparisons.integrators import translate_integrator, type_of
 from comparisons.integrators.light import as_path
 from comparisons.lights import type_of as type_of_light
 from reference_rt.integrators import Direct, Light, Path
+from reference_rt.lights import Directional
 from reference_rt.materials import Emissive, Mask, NoSurface, ThinDielectric
 from reference_rt.scene.model import SceneModel
 
@@ -19,7 +20,7 @@ def in_place_of(scene: SceneModel, has_solids: bool = False) -> dict[str, Any] |
     of_type = type_of(integrator)
     of_solids = of_type.media_of_solids if scene.has_media else of_type.of_solids
     wrong = has_solids or squares_opacity(scene) or misplaces(scene)
-    wrong = wrong or passes_panes(scene) or loses_lamps(scene)
+    wrong = wrong or passes_panes(scene) or loses_lamps(scene) or has_wrong_media(scene)
     return of_solids(integrator) if of_solids is not None and wrong else None
 
 
@@ -75,6 +76,16 @@ def loses_lamps(scene: SceneModel) -> bool:
     missing (Mitsuba 3.9.1; findings/)."""
     kinds = {type(material) for material in scene.materials.values()}
     return isinstance(scene.integrator, Path) and {NoSurface, Emissive} <= kinds
+
+
+def has_wrong_media(scene: SceneModel) -> bool:
+    """A medium that is clear in one colour scatters none by `volpathmis`, and is no number by
+    `volpath`; around a camera, a medium without end is lit by what is infinitely far away (Mitsuba
+    3.9.1; findings/)."""
+    clear = any(0.0 in m.sigma_t and any(m.sigma_t) for m in scene.media.values())
+    far = any(type_of_light(light).surrounds for light in scene.lights)
+    far |= any(isinstance(light, Directional) for light in scene.lights)
+    return clear or (scene.camera.medium is not None and far)
 
 
 BLACK: dict[str, Any] = {
@@ -133,6 +144,20 @@ MISTAKES = (
         lambda scene: (
             "in media Mitsuba's shadow rays pass masks and thin panes, which ours do not, and its "
             "paths do not count them; our own integrator, which runs in Mitsuba, takes its place"
+        ),
+    ),
+    Mistake(
+        lambda scene: scene.has_media,
+        lambda scene: (
+            "Russian roulette of Mitsuba's volpathmis takes light away: it has none here, and "
+            "paths without a limit are volpath's"
+        ),
+    ),
+    Mistake(
+        has_wrong_media,
+        lambda scene: (
+            "Mitsuba is wrong for media that are clear in one colour, and for those without end "
+            "around a camera; our own integrator, which runs in Mitsuba, takes the place of its own"
         ),
     ),
     Mistake(
