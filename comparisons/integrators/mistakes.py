@@ -109,6 +109,13 @@ def drops_light(scene: SceneModel) -> bool:
     return isinstance(scene.integrator, Path) and not environments and passing and Emissive in kinds
 
 
+ROULETTE = (
+    "Russian roulette of Mitsuba's volpathmis takes light away: it has none here, and paths "
+    "without a limit are volpath's"
+)
+"""A note on scenes with media, and on files with that integrator."""
+
+
 class Mistake(NamedTuple):
     """concerns: whether it would make Mitsuba's picture of a scene wrong;  note: for the report."""
 
@@ -144,13 +151,6 @@ MISTAKES = (
         lambda scene: (
             "in media Mitsuba's shadow rays pass masks and thin panes, which ours do not, and its "
             "paths do not count them; our own integrator, which runs in Mitsuba, takes its place"
-        ),
-    ),
-    Mistake(
-        lambda scene: scene.has_media,
-        lambda scene: (
-            "Russian roulette of Mitsuba's volpathmis takes light away: it has none here, and "
-            "paths without a limit are volpath's"
         ),
     ),
     Mistake(

@@ -9,6 +9,7 @@ from typing import Any
 from comparisons.integrators import translate_integrator
 from comparisons.integrators.mistakes import (
     BLACK,
+    ROULETTE,
     by_paths,
     counts_lights_often,
     drops_light,
@@ -272,6 +273,9 @@ def changes_to(scene: Scene) -> list[str]:
     """What `own_scene` changes in the file beyond the film and the samples, for the report."""
     parsed, changes = _parsed(scene)
     changes += notes_of_integrator(scene)
+    plugins = {node.props.plugin_name() for node in parsed.state.nodes}
+    if "volpathmis" in plugins and scene.has_media and in_place_of(scene) is None:
+        changes.append(ROULETTE)
     changes += dict.fromkeys(note for _, note in inexact(scene))
     changes += sample_visible(parsed)
     changes += exact_lamps(parsed)
