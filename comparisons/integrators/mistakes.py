@@ -8,6 +8,7 @@ from comparisons.integrators import translate_integrator, type_of
 from comparisons.integrators.light import as_path
 from comparisons.lights import type_of as type_of_light
 from reference_rt.integrators import Direct, Light, Path
+from reference_rt.lights import Directional
 from reference_rt.materials import Emissive, Mask, NoSurface, ThinDielectric
 from reference_rt.scene.model import SceneModel
 
@@ -19,7 +20,7 @@ def in_place_of(scene: SceneModel, has_solids: bool = False) -> dict[str, Any] |
     of_type = type_of(integrator)
     of_solids = of_type.media_of_solids if scene.has_media else of_type.of_solids
     wrong = has_solids or squares_opacity(scene) or misplaces(scene)
-    wrong = wrong or passes_panes(scene) or loses_lamps(scene)
+    wrong = wrong or passes_panes(scene) or loses_lamps(scene) or has_wrong_media(scene)
     return of_solids(integrator) if of_solids is not None and wrong else None
 
 
@@ -77,6 +78,16 @@ def loses_lamps(scene: SceneModel) -> bool:
     return isinstance(scene.integrator, Path) and {NoSurface, Emissive} <= kinds
 
 
+def has_wrong_media(scene: SceneModel) -> bool:
+    """A medium that is clear in one colour scatters none by `volpathmis`, and is no number by
+    `volpath`; around a camera, a medium without end is lit by what is infinitely far away (Mitsuba
+    3.9.1; findings/)."""
+    clear = any(0.0 in m.sigma_t and any(m.sigma_t) for m in scene.media.values())
+    far = any(type_of_light(light).surrounds for light in scene.lights)
+    far |= any(isinstance(light, Directional) for light in scene.lights)
+    return clear or (scene.camera.medium is not None and far)
+
+
 BLACK: dict[str, Any] = {
     "type": "constant",
     "radiance": {"type": "rgb", "value": [0.0, 0.0, 0.0]},
@@ -96,6 +107,13 @@ def drops_light(scene: SceneModel) -> bool:
     if scene.has_media:
         return False  # that is followed by another integrator, which has the light
     return isinstance(scene.integrator, Path) and not environments and passing and Emissive in kinds
+
+
+ROULETTE = (
+    "Russian roulette of Mitsuba's volpathmis takes light away: it has none here, and paths "
+    "without a limit are volpath's"
+)
+"""A note on scenes with media, and on files with that integrator."""
 
 
 class Mistake(NamedTuple):
@@ -133,6 +151,13 @@ MISTAKES = (
         lambda scene: (
             "in media Mitsuba's shadow rays pass masks and thin panes, which ours do not, and its "
             "paths do not count them; our own integrator, which runs in Mitsuba, takes its place"
+        ),
+    ),
+    Mistake(
+        has_wrong_media,
+        lambda scene: (
+            "Mitsuba is wrong for media that are clear in one colour, and for those without end "
+            "around a camera; our own integrator, which runs in Mitsuba, takes the place of its own"
         ),
     ),
     Mistake(

@@ -45,6 +45,19 @@ def _through_media(reading: Reading, node: Node) -> Path:
     return found
 
 
+NO_ROULETTE = 1 << 30
+"""In place of `rr_depth`: of no path."""
+
+
+def through_media(integrator: Path) -> Data:
+    """Russian roulette of `volpathmis` takes light away (findings/), so that it has none; paths
+    without a limit need it, and are `volpath`'s."""
+    found = translate_path(integrator)
+    if integrator.max_depth is None:
+        return {**found, "type": "volpath"}
+    return {**found, "type": "volpathmis", "rr_depth": NO_ROULETTE}
+
+
 PATH = IntegratorType(
     description=Path,
     to_mitsuba=translate_path,
@@ -54,7 +67,7 @@ PATH = IntegratorType(
         "volpath": _through_media,
         "volpathmis": _through_media,
     },
-    through_media=lambda integrator: {**translate_path(integrator), "type": "volpathmis"},
+    through_media=through_media,
     media_of_solids=lambda integrator: {**translate_path(integrator), "type": "media_of_solids"},
     edges=lambda integrator: integrator.max_depth,
 )

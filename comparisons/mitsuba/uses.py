@@ -10,7 +10,7 @@ from typing import Any, get_args
 from comparisons.results.differentiators import DifferentiatorName
 
 PLUGINS = (
-    *("scene", "path", "volpathmis", "direct", "ptracer", "aov"),
+    *("scene", "path", "volpath", "volpathmis", "direct", "ptracer", "aov"),
     *("perspective", "thinlens", "orthographic", "hdrfilm"),
     *("independent", "stratified", "multijitter"),
     *("box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos"),

@@ -1,9 +1,10 @@
 """Notes for the reader on what Mitsuba lacks or gets wrong: of materials and of integrators."""
 
-from comparisons.integrators.mistakes import notes_of_integrator
+from comparisons.integrators.mistakes import ROULETTE, in_place_of, notes_of_integrator
 from comparisons.materials import type_of
 from comparisons.mitsuba.context import TranslationContext
 from comparisons.translator.accuracy import accuracy
+from reference_rt.integrators import Path
 from reference_rt.materials import Material
 from reference_rt.rendering.scene import Scene
 
@@ -20,6 +21,8 @@ def notes_of(scene: Scene) -> list[str]:
                 "float32: comparisons.translator.accuracy)"
             )
     notes += notes_of_integrator(scene)
+    if scene.has_media and isinstance(scene.integrator, Path) and in_place_of(scene) is None:
+        notes.append(ROULETTE)
     return list(dict.fromkeys(note for note in notes if note))
 
 

@@ -6,8 +6,10 @@ checked, too."""
 import warnings
 from typing import Any
 
+from comparisons.integrators import translate_integrator
 from comparisons.integrators.mistakes import (
     BLACK,
+    ROULETTE,
     by_paths,
     counts_lights_often,
     drops_light,
@@ -243,6 +245,8 @@ def own_scene(scene: Scene, sampler: ReferenceSampler = "independent") -> Any:
         index = _first(state, mi.ObjectType.Integrator)
         assert index is not None
         state.nodes[index].props = _properties(mi, ours)
+    if scene.has_media:
+        _without_roulette(mi, state, scene)
     if drops_light(scene):
         _with_black_environment(mi, state)
     sample_visible(parsed)
@@ -269,6 +273,9 @@ def changes_to(scene: Scene) -> list[str]:
     """What `own_scene` changes in the file beyond the film and the samples, for the report."""
     parsed, changes = _parsed(scene)
     changes += notes_of_integrator(scene)
+    plugins = {node.props.plugin_name() for node in parsed.state.nodes}
+    if "volpathmis" in plugins and scene.has_media and in_place_of(scene) is None:
+        changes.append(ROULETTE)
     changes += dict.fromkeys(note for _, note in inexact(scene))
     changes += sample_visible(parsed)
     changes += exact_lamps(parsed)
@@ -376,6 +383,15 @@ def _without_moments(mi: Any, state: Any) -> None:
             ]
             if inside:
                 root[key] = mi.Properties.ResolvedReference(inside[0])
+
+
+def _without_roulette(mi: Any, state: Any, scene: Scene) -> None:
+    """`volpathmis` without Russian roulette, or `volpath`, where the file has it."""
+    wanted = translate_integrator(scene.integrator, scene.has_media)
+    for node in state.nodes:
+        is_it = node.type == mi.ObjectType.Integrator and node.props.plugin_name() == "volpathmis"
+        if is_it and wanted is not None:
+            node.props = _properties(mi, wanted)
 
 
 def _with_one_sample(mi: Any, state: Any) -> None:
