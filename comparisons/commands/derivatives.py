@@ -16,6 +16,7 @@ from comparisons.commands.options import (
     NumberOfWorkers,
     Scenes,
     Threads,
+    TimeLimit,
     compare_extra,
     out_folder,
     some_of,
@@ -23,6 +24,7 @@ from comparisons.commands.options import (
 )
 from comparisons.results.differentiators import DifferentiatorName, Guiding
 from reference_rt.cli.guarded import guarded, say
+from reference_rt.cli.quantities import seconds_of
 from reference_rt.util.errors import UsageError, printable
 
 
@@ -44,6 +46,7 @@ def derivatives(
         list[str] | None,
         typer.Option(help="Of those that sample edges; repeat it for several. (default: none)"),
     ] = None,
+    time_limit: TimeLimit = None,
     workers: NumberOfWorkers = 1,
     threads: Threads = None,
     fresh: Fresh = False,
@@ -73,6 +76,9 @@ def derivatives(
         for way in (ways if name in PROJECTIVE else (None,))
     ]
     asked = suite.load()
+    if time_limit is not None:
+        limit = seconds_of(time_limit, "--time-limit")
+        asked = asked.model_copy(update={"seconds": limit})
     planned = suite.plan(asked, scenes, chosen, names or ())
     written = ("results.json", "report.html")
     writes = Outputs(out, written, ("cases",), markdown=(markdown, suite.NAME))
@@ -85,7 +91,7 @@ def derivatives(
         options = Options(out, workers=pool, threads=threads, fresh=fresh, tell=tell)
         facts = {"suite": f"{suite.NAME}: {asked.about}"}
         run = run_cases(planned, options, suite=suite.NAME, facts=facts)
-    writes.finish(lambda: "\n".join(suite.table(run.cases).markdown()))
+    writes.finish(lambda: "\n".join(suite.table(planned, run.cases).markdown()))
     undecided = [case for case in run.cases if case.verdict in ("inconclusive", "invalid")]
     raise typer.Exit(exit_code(undecided, run.missing) if undecided or run.missing else 0)
 

@@ -17,8 +17,17 @@ from functools import partial
 import numpy as np
 
 from comparisons.compare.budget import Budget
-from comparisons.compare.derivative_causes import Ours, likeliest
+from comparisons.compare.derivative_causes import (
+    A_FACTOR,
+    EDGES,
+    Ours,
+    explained,
+    factor_of,
+    is_same,
+    likeliest,
+)
 from comparisons.compare.looks import FIRST, Pool, mean_picture, most_kept, until_decided
+from comparisons.lights import type_of
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.renderers import NoCounterpartError
 from comparisons.results.case import Case, Cause, Images, RungResult, decide
@@ -26,10 +35,12 @@ from comparisons.statistics import Known, replicates_asked, standard_error
 from comparisons.statistics.cells import Margins
 from comparisons.statistics.decide import compare
 from comparisons.statistics.sides import side_of
-from comparisons.translator.derivative import Differentiator, Moving
+from comparisons.translator.derivative import PROJECTIVE, Differentiator, Moving
 from comparisons.translator.reference import inexact
+from reference_rt.cameras.perspective import Perspective
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
+from reference_rt.util.errors import SceneError, UsageError
 
 PILOTS = 4
 """Pictures of each side that show which is noisier, and are not used again."""
@@ -46,6 +57,10 @@ a thousandth."""
 
 DEAR = 16
 """Times as many samples of an integrator whose pictures cost as much with few as with many."""
+
+WIDE = 20.0
+"""Degrees of a view that is wide enough for the octree of edges: there all of the derivative was
+left, of one of 2 degrees three quarters (`findings/mitsuba-projective-narrow-view.sh`)."""
 
 PILOT_SEED = 1 << 24
 """Of these pictures: far from those of the others."""
@@ -93,6 +108,9 @@ def derivative_case(
         say("looks for a cause")
         half = partial(_at_half_size, scene, budget, ours.times)
         cause = likeliest(ours, right, wrong, both.margins(), half)
+        if differentiator.name in PROJECTIVE and (cause is None or cause.name in (A_FACTOR, EDGES)):
+            limits = _Limits(ours, differentiator, both.margins())
+            cause = limits.likeliest(right, wrong) or cause
     rungs.append(adjoint)
     if adjoint.status == "differ":
         cause = _wrong_mode(adjoint, right, ours.times * scene.resolved_sampler.spp) or cause
@@ -145,7 +163,64 @@ def _at_half_size(scene: Scene, budget: Budget, times: int) -> tuple[FloatArray,
     theirs = _Theirs(small, asked.parameter, Differentiator(asked.integrator, asked.guiding))
     ours = Ours(small, asked.parameter, asked.step)
     ours.times = times
-    return ours.replicates(FIRST), np.stack([theirs.picture(k) for k in range(FIRST)])
+    return ours.replicates(FIRST), theirs.replicates(FIRST)
+
+
+class _Limits:
+    """What Mitsuba's integrators that sample edges cannot do: each is a cause where there is no
+    difference without it, and as large a one would be seen."""
+
+    def __init__(self, ours: Ours, by: Differentiator, margins: Margins) -> None:
+        self._ours, self._by, self._margins = ours, by, margins
+
+    def likeliest(self, right: FloatArray, wrong: FloatArray) -> Cause | None:
+        """right, wrong: replicates of both sides."""
+        try:
+            return self._of_points(right, wrong) or self._of_view(right, wrong)
+        except (NoCounterpartError, UsageError, SceneError):  # a scene that lacks the parameter
+            return None
+
+    def _of_points(self, right: FloatArray, wrong: FloatArray) -> Cause | None:
+        """Edges are found by rays that scatter, and no ray finds a lamp without extent."""
+        scene = self._ours.scene
+        points = [f"lights[{k}]" for k, x in enumerate(scene.lights) if type_of(x).has_no_extent]
+        others = tuple(x for x in scene.lights if not type_of(x).has_no_extent)
+        if not points:
+            return None
+        rest = scene.changed(lights=others)
+        part = self._without(rest, lambda x: x + (wrong.mean(axis=0) - right.mean(axis=0)))
+        if part is None:
+            return None
+        told = f"without {', '.join(points)} there is no difference"
+        return Cause("edges of shadows of lamps without extent are left out", told, part)
+
+    def _of_view(self, right: FloatArray, wrong: FloatArray) -> Cause | None:
+        """Few of the samples that an octree of edges is built of fall into what a narrow view sees.
+        A wide one has as many pixels."""
+        camera = self._ours.scene.camera
+        if not isinstance(camera, Perspective) or camera.fov is None or camera.fov >= WIDE:
+            return None
+        factor, error = factor_of(right, wrong)
+        if not self._by.is_dear or not math.isfinite(error):
+            return None
+        wide = self._ours.scene.changed(camera=camera.model_copy(update={"fov": WIDE}))
+        part = self._without(wide, lambda x: factor * x)
+        if part is None:
+            return None
+        told = (
+            f"of {camera.fov:g} degrees: {factor:.2g} of the derivative is left; with {WIDE:g} "
+            "degrees there is no difference"
+        )
+        return Cause("a view too narrow for the guiding", told, part)
+
+    def _without(self, scene: Scene, fault: Callable[[FloatArray], FloatArray]) -> float | None:
+        """Of a scene in which there is no difference: the part of what `fault` would make of ours
+        that is gone; None if there is a difference, or if that of the fault would not be seen."""
+        theirs = _Theirs(scene, self._ours.path, self._by)
+        seen, right = theirs.replicates(FIRST), self._ours.of(scene, FIRST)
+        if not is_same(right, seen, self._margins) or is_same(fault(right), seen, self._margins):
+            return None
+        return explained(right, fault(right), seen)
 
 
 class _Theirs:
@@ -163,6 +238,10 @@ class _Theirs:
     def picture(self, seed: int) -> FloatArray:
         """One replicate."""
         return self.moving.forward(self._integrator, self.times * self._spp, seed)
+
+    def replicates(self, count: int) -> FloatArray:
+        """So many."""
+        return np.stack([self.picture(k) for k in range(count)])
 
     def adjoint(self) -> RungResult:
         """The rung: the sum of the derivative's pixels with random weights, by both modes with the
@@ -287,7 +366,8 @@ def judged(
     found = replace(found, name="derivative")
     if found.status == "agree" and seen > limit:
         reason = f"what the step adds is not known better than to {seen:.2%}; {found.reason}"
-        return replace(found, status="inconclusive", reason=reason)
+        numbers = found.numbers | {"step_adds": seen}
+        return replace(found, status="inconclusive", reason=reason, numbers=numbers)
     return found
 
 

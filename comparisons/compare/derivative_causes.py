@@ -58,6 +58,8 @@ UNITS = {
 
 EDGES = "edges that move are left out"
 
+A_FACTOR = "a constant factor"
+
 NEAR = 0.01
 """How near a factor must be to one of UNITS, and its standard error to nothing."""
 
@@ -163,7 +165,7 @@ def likeliest(
         return found
     count = min(len(right), MOST)
     few = right[:count] if ours.times == 1 else ours.of(ours.scene, count)
-    if _is(few, wrong, margins):
+    if is_same(few, wrong, margins):
         return None
     for one in _hypotheses(ours, few):
         try:
@@ -173,8 +175,8 @@ def likeliest(
         if picture.shape[1:] != wrong.shape[1:]:
             continue
         inner = [_inner(x, one.rim) for x in (picture, few, wrong)]
-        if inner[0].size and _is(inner[0], inner[2], margins):
-            return Cause(one.name, one.evidence, _explained(*inner))
+        if inner[0].size and is_same(inner[0], inner[2], margins):
+            return Cause(one.name, one.evidence, explained(*inner))
         if one.name == EDGES and _size(wrong) <= NOTHING * _size(right):
             return Cause("it is 0", "the candidate does not see the parameter move", 1.0)
     return _detached(ours, few, wrong, margins)
@@ -195,18 +197,18 @@ def _detached(ours: Ours, right: FloatArray, wrong: FloatArray, margins: Margins
         if not abs(change) > NEAR_NOTHING * error:
             continue
         picture = right - change * light
-        if _is(picture, wrong, margins):
+        if is_same(picture, wrong, margins):
             return Cause(
                 "detached sampling",
                 f"{change:.4g} ± {error:.1g} times the light of {name} is missing, as where the "
                 "density of the points that are sampled there is held while the parameter changes "
                 "it",
-                _explained(picture, right, wrong),
+                explained(picture, right, wrong),
             )
     return None
 
 
-def _is(picture: FloatArray, wrong: FloatArray, margins: Margins) -> bool:
+def is_same(picture: FloatArray, wrong: FloatArray, margins: Margins) -> bool:
     """Whether the statistics see no difference."""
     if not picture.any() and not wrong.any():
         return True
@@ -226,7 +228,7 @@ def _inner(pictures: FloatArray, rim: int) -> FloatArray:
     return pictures[:, rim : height - rim, rim : width - rim]
 
 
-def _explained(picture: FloatArray, right: FloatArray, wrong: FloatArray) -> float:
+def explained(picture: FloatArray, right: FloatArray, wrong: FloatArray) -> float:
     """The part of the squared difference that goes."""
     before, after = (_square(wrong, picture=x) for x in (right, picture))
     return min(max(0.0, 1.0 - after / before), 1.0) if before > 0.0 else 0.0
@@ -247,7 +249,7 @@ def _factor(
     if not math.isfinite(factor) or error >= 0.1 * abs(factor):
         return None
     told = f"it is {factor:.4g} ± {error:.1g} times the derivative"
-    explained = _explained(factor * right, right, wrong)
+    part = explained(factor * right, right, wrong)
     if at_half_size is not None and abs(factor - 1.0) > NEAR + 3.0 * error:
         small, small_error = factor_of(*at_half_size())
         known = small_error < 0.1 * abs(small)  # else anything is four times as large
@@ -256,16 +258,16 @@ def _factor(
             return Cause(
                 "a factor that grows with the number of pixels",
                 f"{told}, and {small:.4g} ± {small_error:.1g} with a quarter of the pixels",
-                explained,
+                part,
             )
-    if not _is(factor * right, wrong, margins):
+    if not is_same(factor * right, wrong, margins):
         return None
     if abs(factor + 1.0) < max(NEAR, 3.0 * error):
-        return Cause("the sign", told, explained)
+        return Cause("the sign", told, part)
     for unit, words in UNITS.items():
         if abs(factor / unit - 1.0) < NEAR and error < NEAR * unit:
-            return Cause("another unit of the parameter", f"{told}: {words}", explained)
-    return Cause("a constant factor", told, explained)
+            return Cause("another unit of the parameter", f"{told}: {words}", part)
+    return Cause(A_FACTOR, told, part)
 
 
 def factor_of(right: FloatArray, wrong: FloatArray) -> tuple[float, float]:

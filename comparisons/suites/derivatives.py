@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field
 
 from comparisons.compare.budget import Asked, Budget, PixelSize, Seconds, usual
 from comparisons.report.table import Column, Table
-from comparisons.results.case import Case
+from comparisons.results.case import Case, RungResult
 from comparisons.statistics.wording import percent
 from comparisons.suites.suite import Changes, Plan, Work, read
 from comparisons.translator.derivative import Differentiator
@@ -82,37 +82,62 @@ def plain(text: str) -> str:
     return re.sub(r"[^\w]+", ".", text).strip(".")
 
 
-def table(cases: Sequence[Case]) -> Table[Case]:
-    """A row for each case: the verdict, the bias of the channel that is farthest off, and the
-    seconds in which Mitsuba's noise falls to a percent of the derivative's size in the image
-    mean."""
-    columns: tuple[Column[Case], ...] = (
-        Column("parameter and integrator", lambda case: case.scene),
-        Column("verdict", lambda case: case.verdict),
-        Column("likeliest cause", lambda case: "" if case.cause is None else case.cause.name),
-        Column("bias of the image mean", _bias),
-        Column("seconds to 1 %", _seconds, lambda x: "" if x is None else f"{x:.2g}", right=True),
-    )
-    return Table(columns, list(cases))
+def table(planned: Plan, cases: Sequence[Case]) -> Table[tuple[str, str]]:
+    """A row for each parameter of a scene, and a column for each integrator."""
+    verdicts = {case.scene: verdict_on(case) for case in cases}
+    cells: dict[tuple[str, str], dict[str, str]] = {}
+    integrators: dict[str, None] = {}
+    for work in planned.work:
+        asked = work.budget.derivative
+        assert asked is not None
+        by = Differentiator(asked.integrator, asked.guiding).words
+        integrators[by] = None
+        row = cells.setdefault((work.path.stem, asked.parameter), {})
+        row[by] = verdicts.get(work.name, "not run")
+
+    def column(by: str) -> Column[tuple[str, str]]:
+        return Column(by, lambda row: cells[row].get(by, ""))
+
+    scene: Column[tuple[str, str]] = Column("scene", lambda row: row[0])
+    moved: Column[tuple[str, str]] = Column("parameter", lambda row: f"`{row[1]}`")
+    return Table([scene, moved, *map(column, integrators)], list(cells))
 
 
-def _numbers(case: Case) -> dict[str, Any]:
-    return next((rung.numbers for rung in case.rungs if rung.name == "derivative"), {})
-
-
-def _bias(case: Case) -> str:
-    """Of the channel farthest from 0, with its interval, or why there is none."""
-    numbers = _numbers(case)
-    found, width = (numbers.get(key) or {} for key in ("relative_bias", "half_width_of_bias"))
-    known = {channel: value for channel, value in found.items() if value is not None}
-    if not known:
-        return case.rungs[0].reason if case.verdict == "not-comparable" else ""
-    channel = max(known, key=lambda c: abs(known[c]))
-    half = width.get(channel)
-    return f"{channel} {100.0 * known[channel]:+.3g}" + (f" ± {percent(half)}" if half else " %")
-
-
-def _seconds(case: Case) -> float | None:
-    error = _numbers(case).get("candidate_error")
+def verdict_on(case: Case) -> str:
+    """A cell of the table: the verdict; of a difference the cause, or else what differs; where
+    noise hides the answer, the factor of samples that would decide it; of what is right the seconds
+    in which Mitsuba's noise falls to a percent of the derivative's size."""
+    rungs = {rung.name: rung for rung in case.rungs}
+    found = rungs["derivative"]
+    if case.verdict == "not-comparable":
+        return "refused"
+    if case.verdict == "inconclusive":
+        if (added := found.numbers.get("step_adds")) is not None:
+            return f"our step adds up to {percent(added)}"
+        factor = found.numbers.get("samples_factor")
+        return f"too noisy: x {factor:.2g}" if factor else "too noisy: x ?"
+    told = {"agree": "agrees", "differ": "differs"}.get(case.verdict, case.verdict)
+    if case.cause is not None:
+        told = f"{told}: {case.cause.name}"
+    elif "adjoint" in rungs and rungs["adjoint"].status == "differ":
+        told = f"{told}: forward and reverse mode"
+    elif case.verdict == "differ":
+        told = f"{told}: {_difference(found)}"
+    error = found.numbers.get("candidate_error")
     taken = case.seconds.get("candidate", {}).get("render")
-    return None if error is None or taken is None else taken * (error / 0.01) ** 2
+    if error is None or taken is None or case.verdict != "agree":
+        return told
+    return f"{told} ({taken * (error / 0.01) ** 2:.2g} s)"
+
+
+def _difference(found: RungResult) -> str:
+    """The bias of the channel that is farthest off, with its interval, where the image mean
+    differs; else where it is seen."""
+    image = found.numbers.get("image") or {}
+    if not image.get("differs"):
+        return found.reason.partition(",")[0].partition(";")[0]
+    biases, widths = (image.get(key) or {} for key in ("relative_bias", "half_width_of_bias"))
+    known = {channel: value for channel, value in biases.items() if value is not None}
+    channel = max(known, key=lambda c: abs(known[c]))
+    half = widths.get(channel)
+    return f"{channel} {100.0 * known[channel]:+.3g}" + (f" ± {percent(half)}" if half else " %")

@@ -76,6 +76,35 @@ def test_edges_that_move_are_left_out_by_prb():
 
 
 @needs_llvm
+@pytest.mark.slow
+@pytest.mark.parametrize("is_lit", [True, False], ids=["sun and sky", "sky"])
+def test_shadows_of_lamps_without_extent(is_lit):
+    """A ball that rises: the edge of its shadow in sunlight."""
+    text = (ROOT / "scenes/light_directional.yaml").read_text()
+    if not is_lit:
+        text = text.replace("irradiance: [3, 2.8, 2.4]", "irradiance: 0")
+    text = text.replace("width: 128, height: 96", "width: 32, height: 24")
+    found = case(
+        "shapes[0].center[1]", text, limit=0.02, integrator="direct_projective", guiding="none"
+    )
+    assert (found.verdict == "differ") == is_lit
+    if is_lit:
+        assert found.cause.name == "edges of shadows of lamps without extent are left out"
+        assert found.cause.explained > 0.9
+
+
+@needs_llvm
+@pytest.mark.slow
+@pytest.mark.parametrize(("fov", "cause"), [(0.2, "a view too narrow for the guiding"), (40, None)])
+@pytest.mark.filterwarnings("ignore:.*an angle of view of 0.2 degrees")
+def test_a_narrow_view(fov, cause):
+    text = DISK.replace("fov: 60", f"fov: {fov}").replace("8, height: 8", "4, height: 4")
+    found = case("shapes[1].transform[0].scale", text, integrator="direct_projective")
+    assert (found.verdict == "differ") == (cause is not None)
+    assert (found.cause and found.cause.name) == cause
+
+
+@needs_llvm
 def test_a_fault_in_what_moves_is_seen(monkeypatch):
     """Of what the translation gives: 2 % faster, and the wrong way."""
     true = Moving.__init__
