@@ -30,8 +30,7 @@ class Camera(Description):
     """The near clipping plane: its distance from the eye along the direction of view, in scene
     units.  Nothing in front of it is seen, and distances in the picture count from it."""
     far: Positive | None = None
-    """The far clipping plane, likewise: nothing behind it is seen but the environment.  Default:
-    none."""
+    """The far clipping plane: nothing behind it is seen but the environment.  Default: none."""
     medium: str | None = None
     """Name of the medium in which the camera's rays begin.  Default: none."""
 

@@ -40,6 +40,8 @@ REQUIRED = {
         "irradiance": [0.5, 0.25, 1.0],
     },
     "Spot": {"origin": [1.0, 2.0, 3.0], "target": [0.0, 0.0, 1.0], "intensity": [0.5, 0.25, 1.0]},
+    "BlendPhase": {"first": {"type": "isotropic"}, "second": {"type": "hg", "g": 0.5}},
+    "Homogeneous": {"sigma_t": [0.5, 0.25, 1.0], "albedo": [0.5, 0.25, 1.0]},
     "Bump": {"base": "m", "height": "t"},
     "Conductor": {"eta": [0.25, 0.5, 1.5], "k": [4.0, 2.0, 1.5]},
     "RoughConductor": {"eta": [0.25, 0.5, 1.5], "k": [4.0, 2.0, 1.5], "alpha": [0.25, 0.5]},
