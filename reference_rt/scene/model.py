@@ -86,8 +86,7 @@ class SceneModel(Description):
     description: str = ""
     """One line about the scene, for people."""
     camera: AnyCamera = Perspective()
-    """The view.  Default: a perspective camera at [0, 0, 1] that looks at the origin, 45 degrees
-    wide."""
+    """The view.  Default: in perspective from [0, 0, 1] to the origin, 45 degrees wide."""
     film: Film = Film()
     """Size of the picture, reconstruction filter and additional layers."""
     sampler: AnySampler | None = None
@@ -100,8 +99,7 @@ class SceneModel(Description):
     materials: dict[str, AnyMaterial] = Field(default_factory=dict)
     """Materials by name, which shapes and other materials refer to."""
     media: dict[str, AnyMedium] = Field(default_factory=dict)
-    """What fills the space between surfaces, by name, which shapes and the camera refer to.  Path
-    tracing alone follows light through media."""
+    """Media by name, which shapes and the camera refer to.  For path tracing."""
     shapes: tuple[AnyShape, ...] = Field(default=(), strict=False)
     """All surfaces and solids; the index of a shape is its place in this list, from 0."""
     groups: dict[str, Annotated[tuple[AnyShape, ...], Field(strict=False, min_length=1)]] = Field(
