@@ -107,13 +107,26 @@ class Specular(Part):
     specular_color_texture: TextureInfo | None = None
 
 
+class Transmission(Part):
+    transmission_factor: Unit = 0.0
+    transmission_texture: TextureInfo | None = None
+
+
+class Volume(Part):
+    thickness_factor: NotNegative = 0.0
+    attenuation_distance: Annotated[float, Field(gt=0)] | None = None
+    attenuation_color: UnitColour = [1.0] * 3
+
+
 class MaterialExtensions(Part):
     emissive_strength: EmissiveStrength = Field(
         EmissiveStrength(), alias="KHR_materials_emissive_strength"
     )
     ior: Ior = Field(Ior(), alias="KHR_materials_ior")
     specular: Specular = Field(Specular(), alias="KHR_materials_specular")
+    transmission: Transmission = Field(Transmission(), alias="KHR_materials_transmission")
     unlit: dict[str, Any] | None = Field(None, alias="KHR_materials_unlit")
+    volume: Volume = Field(Volume(), alias="KHR_materials_volume")
 
 
 class Material(Part):
@@ -246,7 +259,9 @@ READ = frozenset(
         "KHR_materials_emissive_strength",
         "KHR_materials_ior",
         "KHR_materials_specular",
+        "KHR_materials_transmission",
         "KHR_materials_unlit",
+        "KHR_materials_volume",
         "KHR_mesh_quantization",
         "KHR_texture_transform",
     )

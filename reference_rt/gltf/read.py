@@ -180,6 +180,7 @@ def _scene(reading: Reading, cls: type[M], options: Mapping[str, str]) -> M:
         film=film,
         textures=shapes.surfaces.textures,
         materials=shapes.surfaces.materials,
+        media=shapes.surfaces.media,
         shapes=tuple(shapes.shapes),
         groups=shapes.groups,
         lights=tuple(lights),
@@ -297,6 +298,7 @@ class _Shapes:
                 more_uv=found.more_uv,
                 colours=colours,
                 material=surface.name,
+                interior=surface.medium,
             )
         except SceneError as error:
             raise self.reading.error(f"{where}: {error}") from None

@@ -17,13 +17,17 @@ from reference_rt.core.image_files import open_image
 from reference_rt.gltf.document import Document, Image, Material, TextureInfo, TextureTransform
 from reference_rt.materials import (
     AnyMaterial,
+    Dielectric,
     Diffuse,
     Emissive,
     GltfPbr,
     Mask,
     NormalMap,
+    RoughDielectric,
+    ThinDielectric,
     TwoSided,
 )
+from reference_rt.media import AnyMedium, Homogeneous
 from reference_rt.shapes.meshes.files.gltf import GltfFile, inline
 from reference_rt.textures import AnyTexture, Bitmap, Product, VertexColours
 from reference_rt.textures.image_file import Channel, Encoding
@@ -74,22 +78,25 @@ class Reading:
 class Surface(NamedTuple):
     """name: of our material;  emits: whether it is a lamp;  is_bright: one of more than 1, which is
     meant to light others;  is_clear: whether opacity is less than 1 anywhere;  tilt: the name of
-    its normal map, None for none."""
+    its normal map, None for none;  medium: that of the medium behind it, likewise."""
 
     name: str
     emits: bool
     is_bright: bool
     is_clear: bool
     tilt: str | None
+    medium: str | None = None
 
 
 class Surfaces:
-    """The materials of a file as ours.  `textures` and `materials` are those of the scene."""
+    """The materials of a file as ours.  `textures`, `materials` and `media` are those of the
+    scene."""
 
     def __init__(self, reading: Reading) -> None:
         self.reading = reading
         self.textures: dict[str, AnyTexture] = {}
         self.materials: dict[str, AnyMaterial] = {}
+        self.media: dict[str, AnyMedium] = {}
         self._made: dict[tuple[int | None, bool], Surface] = {}
         self._named: dict[str, str] = {}
         self._files: dict[int, str] = {}
@@ -127,6 +134,13 @@ class Surfaces:
             return factor if name is None else name
 
         pbr, more = material.pbr_metallic_roughness, material.extensions
+        if more.transmission.transmission_factor > 0.0:
+            glass = self._glass(material, where, coloured)
+            if glass is not None:
+                # Glass has no other side than its own.
+                one_sided = material.model_copy(update={"double_sided": False})
+                found = self._nested(one_sided, index, glass, 1.0, ([], (0.0, 0.0, 0.0)), image)
+                return found._replace(medium=self._medium(material, found.name))
         parts = [image(pbr.base_color_texture, encoding="srgb"), self._vertices(coloured)]
         factor = pbr.base_color_factor[:3]
         opacity = _opacity(material, image, number)
@@ -156,6 +170,53 @@ class Surfaces:
         if material.occlusion_texture is not None:
             self.reading.note("occlusion textures are ignored: the shapes themselves occlude light")
         return self._nested(material, index, leaf, opacity, (parts, factor), image)
+
+    def _glass(self, material: Material, where: str, coloured: bool) -> AnyMaterial | None:
+        """The glass of a material that transmits all light; None, and a word, for others.
+
+        KHR_materials_transmission and KHR_materials_volume: with a thickness the surface is the
+        boundary of a body, which light enters by refraction, else a thin sheet.
+        """
+        pbr, more = material.pbr_metallic_roughness, material.extensions
+        ior, alpha = more.ior.ior, pbr.roughness_factor * pbr.roughness_factor
+        is_thin = more.volume.thickness_factor == 0.0
+        reasons = {
+            "less than all light": more.transmission.transmission_factor < 1.0,
+            "light by a texture": more.transmission.transmission_texture is not None,
+            "tinted light": pbr.base_color_factor[:3] != [1.0] * 3
+            or pbr.base_color_texture is not None
+            or coloured,
+            "light beside a metal": pbr.metallic_factor > 0.0,
+            "light with a roughness by a texture": pbr.metallic_roughness_texture is not None,
+            "light that it emits": max(material.emissive_factor) > 0.0,
+            "light by a specular factor": more.specular.specular_factor != 1.0
+            or more.specular.specular_color_factor != [1.0] * 3,
+            "light with opacity": material.alpha_mode != "OPAQUE",
+            "light through a thin and rough sheet": is_thin and alpha > 0.0,
+            "light with an index of at most 1": ior <= 1.0,
+        }
+        for what, is_so in reasons.items():
+            if is_so:
+                self.reading.lack(f"{where} transmits {what}; expected clear white glass")
+                return None
+        if is_thin:
+            return ThinDielectric(interior_ior=ior)
+        if alpha == 0.0:
+            return Dielectric(interior_ior=ior, exterior_ior=1.0)
+        return RoughDielectric(interior_ior=ior, exterior_ior=1.0, alpha=(alpha, alpha))
+
+    def _medium(self, material: Material, name: str) -> str | None:
+        """The name of the medium in a glass: what is left after the attenuation's distance is its
+        colour; None where nothing is lost."""
+        volume = material.extensions.volume
+        distance, colour = volume.attenuation_distance, volume.attenuation_color
+        if volume.thickness_factor == 0.0 or distance is None or min(colour) == 1.0:
+            return None
+        # Of black nothing is left: exp(-700) is as near to that as float64's numbers.
+        sigma = [min(-math.log(c), 700.0) if c > 0.0 else 700.0 for c in colour]
+        r, g, b = (s / distance for s in sigma)
+        self.media[name] = Homogeneous(sigma_t=(r, g, b), albedo=(0.0, 0.0, 0.0))
+        return name
 
     def _nested(
         self,
