@@ -282,6 +282,18 @@ def test_a_difference_is_shown_by_as_many_pictures_as_ever() -> None:
     assert any("24 pictures by each renderer" in note for note in case.notes)
 
 
+def test_media_have_independent_samples_of_mitsubas() -> None:
+    """Its stratified samplers are biased there; the same of a scene without media are not."""
+    for name, sampler in (("coloured_fog", "independent"), ("soft_shadows", "multijitter")):
+        case = comparisons.compare.compare.compare_scene(
+            comparisons.compare.compare.Subject(small(name)),
+            usual(4, 2, fixed=True, limit=0.5),
+            lambda _: None,
+            rungs=("statistics",),
+        )
+        assert any(f"Mitsuba's {sampler}" in note for note in case.notes), case.notes
+
+
 @pytest.mark.parametrize(
     ("given", "expected"),
     [
