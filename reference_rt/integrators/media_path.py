@@ -26,7 +26,7 @@ from typing import NamedTuple
 from reference_rt import lights as any_light
 from reference_rt import materials as any_material
 from reference_rt import sampling
-from reference_rt.accel.geometry import closest_hit
+from reference_rt.accel.geometry import closest_hit, occluded
 from reference_rt.core.ray import Hit, Ray, SurfacePoint, at, ray_from
 from reference_rt.core.vec3 import (
     Vec3,
@@ -137,14 +137,18 @@ def fly(
     left = -math.log1p(-u)
     passed = Passed(nothing, nothing)
     while True:
-        hit = closest_hit(scene.geometry, ray)
+        until = ray
         if medium >= 0 and media.scatters[medium] != 0:
+            # Where it scatters, unless a surface is nearer.
+            free = max(0.0, left - component(passed.sampled, hue))
             sigma = media.sigma_t[medium, hue]
-            before = component(passed.sampled, hue)
-            if before + thickness(sigma, hit.t) > left:
-                t = min(max(0.0, left - before) / sigma, _FARTHEST)
-                there = _in_space(at(ray, t), ray.d)
-                return Flight(True, ray, hit, there, medium, _further(media, medium, passed, t))
+            if free < thickness(sigma, ray.t_max):
+                until = Ray(ray.o, ray.d, free / sigma)
+        hit = closest_hit(scene.geometry, until)
+        if hit.kind < 0 and until.t_max < ray.t_max:
+            t = min(until.t_max, _FARTHEST)
+            there = _in_space(at(ray, t), ray.d)
+            return Flight(True, ray, hit, there, medium, _further(media, medium, passed, t))
         passed = _further(media, medium, passed, hit.t)
         if hit.kind < 0:
             return Flight(False, ray, hit, _in_space(ray.o, ray.d), medium, passed)
@@ -162,6 +166,10 @@ def _look(scene: KernelScene, media: Media, ray: Ray, medium: int) -> Way:
     """Follow a shadow ray, whose direction may have any length."""
     nothing = Vec3(0.0, 0.0, 0.0)
     passed, unit = Passed(nothing, nothing), length(ray.d)
+    if media.any_passes == 0:  # then any surface ends it, in the medium in which it begins
+        if occluded(scene.geometry, ray):
+            return Way(False, passed)
+        return Way(True, _further(media, medium, passed, ray.t_max * unit))
     while True:
         hit = closest_hit(scene.geometry, ray)
         passed = _further(media, medium, passed, hit.t * unit)

@@ -26,7 +26,7 @@ class Media(NamedTuple):
     whether no medium that scatters has another sigma_t for another colour.
     inside, outside (n,): the medium behind and in front of a surface with this material: its
     number, VACUUM, or UNCHANGED for a surface that bounds none;  passes (n,): whether there is no
-    surface, so that rays go straight on.
+    surface, so that rays go straight on;  any_passes: whether there is such a material.
     """
 
     sigma_t: FloatArray
@@ -37,6 +37,7 @@ class Media(NamedTuple):
     inside: IntArray
     outside: IntArray
     passes: IntArray
+    any_passes: int
 
 
 def media_table(
@@ -64,6 +65,7 @@ def media_table(
         inside=np.ascontiguousarray(inside),
         outside=np.ascontiguousarray(outside),
         passes=np.array(passes, np.int64),
+        any_passes=int(any(passes)),
     )
 
 
