@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from reference_rt.cli.guarded import say
+from reference_rt.cli.picture_above import first_look, pixels_of
 from reference_rt.cli.quantities import percentage
 from reference_rt.cli.terminal_picture import Pixels, draws_sixels, half_blocks, room, sixels
-from reference_rt.rendering.image import display, eight_bits
 from reference_rt.rendering.loop import Limits
 from reference_rt.rendering.picture import Picture
 from reference_rt.rendering.render import Session, with_settings
@@ -142,9 +142,9 @@ def _show(scene: BuiltScene, view: View, wanted: Wanted, check: Callable[[], Non
     """Render, and show the picture again and again: each second at first, later after a tenth of
     the time so far.  check: called a few times per second."""
     error, threads = wanted.error, wanted.threads
-    with ProgressLine() as progress:
+    with ProgressLine() as progress, first_look(scene, progress) as compiling:
         limits = Limits(error=error) if _is_noisy(scene) else Limits()
-        session = Session(scene, threads=threads, compiling=progress.compiling, limits=limits)
+        session = Session(scene, threads=threads, compiling=compiling, limits=limits)
     began = due = time.monotonic()
 
     def watch() -> None:
@@ -195,11 +195,6 @@ def view_of(to: str, scene: Scene) -> View:
         known = ", ".join(PLACES)
         raise UsageError(f"--to: expected one of {known} or a .png file, got '{to}'")
     return File(Path(to))
-
-
-def pixels_of(picture: Picture) -> Pixels:
-    """The picture as the command `render` would write it to a .png file."""
-    return eight_bits(display(picture))
 
 
 class File:

@@ -11,12 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from reference_rt.cli.options import Where
+from reference_rt.cli.picture_above import Growing, first_look
 from reference_rt.cli.quantities import bytes_of, duration, percentage, seconds_of, share_of
 from reference_rt.integrators import Light
 from reference_rt.jit.kernel_cache import cache_root
 from reference_rt.rendering import image
 from reference_rt.rendering.checkpoint import delete_old
 from reference_rt.rendering.loop import Limits
+from reference_rt.rendering.picture import Picture
 from reference_rt.rendering.query import intersect
 from reference_rt.rendering.render import Session, Storage
 from reference_rt.rendering.scene import Scene
@@ -104,12 +106,12 @@ def render_to_file(
     memory, limits, storage = limited.bytes(), limited.limits(), stored.storage()
     where.check()
     code = 0
-    with ProgressLine() as progress:
+    with ProgressLine() as progress, first_look(scene, progress) as compiling:
         session = Session(
             scene,
             threads=where.threads,
             workers=partial(where.open, Processes) if where.is_elsewhere else None,
-            compiling=progress.compiling,
+            compiling=compiling,
             limits=limits,
             storage=storage,
             memory=memory,
@@ -209,6 +211,7 @@ class Watch:
         self._began = time.monotonic()
         self._next_line, self._between = self._began + _FIRST_LINE, _FIRST_LINE
         self._next_preview = self._began if preview is not None else math.inf
+        self._growing = Growing(progress)
 
     def __call__(self) -> None:
         now = time.monotonic()
@@ -219,8 +222,17 @@ class Watch:
             self._between = min(2.0 * self._between, _MOST_BETWEEN_LINES)
             self._next_line = now + self._between
             self._progress.line(self._line(now - self._began, error))
+        if self._growing.is_due and (picture := self._so_far()) is not None:
+            self._growing.show(picture, now)
         if now >= self._next_preview and self._preview is not None:
             self._write_preview(self._preview, now)
+
+    def _so_far(self) -> Picture | None:
+        """The picture, once all pixels have samples."""
+        picture = self._session.preview()
+        if picture is None or picture.taken is None or picture.taken.fewest == 0:
+            return None
+        return picture
 
     def _line(self, elapsed: float, error: str) -> str:
         loop = self._session.loop
@@ -231,8 +243,8 @@ class Watch:
         return ", ".join([*parts, error] if error else parts)
 
     def _write_preview(self, path: Path, now: float) -> None:
-        picture = self._session.preview()
-        if picture is None or picture.taken is None or picture.taken.fewest == 0:
+        picture = self._so_far()
+        if picture is None:
             return
         with suppress(ImageError):  # the next one may be written
             picture.save(path)

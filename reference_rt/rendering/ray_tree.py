@@ -25,9 +25,7 @@ The sum of all `adds`, ray after ray from 0, is the sample's radiance, to the la
 import functools
 import inspect
 import math
-import os
 import pickle
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -43,11 +41,11 @@ from reference_rt.accel import geometry as geometries
 from reference_rt.accel.bvh import CENTER, CHILDREN, child_of, size_of
 from reference_rt.accel.leaf import nearer_primitive, nearest_of_triangle_leaf
 from reference_rt.accel.single_ray import enter
+from reference_rt.core.arrays import FloatArray
 from reference_rt.core.ray import Ray, at, hit_of, point_of, ray_of
 from reference_rt.core.vec3 import Vec3, is_black, length
 from reference_rt.integrators import (
     Light,
-    RayCast,
     direct,
     direct_light,
     media_path,
@@ -60,11 +58,9 @@ from reference_rt.integrators import (
 from reference_rt.integrators.scene_tables import KernelScene
 from reference_rt.jit.simd import VECTOR_WIDTH
 from reference_rt.rendering import tiles
-from reference_rt.rendering.accumulation import jobs_of
 from reference_rt.rendering.executor import build_and_check
-from reference_rt.rendering.kernels import plain_arguments
+from reference_rt.rendering.plain_python import PlainTile, plain_tile, request, started_with
 from reference_rt.scene.build import BuiltScene
-from reference_rt.util.processes import tied
 
 RayRecord = dict[str, Any]
 
@@ -81,19 +77,14 @@ def ray_trees(scene: BuiltScene, places: Sequence[tuple[int, int, int]]) -> list
             "a pixel of 'light' is no mean of samples of its own; expected 'path'",
             *("integrator", "type"),
         )
-    film = scene.film
-    tables = build_and_check(scene, None)
-    view = scene.camera.setup(film.width, film.height)
-    given = plain_arguments(jobs_of(scene)[0], tables, view, film.filter.setup())
-    asked = [((film.width * y + x), sample) for x, y, sample in places]
-    is_cast = isinstance(scene.integrator, RayCast)
+    build_and_check(scene)
+    width = scene.film.width
+    asked = [((width * y + x), sample) for x, y, sample in places]
     done = subprocess.run(
-        [sys.executable, "-P", "-c", f"from {__name__} import _answer; _answer()"],
-        input=pickle.dumps((is_cast, given, asked)),
-        env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(sys.path)},
+        **started_with(_answer),
+        input=pickle.dumps((plain_tile(scene), asked)),
         stdout=subprocess.PIPE,
         check=True,
-        **tied(),
     )
     found: list[dict[str, Any]] = pickle.loads(done.stdout)
     return found
@@ -101,18 +92,16 @@ def ray_trees(scene: BuiltScene, places: Sequence[tuple[int, int, int]]) -> list
 
 def _answer() -> None:
     """The second process: from the arguments of a kernel on standard input to trees."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # the first process says that it was interrupted
-    is_cast, arguments, asked = pickle.load(sys.stdin.buffer)
+    tile, asked = request()
     with np.errstate(all="ignore"):
-        trees = [_tree(is_cast, arguments, *one) for one in asked]
+        trees = [_tree(tile, *one) for one in asked]
     sys.stdout.buffer.write(pickle.dumps(trees))
 
 
-def _tree(is_cast: bool, arguments: Any, pixel: int, sample: int) -> dict[str, Any]:
-    kernel: Any = tiles.aov_tile if is_cast else tiles.render_tile
-    out: Any = [np.zeros((1, 10))] if is_cast else [np.zeros((1, 3)), np.zeros((0, 3))]
-    recorder, scene = _Recorder(), arguments[0 if is_cast else 1]
-    recorder.run(lambda: kernel(*arguments, *out, pixel, pixel + 1, sample, sample + 1))
+def _tree(tile: PlainTile, pixel: int, sample: int) -> dict[str, Any]:
+    recorder, scene = _Recorder(), tile.arguments[0 if tile.is_cast else 1]
+    values: list[FloatArray] = []
+    recorder.run(lambda: values.append(tile.add(pixel, sample)))
     radiance = Vec3(0.0, 0.0, 0.0)
     for ray in recorder.rays:
         for _, value in ray["adds"]:
@@ -123,7 +112,7 @@ def _tree(is_cast: bool, arguments: Any, pixel: int, sample: int) -> dict[str, A
             "radiance": radiance,
             "filter_weight": recorder.filter_weight,
             "exposure": recorder.exposure,
-            "value": out[0][0, :3],
+            "value": values[0][:3],
         }
     )
     return tree

@@ -1,10 +1,11 @@
 """Progress display: a bar on a terminal, else one line per step; on standard error only."""
 
 import time
+from collections.abc import Iterable
 from types import TracebackType
 from typing import Self
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.progress import (
     BarColumn,
     Progress,
@@ -14,12 +15,30 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.text import Text
 
 from reference_rt.util.errors import printable
 
 _WORDS = {"compile": "compiling kernels", "render": "rendering"}
 _PATIENCE = 0.4
 """Seconds before compiling is mentioned: kernels from the cache load faster than that."""
+
+
+_REFRESHED = 4.0
+"""Times a second that bars are drawn."""
+
+_MOST_COLUMNS, _MOST_ROWS = 64, 20
+
+
+class _Topped(Progress):
+    """Bars, and what stands above them."""
+
+    top: RenderableType = ""
+
+    def get_renderables(self) -> Iterable[RenderableType]:
+        if self.top:
+            yield self.top
+        yield from super().get_renderables()
 
 
 class Bar:
@@ -30,12 +49,13 @@ class Bar:
 
     def __init__(self, *columns: ProgressColumn, console: Console | None = None) -> None:
         self._console = console or Console(stderr=True, highlight=False)
-        self._bar = Progress(
+        self._bar = _Topped(
             TextColumn("{task.description}", markup=False),
             BarColumn(),
             *columns,
             console=self._console,
             transient=True,
+            refresh_per_second=_REFRESHED,
         )
 
     def __enter__(self) -> Self:
@@ -55,6 +75,17 @@ class Bar:
     @property
     def is_terminal(self) -> bool:
         return self._console.is_terminal
+
+    @property
+    def room(self) -> tuple[int, int]:
+        """Columns and rows for a picture above the bars: small, since it is sent again and again,
+        perhaps over a network."""
+        return min(self._console.width, _MOST_COLUMNS), min(self._console.height // 2, _MOST_ROWS)
+
+    def show(self, text: str) -> None:
+        """Shows text, such as a picture of blocks, above the bars in place of the text before."""
+        if self.is_terminal:
+            self._bar.top = Text.from_ansi(text, no_wrap=True, end="")
 
     def line(self, text: str) -> None:
         """Prints a line that remains when the bar disappears."""
