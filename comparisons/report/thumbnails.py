@@ -39,6 +39,12 @@ class Thumbnail:
     nonfinite: int
     """pixels of the full picture that are not finite"""
 
+    @property
+    def pixels(self) -> npt.NDArray[np.uint8]:
+        """What the PNG shows (height, width, 3)."""
+        data = base64.b64decode(self.url.partition(",")[2])
+        return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
+
 
 @dataclass(frozen=True)
 class Thumbnails:

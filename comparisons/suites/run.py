@@ -87,6 +87,10 @@ class Display(Count):
         told = self._steps or case.verdict not in PASSING
         if told:
             line.append(named(f": {headline(case)}", case.sides))
+        if self._steps and self.is_terminal and case.images is not None:
+            from comparisons.report.terminal_pictures import side_by_side
+
+            self._console.print(side_by_side(case, self._console.width), soft_wrap=True)
         self._console.print(line, soft_wrap=True)
         if told:
             tell(self._console, case)
