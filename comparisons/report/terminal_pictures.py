@@ -25,7 +25,8 @@ def side_by_side(case: Case, columns: int) -> Text:
     blocks = [half_blocks(picture.pixels, each, _MOST_ROWS).splitlines() for picture, _ in shown]
     widths = [lines[0].count("▀") for lines in blocks]
     titles = [title[:width].ljust(width) for (_, title), width in zip(shown, widths, strict=True)]
-    rows = [titles]
-    for parts in zip_longest(*blocks):
-        rows.append([part or " " * width for part, width in zip(parts, widths, strict=True)])
-    return Text.from_ansi("\n".join(_GAP.join(row) for row in rows), no_wrap=True)
+    rows = [
+        [part or " " * width for part, width in zip(parts, widths, strict=True)]
+        for parts in zip_longest(*blocks)
+    ]
+    return Text.from_ansi("\n".join(map(_GAP.join, [titles, *rows])), no_wrap=True)
