@@ -11,18 +11,22 @@ STRATIFIED = ("stratified", "multijitter", "orthogonal", "ldsampler")
 """Mitsuba's samplers that are read as Sobol' points."""
 
 
-def translate_sampler(sampler: Any, in_file: bool = False) -> dict[str, Any]:
-    """A sampler's dict;  in_file: with its seed, and of the kind that ours is.  Raises
-    UntranslatableError."""
+def translate_sampler(
+    sampler: Any, in_file: bool = False, has_media: bool = False
+) -> dict[str, Any]:
+    """A sampler's dict;  in_file: with its seed, and of the kind that ours is;  has_media: whether
+    the scene has media.  Raises UntranslatableError."""
     match sampler:
         case Grid(spp=spp):
             return {"type": "stratified", "sample_count": spp, "jitter": False}
         case Sobol(spp=spp, seed=seed) | Independent(spp=spp, seed=seed):
             found: dict[str, Any] = {"type": "independent", "sample_count": spp}
             if in_file:
-                # Mitsuba's sequence of the kind that Sobol' points are.
-                found["type"] = "ldsampler" if isinstance(sampler, Sobol) else "independent"
                 found["seed"] = seed
+                # Not `ldsampler`, though it is nearer to Sobol' points: its pictures have another
+                # mean.  In media no stratified sampler has the right one (`findings/`).
+                if isinstance(sampler, Sobol) and not has_media:
+                    found["type"] = "multijitter"
             return found
     raise UntranslatableError(sampler, "sampler")
 

@@ -141,7 +141,7 @@ def sensor(scene: Scene, surfaces: Surfaces) -> Element:
     """The camera, with film and sampler.  Raises UntranslatableError."""
     values = translate_camera(scene.camera, scene.film, surfaces.context)
     values["film"] = translate_film(scene.film)
-    values["sampler"] = translate_sampler(scene.resolved_sampler, in_file=True)
+    values["sampler"] = translate_sampler(scene.resolved_sampler, True, scene.has_media)
     found = surfaces.element(values, "sensor")
     if scene.camera.medium is not None:
         found.values["medium"] = surfaces.medium(scene.camera.medium)

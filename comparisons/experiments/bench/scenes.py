@@ -28,10 +28,10 @@ from comparisons.experiments.bench.row import (
     spread,
 )
 from comparisons.experiments.convergence.methods import (
-    CANDIDATES,
     METHODS,
     AbsentError,
     Taken,
+    candidates,
     in_turn,
     with_sampler,
 )
@@ -193,12 +193,13 @@ def _rows(name: str, scene: Scene, setting: Setting) -> list[Row]:
     small = sized(scene, FEWEST)
     first = in_turn(small, {"ours": OURS, "default": DEFAULT}, SPP, 2, setting.say)
     seconds = {who: float(one.warm.min()) for who, one in first.items()}
-    if len(CANDIDATES) * PICTURES * seconds["default"] < SECONDS:
-        candidates = {sampler: with_sampler(DEFAULT, sampler) for sampler in CANDIDATES}
-        trial = in_turn(small, candidates, SPP, PICTURES, setting.say)
-        sampler = min(CANDIDATES, key=lambda candidate: trial[candidate].work)
+    names = candidates(scene)
+    if len(names) * PICTURES * seconds["default"] < SECONDS:
+        by_name = {sampler: with_sampler(DEFAULT, sampler) for sampler in names}
+        trial = in_turn(small, by_name, SPP, PICTURES, setting.say)
+        sampler = min(names, key=lambda candidate: trial[candidate].work)
     else:
-        sampler, pictures = USUAL, FEW
+        sampler, pictures = USUAL if USUAL in names else names[0], FEW
     pixels = affordable(seconds["ours"] + 2.0 * seconds["default"], budget / pictures)
     if pictures == FEW:  # most of such seconds do not depend on the number of pixels
         pixels = PIXELS // 4

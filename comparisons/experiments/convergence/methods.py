@@ -294,9 +294,17 @@ def why_left_out(
 # ---- Mitsuba's best sampler ---------------------------------------------------------------------
 
 
-CANDIDATES = ("independent", "multijitter", "ldsampler", "orthogonal")
+CANDIDATES = ("independent", "multijitter", "orthogonal")
 """Not `stratified`: multijitter is never worse (64 samples: 1.76 against 1.57 ms in a Cornell box,
-0.28 against 0.26 ms with `veach_mis`)."""
+0.28 against 0.26 ms with `veach_mis`).  Not `ldsampler`: the mean of its pictures is another one,
+by 0.5 % in Mitsuba's Cornell box (`findings/mitsuba-ldsampler.sh`)."""
+
+
+def candidates(scene: Scene) -> tuple[str, ...]:
+    """Mitsuba's samplers whose pictures of a scene have the right mean: of media, that of
+    independent samples alone has it (`findings/mitsuba-media-stratified.sh`)."""
+    return CANDIDATES[:1] if scene.has_media else CANDIDATES
+
 
 SPP = 256
 """Samples a pixel of the trial; orthogonal takes 289.  With fewer it looks worse than it is later:
@@ -314,8 +322,8 @@ def merits(scene: Scene, method: Method) -> dict[str, float]:
     the best.  Raises as `Stable.ready` does."""
     width, height = size_within(scene.film, WIDEST)
     film = scene.film.model_copy(update={"width": width, "height": height})
-    candidates = {name: with_sampler(method, name) for name in CANDIDATES}
-    found = in_turn(scene.changed(film=film), candidates, SPP, PICTURES)
+    by_name = {name: with_sampler(method, name) for name in candidates(scene)}
+    found = in_turn(scene.changed(film=film), by_name, SPP, PICTURES)
     return {name: one.work for name, one in found.items()}
 
 

@@ -11,6 +11,7 @@ from typing import Any, get_args
 import numpy as np
 import OpenEXR
 import pytest
+from builders import SCENES
 from exr_writer import exr
 from PIL import Image
 
@@ -293,3 +294,22 @@ def test_defaults_of_sensors(plugin: str) -> None:
     found = numbers(to_mitsuba(read(sensor=given))["sensor"])
     assert len(found) >= 5
     assert found == numbers(given)
+
+
+@pytest.mark.parametrize("sampler", SAMPLER_EXAMPLES, ids=lambda one: one.type)
+@pytest.mark.parametrize("has_media", [False, True])
+def test_samplers_in_files(sampler: Any, has_media: bool) -> None:
+    """Of those whose pictures have the right mean (`findings/mitsuba-ldsampler.sh` and
+    `mitsuba-media-stratified.sh`), the one that is nearest to ours."""
+    found = translate_sampler(sampler, in_file=True, has_media=has_media)["type"]
+    if isinstance(sampler, rt.Grid):
+        assert found == "stratified"  # without jitter: no random numbers
+    else:
+        is_spread = isinstance(sampler, rt.Sobol) and not has_media
+        assert found == ("multijitter" if is_spread else "independent")
+
+
+def test_media_are_seen_where_a_file_is_written(tmp_path: Path) -> None:
+    for name, sampler in (("fog", "independent"), ("cornell_box", "multijitter")):
+        write_xml(Scene.load(SCENES / f"{name}.yaml"), path := tmp_path / f"{name}.xml")
+        assert f'<sampler type="{sampler}">' in path.read_text()
