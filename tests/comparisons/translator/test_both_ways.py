@@ -298,7 +298,7 @@ def test_defaults_of_sensors(plugin: str) -> None:
 
 @pytest.mark.parametrize("sampler", SAMPLER_EXAMPLES, ids=lambda one: one.type)
 @pytest.mark.parametrize("has_media", [False, True])
-def test_samplers_in_files(sampler: Any, has_media: bool) -> None:
+def test_which_samplers_are_written(sampler: Any, has_media: bool) -> None:
     """Of those whose pictures have the right mean (`findings/mitsuba-ldsampler.sh` and
     `mitsuba-media-stratified.sh`), the one that is nearest to ours."""
     found = translate_sampler(sampler, in_file=True, has_media=has_media)["type"]
