@@ -6,7 +6,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from reference_rt.util.errors import SceneError, meant
+from reference_rt.util.errors import SceneError, means, meant, meant_by
 
 Keys = tuple[str | int, ...]
 
@@ -36,10 +36,56 @@ _NAMED = {
 """The part of the scene that has what a field names."""
 
 _ELSEWHERE = {
-    "area": "a lamp is a shape whose material has the type 'emissive'",
-    "spp": "samples per pixel are set in 'sampler', such as {type: sobol, spp: 64}",
+    "area": ("point", "a lamp is a shape whose material has the type 'emissive'"),
+    **dict.fromkeys(
+        ("spp", "samples"),
+        ("filter", "samples per pixel are set in 'sampler', such as {type: sobol, spp: 64}"),
+    ),
+    **dict.fromkeys(
+        ("gamma", "exposure"), ("filter", "a picture is linear; .png files have the sRGB curve")
+    ),
+    "aspect": ("fov_axis", "the width and height of 'film' give it"),
+    "fov": ("film_distance", "the type 'perspective' has it"),
+    **dict.fromkeys(
+        ("color", "colour", "reflectance", "albedo", "emission", "radiance"),
+        ("transform", "its 'material' has it: the name of one of 'materials'"),
+    ),
+    **{
+        step: ("transform", f"it is a step of 'transform', such as [{{{step}: {example}}}]")
+        for step, example in {
+            "scale": "2",
+            "translate": "[0, 0, 1]",
+            "rotate": "{axis: [0, 1, 0], degrees: 90}",
+            "matrix": "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]",
+        }.items()
+    },
+    **dict.fromkeys(
+        [
+            "size",
+            "min",
+            "max",
+            "width",
+            "height",
+            "depth",
+            "length",
+            "normal",
+            "point",
+            "position",
+            "center",
+            "p0",
+            "p1",
+        ],
+        ("transform", "'transform' places, turns and scales it"),
+    ),
+    "roughness": ("reflectance", "a rough mirror has the type 'rough_conductor'"),
+    **dict.fromkeys(
+        ("sigma_s", "sigma_a"),
+        ("albedo", "sigma_t is sigma_s + sigma_a, and albedo is sigma_s / sigma_t"),
+    ),
+    "g": ("phase", "it is set in 'phase', such as {type: hg, g: 0.5}"),
 }
-"""Keys and types that are expected in another part of a scene."""
+"""Keys and types that mean something else than one key of their place: what to write, where this
+other key or type would be possible."""
 
 
 MOST = 20
@@ -49,7 +95,12 @@ MOST = 20
 def scene_error(model: type[BaseModel], error: ValidationError, data: Any) -> SceneError:
     """What pydantic reports about `data`: an error with all problems, one for each wrong value."""
     found: dict[Keys, str] = {}
-    for first in error.errors(include_url=False):
+    # What is unknown says what is meant; what is missing because of that is no problem of its own.
+    reported = sorted(error.errors(include_url=False), key=lambda one: one["type"] == "missing")
+    meant = _meant_keys(model, reported)
+    for first in reported:
+        if first["type"] == "missing" and first["loc"] in meant:
+            continue
         message, keys = _problem(model, first, data)
         # What is inside a value that is wrong itself, or is tried as several types, counts once.
         found.setdefault(keys, message)
@@ -59,12 +110,24 @@ def scene_error(model: type[BaseModel], error: ValidationError, data: Any) -> Sc
     return SceneError(errors[0].message, errors[0].path, others=errors[1:])
 
 
+def _meant_keys(model: type[BaseModel], reported: Iterable[Any]) -> set[Keys]:
+    """The keys that are meant by unknown ones, each with those that lead to it."""
+    found: set[Keys] = set()
+    for one in reported:
+        if one["type"] == "extra_forbidden":
+            *outer, name = one["loc"]
+            known = _models_at(model, tuple(outer))[0].__pydantic_fields__
+            found.update((*outer, key) for key in meant_by(str(name), known))
+    return found
+
+
 def _problem(model: type[BaseModel], first: Any, data: Any) -> tuple[str, Keys]:
     """(message, keys) of one of pydantic's errors: the message is one line, the keys lead to the
     wrong value."""
     location: Keys = first["loc"]
     keys = _keys_in(data, location)
     message = first["msg"].removeprefix("Value error, ").replace("Input should be", "expected")
+    message = message.replace("a valid integer", "a whole number").replace("a valid n", "a n")
     cause = first.get("ctx", {}).get("error")
     if isinstance(cause, FieldError):
         return message, (*keys, cause.field)
@@ -73,7 +136,7 @@ def _problem(model: type[BaseModel], first: Any, data: Any) -> tuple[str, Keys]:
         near = _instead(str(location[-1]), known)
         message = f"unknown key; expected one of: {', '.join(known)}{near}"
     elif first["type"] == "missing":
-        message = "missing; expected a value"
+        message = f"missing; expected {_wanted(model, location)}"
     elif first["type"] == "union_tag_not_found":
         message = f"missing 'type'; expected one of: {_types(_models_at(model, location))}"
     elif first["type"] == "union_tag_invalid":
@@ -103,7 +166,17 @@ def _problem(model: type[BaseModel], first: Any, data: Any) -> tuple[str, Keys]:
 
 def _instead(word: str, known: Iterable[str]) -> str:
     """What to write in place of a key or a type; nothing where that is unknown."""
-    return f"; {_ELSEWHERE[word]}" if word in _ELSEWHERE else meant(word, known)
+    known = [*known]
+    beside, told = _ELSEWHERE.get(word, ("", ""))
+    return f"; {told}" if beside in known and not means(word, known) else meant(word, known)
+
+
+def _wanted(model: type[BaseModel], location: Keys) -> str:
+    """What a missing key is for, by the first sentence of its documentation."""
+    fields = _models_at(model, location[:-1])[0].model_fields
+    about = (fields[str(location[-1])].description or "").split("\n\n")[0]
+    sentence = " ".join(about.split()).partition(". ")[0].rstrip(".")
+    return f"a value: {sentence[:1].lower()}{sentence[1:]}" if sentence else "a value"
 
 
 def _such_as(model: type[BaseModel], first: Any) -> str:

@@ -26,16 +26,28 @@ _OURS = """
 eye origin center: position location origin from
 target: look_at lookat to
 reflectance base_colour radiance intensity irradiance: color colour albedo
-radiance intensity irradiance: emission brightness power intensity radiance
+radiance intensity irradiance: emission brightness power intensity radiance strength energy
+reflectance: texture map
 alpha: roughness
 interior_ior eta: ior index
+exponent: shininess
+aperture_radius: aperture lens_radius f_stop
+fov: field_of_view fovy angle
+cutoff_angle: angle cone_angle
+degrees: angle
 file: filename
+first: color1 colour1 color0 colour0
+second: color2 colour2
+sigma_t: density extinction
 spp: samples samples_per_pixel
 --spp: --samples
 --size: --resolution
 width+height: resolution size
 max_depth: max_bounces bounces depth
-transform: translate rotation scale
+transform: rotation
+v0+v1+v2: vertices points
+of: children operands shapes a
+group: of object ref
 shapes: objects world
 lights: background
 box: cube
@@ -51,6 +63,8 @@ emissive lights: light emitter area_light
 directional: sun
 constant: sky
 environment_map: envmap hdri
+bitmap: image
+independent: random
 path: path_tracer pathtracer
 """
 """Our words, and those of other programs and of beginners for the same.  Of several of ours the
@@ -66,11 +80,16 @@ def meant(name: str, known: Iterable[str]) -> str:
 def meant_by(name: str, known: Iterable[str]) -> list[str]:
     """The known names, mostly one, that mean the same as `name`, or the one that is near."""
     known = [*known]
+    return means(name, known) or difflib.get_close_matches(name, known, n=1)
+
+
+def means(name: str, known: Iterable[str]) -> list[str]:
+    """The known names, mostly one, that mean the same as `name`."""
     lines = [line.split(":") for line in _OURS.strip().splitlines()]
     ours = [word for word, theirs in lines if name.lower() in theirs.split()]
     words = [word.split("+") for word in " ".join(ours).split()]
     same = [word for word in words if {*word} <= {*known} and word != [name]]
-    return same[0] if same else difflib.get_close_matches(name, known, n=1)
+    return same[0] if same else []
 
 
 class Brief(type):
