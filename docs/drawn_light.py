@@ -315,7 +315,7 @@ def truth(drawing: Drawing) -> None:
     view.arrow((-2.15, 0), (2.25, 0), "edge")
     view.line(*np.stack([x, formula], axis=-1), kind="ink")
     for at in np.arange(-1.8, 1.9, 0.4):
-        u, angle = rng.random((2, 4, 24))
+        u, angle = rng.random((2, 4, 8))
         lamp = polar(360 * angle, r * np.sqrt(u))
         square = (lamp[..., 0] - at) ** 2 + lamp[..., 1] ** 2 + h**2
         for values, kind in ((r**2 * h**2 / square**2, "eye"), (r**2 * h / square**1.5, "wrong")):
@@ -350,6 +350,6 @@ def gate(drawing: Drawing) -> None:
             continue
         means = 32 * (middle + spread * rng.standard_normal(8))
         view = drawing.view((150, y))
-        for mean in means:
-            view.dot((mean, 0), "guide", 3)
         interval(view, means.mean(), quantile * means.std(ddof=1) / math.sqrt(8), kind)
+        for mean in means:
+            view.dot((mean, -13), "ink", 3)

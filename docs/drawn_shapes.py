@@ -360,7 +360,7 @@ def bvh(drawing: Drawing) -> None:
     """Boxes that a ray enters, those that it skips; and a leaf that is not the last word."""
     drawing.heads("entered, skipped", "a leaf is no last word", wrong=[1])
     rng, grid = np.random.default_rng(5), np.stack(np.meshgrid(np.arange(5), np.arange(4)), axis=-1)
-    centres = grid.reshape(-1, 2) * 55.0 + (38, 34) + rng.uniform(-9, 9, (grid.size // 2, 2))
+    centres = grid.reshape(-1, 2) * 54.0 + (40, 38) + rng.uniform(-9, 9, (grid.size // 2, 2))
     radii = rng.uniform(8, 17, len(centres))
     o, d, tests = np.array([10.0, 186.0]), unit((1.0, -0.28)), [0, 0]
 
