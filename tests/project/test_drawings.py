@@ -4,11 +4,14 @@ import re
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from reference_rt.core.arrays import FloatArray
 
 ROOT = Path(__file__).parents[2]
 sys.path.append(str(ROOT / "docs"))
-from drawing import WIDTH  # noqa: E402
+from drawing import WIDTH, Glass, ball, crossings  # noqa: E402
 from make_drawings import DRAWINGS, FOLDER, svg  # noqa: E402
 
 PAGES = [
@@ -38,6 +41,24 @@ def test_letters_can_be_read_on_a_telephone(name: str) -> None:
     sizes = re.findall(r"(?:font:|font-size[:=]\"?)([\d.]+)", svg(name))
     assert sizes
     assert min(map(float, sizes)) * 353 / WIDTH >= 12
+
+
+@pytest.mark.parametrize("height", [-0.9, 0.1, 0.6])
+def test_glass_bends_rays_by_snell(height: float) -> None:
+    """Sines of the angles by cross products, at both ends of the scene's own chord."""
+    glass, o, d = ball(3.0, 1.0, 2.0), np.array([-2.0, 1.0 + 2.0 * height]), np.array([1.0, 0.0])
+    p, n, mirrored, inside, q, out = Glass.hit(o, d, glass, 1.4)
+
+    def sine(a: FloatArray, b: FloatArray) -> float:
+        return float(a[0] * b[1] - a[1] * b[0])
+
+    last = (q - (3.0, 1.0)) / 2.0
+    assert p + crossings(p, inside, glass)[-1] * inside == pytest.approx(q, abs=1e-14)
+    assert sine(d, n) == pytest.approx(1.4 * sine(inside, n), abs=1e-14)
+    assert sine(out, last) == pytest.approx(1.4 * sine(inside, last), abs=1e-14)
+    assert sine(mirrored, n) == pytest.approx(sine(d, n), abs=1e-14)
+    assert d @ n < 0 < mirrored @ n
+    assert inside @ n < 0 < out @ last
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
