@@ -19,12 +19,16 @@ It imports nothing but pytest until it is used.
 import hashlib
 import importlib
 import re
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+
+from comparisons.gate import session
+from comparisons.gate.session import pytest_configure as pytest_configure
 
 if TYPE_CHECKING:
     from comparisons.gate.material import Check
@@ -33,12 +37,11 @@ if TYPE_CHECKING:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """`--image-gate-out` and `--image-gate-baselines`."""
+    """`--image-gate-out` and `--image-gate-baselines`, and what `session` adds."""
     group = parser.getgroup("image_gate", "compare pictures with scenes and baselines")
     group.addoption(
         "--image-gate-out",
         metavar="DIR",
-        default="image-gate",
         help="folder for results.json and, for failures, the pictures and a page, in a folder per "
         "test (default: image-gate, in the root folder)",
     )
@@ -48,6 +51,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default="baselines",
         help="the folder of baselines (default: baselines, in the root folder)",
     )
+    session.pytest_addoption(parser)
 
 
 @pytest.fixture
@@ -74,6 +78,10 @@ def pair_gate(request: pytest.FixtureRequest) -> "PairGate":
     return PairGate(request.node, request.config)
 
 
+_CALLS = pytest.StashKey[int]()
+"""Calls of gates in a test so far."""
+
+
 class Gate:
     """The gate for one test; each call has a folder of its own."""
 
@@ -81,7 +89,11 @@ class Gate:
 
     def __init__(self, node: pytest.Item, config: pytest.Config) -> None:
         self._node, self._root, self._calls = node, config.rootpath, 0
-        self._out = self._root / str(config.getoption("--image-gate-out"))
+        self._noted = config.pluginmanager.get_plugin(session.NAME) is not None
+        report, _ = session.folders(config)
+        self._has_pages = report is not None
+        usual = self._root / "image-gate" if report is None else report / "tests"
+        self._out = self._root / (config.getoption("--image-gate-out") or usual)
         self._baselines = self._root / str(config.getoption("--image-gate-baselines"))
 
     def _judge(
@@ -95,7 +107,7 @@ class Gate:
         self._begin("comparisons.gate.request")
         from reference_rt.util.errors import ReferenceRtError
 
-        failed = ""
+        failed, begun = "", time.perf_counter()
         given: list[tuple[Picture, Path | None]] = []
         try:
             folder = self._folder()
@@ -107,7 +119,11 @@ class Gate:
             failed = f"{self.fixture}: {error}"
         if failed:
             kept, unkept = _kept(given)
+            self._note_error(failed)
             pytest.fail("\n".join([failed, *kept, *unkept]))
+        if self._noted:
+            seconds = time.perf_counter() - begun
+            self._note(folder=str(folder), seconds=seconds, **session.of_case(case, passed))
         self._node.user_properties.append((self.fixture, f"{case.verdict}: {case.reason}"))
         if not passed:
             _, unkept = _kept(given)
@@ -115,10 +131,20 @@ class Gate:
             pytest.fail("\n".join([told, *unkept]))
         return case
 
+    def _note(self, **what: Any) -> None:
+        """Note this call for the page of the session, if there is one."""
+        if self._noted:
+            session.note(self._node, self.fixture, self._calls, **what)
+
+    def _note_error(self, message: str) -> None:
+        """Note a call that could not be judged."""
+        self._note(verdict="error", passed=False, headline=message, reason=message)
+
     def _begin(self, module: str) -> None:
         """A call of the gate, which needs a module.  Fails the test if its extra is missing."""
         __tracebackhide__ = True
-        self._calls += 1
+        # Of all gates of the test, whose folders are beside each other.
+        self._calls = self._node.stash[_CALLS] = self._node.stash.get(_CALLS, 0) + 1
         missing = ""
         try:
             importlib.import_module(module)
@@ -128,6 +154,7 @@ class Gate:
             missing = needs(self.fixture, "compare", error.name)
         # Failing outside of `except`: pytest would show the handled error, with all its frames.
         if missing:
+            self._note_error(missing)
             pytest.fail(missing)
 
     def _folder(self) -> Path:
@@ -149,12 +176,14 @@ class Gate:
         return folder
 
     def _write(self, case: "Case", folder: Path, baseline: str) -> bool:
-        """Write results.json, for a failure also the page and the pictures; whether it passes."""
+        """Write results.json; for a failure, or a page of the session, also the page, and for a
+        failure the pictures.  Whether it passes."""
         from comparisons.gate import outputs
         from comparisons.results.stored_case import write_case
 
         passed = outputs.code_of(case) == 0
-        outputs.write(case, folder, {"baseline": baseline} if baseline else {}, page=not passed)
+        facts = {"baseline": baseline} if baseline else {}
+        outputs.write(case, folder, facts, page=self._has_pages or not passed)
         if not passed:
             write_case(folder, case)
         return passed
@@ -298,6 +327,9 @@ class MaterialGate(Gate):
         from reference_rt.util.errors import ReferenceRtError
 
         lines: list[str] = []
+        found: list[Check] = []
+        pictures: list[Path] = []
+        begun = time.perf_counter()
         try:
             folder = self._folder()
             asked = {"views": views, "eta": eta, "reciprocal": reciprocal, "seed": seed}
@@ -308,9 +340,15 @@ class MaterialGate(Gate):
                 if check.maps:
                     picture = folder / f"{check.name}.png"
                     check.write_picture(picture)
+                    pictures.append(picture)
                     lines.append(f"kept: {_relative(picture, self._root)}")
         except ReferenceRtError as error:
             lines = [f"{self.fixture}: {error}"]
+            self._note_error(lines[0])
+        else:
+            if self._noted:
+                seconds = time.perf_counter() - begun
+                self._note(seconds=seconds, **session.of_checks(found, pictures))
         if lines:
             pytest.fail("\n".join(lines))
         return found
