@@ -80,15 +80,14 @@ def small_pictures(case: Case) -> list[tuple[str, str]]:
     return pictures + ([(found.difference.url, "difference")] if found.difference else [])
 
 
-def of_witness(images: Images, sides: tuple[str, str], whose: str) -> list[tuple[Thumbnail, str]]:
-    """A third renderer's picture and what each of the two differs from it, with their titles; none
-    where there is no third one.  whose: its."""
-    if images.witness is None:
-        return []
-    found = [(_exposed(images.witness, white_level(images.reference)), whose)]
-    for picture, side in zip((images.candidate, images.reference), sides, strict=True):
-        span, difference = _difference(Images(picture, images.witness))
-        found.append((difference, f"{side} − {whose}, −{span:.2g} to +{span:.2g}"))
+def of_others(images: Images, sides: tuple[str, str]) -> list[tuple[Thumbnail, str]]:
+    """Other renderers' pictures, and what each of the two differs from them, with titles."""
+    found = []
+    for whose, other in images.others.items():
+        found.append((_exposed(other, white_level(images.reference)), whose))
+        for picture, side in zip((images.candidate, images.reference), sides, strict=True):
+            span, difference = _difference(Images(picture, other))
+            found.append((difference, f"{side} − {whose}, −{span:.2g} to +{span:.2g}"))
     return found
 
 
