@@ -3,10 +3,10 @@
 import shlex
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -29,6 +29,10 @@ from reference_rt.cli.options import AllowMissing, Defaults, adjusted, by_name, 
 from reference_rt.cli.quantities import seconds_of
 from reference_rt.cli.watching import stamps, wait_for_change
 from reference_rt.util.errors import ReferenceRtError, UsageError, printable
+
+if TYPE_CHECKING:
+    from comparisons.gate.pictures_in import Picture
+    from comparisons.results.case import Case
 
 
 @guarded
@@ -155,6 +159,13 @@ def gate(
         ),
     ] = "",
     witness: Witness = None,
+    beside: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=FILE",
+            help="Show this picture, another renderer's, on the page too; it is not judged.",
+        ),
+    ] = None,
     pair: Annotated[
         tuple[str, str] | None,
         typer.Option(
@@ -237,7 +248,7 @@ def gate(
         alone: dict[str, Any] = {"reference": reference, "variance": variance, "truth": truth}
         alone |= {"baseline": baseline, "command": command, "browser": browser, "step": step}
         alone |= {"witness": witness, "derivative": derivative, "tone-curve": tone_curve}
-        alone |= {"from": renderer, "watch": watch}
+        alone |= {"from": renderer, "watch": watch, "beside": beside}
         alone = {f"--{name}": value for name, value in alone.items()} | {"candidates": candidates}
         for name, value in {**alone, "--reference-layer": reference_layer}.items():
             if value:
@@ -279,7 +290,7 @@ def gate(
         others |= {"variance": variance, "baseline": baseline, "fixed": fixed, "rim": rim}
         others |= {"noise-free": noise_free, "witness": witness, "browser": browser}
         others |= {"allow-missing": allow_missing, "tone-curve": tone_curve, "from": renderer}
-        others |= {"watch": watch}
+        others |= {"watch": watch, "beside": beside}
         for name, value in {**others, "junit": junit, "github": github, "define": define}.items():
             if value:
                 raise UsageError(f"--{name}: does not apply to {which}; expected one of them")
@@ -292,6 +303,9 @@ def gate(
             candidates or (), derivative, scene, reference or (), layer, out,
             spp=spp, size=size, limit=limit, step=step, threads=threads,
         )  # fmt: skip
+    if beside and rim:
+        raise UsageError("--beside: does not apply to --rim; expected one of them")
+    shown = pictures_beside(beside or ())
     if step is not None:
         raise UsageError("--step: only applies to --derivative; expected that too")
     described = (
@@ -368,7 +382,7 @@ def gate(
                         p for path in candidates or () for p in read_candidates(path, layer)
                     ]
                     case = gated(request, reading.read(pictures), progress)
-                case = reading.told(case)
+                case = with_others(reading.told(case), shown)
         except UsageError:
             raise
         except ReferenceRtError as error:
@@ -404,6 +418,33 @@ def gate(
         watched = [*(candidates or ()), *(reference or ()), *([variance] if variance else ())]
         raise typer.Exit(judged_again(judge_once, watched))
     raise typer.Exit(judge_once())
+
+
+def pictures_beside(given: Sequence[str]) -> dict[str, tuple["Picture", ...]]:
+    """The pictures of NAME=FILE, by name.  Raises UsageError, ImageError."""
+    from comparisons.gate.pictures_in import read_candidates
+
+    found = {}
+    for text in given:
+        whose, _, file = text.partition("=")
+        if not whose or not file or whose in found:
+            expected = "a name for each" if whose in found else "NAME=FILE, such as Cycles=c.exr"
+            raise UsageError(f"--beside: expected {expected}, got '{text}'")
+        found[whose] = read_candidates(Path(file))
+    return found
+
+
+def with_others(case: "Case", pictures: Mapping[str, tuple["Picture", ...]]) -> "Case":
+    """The case with other renderers' pictures for its page.  Raises ImageError."""
+    from comparisons.gate.reference import check_sizes, size_of, stacked
+
+    if case.images is None:
+        return case
+    others = dict(case.images.others)
+    for whose, replicates in pictures.items():
+        check_sizes(replicates, size_of(case.images.reference), "as the reference")
+        others[whose] = stacked(replicates).mean(axis=0)
+    return replace(case, images=replace(case.images, others=others))
 
 
 def judged_again(judge: Callable[[], int], files: Sequence[Path]) -> int:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from comparisons.gate.session import Use, key_of
+from comparisons.gate.uses import Use, key_of
 from comparisons.results.files import write_json
 from reference_rt.util.files import discard, read_text
 

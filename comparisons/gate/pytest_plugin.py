@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from comparisons.gate import session
+from comparisons.gate import session, uses
 from comparisons.gate.session import pytest_configure as pytest_configure
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ class Gate:
             pytest.fail("\n".join([failed, *kept, *unkept]))
         if self._noted:
             seconds = time.perf_counter() - begun
-            self._note(folder=str(folder), seconds=seconds, **session.of_case(case, passed))
+            self._note(folder=str(folder), seconds=seconds, **uses.of_case(case, passed))
         self._node.user_properties.append((self.fixture, f"{case.verdict}: {case.reason}"))
         if not passed:
             _, unkept = _kept(given)
@@ -134,7 +134,7 @@ class Gate:
     def _note(self, **what: Any) -> None:
         """Note this call for the page of the session, if there is one."""
         if self._noted:
-            session.note(self._node, self.fixture, self._calls, **what)
+            uses.note(self._node, self.fixture, self._calls, **what)
 
     def _note_error(self, message: str) -> None:
         """Note a call that could not be judged."""
@@ -348,7 +348,7 @@ class MaterialGate(Gate):
         else:
             if self._noted:
                 seconds = time.perf_counter() - begun
-                self._note(seconds=seconds, **session.of_checks(found, pictures))
+                self._note(seconds=seconds, **uses.of_checks(found, pictures))
         if lines:
             pytest.fail("\n".join(lines))
         return found

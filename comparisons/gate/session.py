@@ -7,26 +7,18 @@ session's own process writes the page.  Imports nothing but pytest until a use i
 
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from comparisons.gate.uses import USES, Use
+
 if TYPE_CHECKING:
     from comparisons.gate.history import Past
-    from comparisons.gate.material import Check
-    from comparisons.results.case import Case
-
-Use = dict[str, Any]
-"""A use of a gate, in JSON's types: "test" (pytest's id), "fixture", "call" (of any gate in the
-test, from 1), "verdict" (a case's, or "error" of what could not be judged), "passed", "headline",
-"reason", "cause" (name and evidence, or null), "z", "folder" (of the use's own outputs, or ""),
-"pictures" (URLs and titles), "seconds", and in the session's process "outcome" (of the test, up to
-here)."""
 
 NAME = "reference_rt_session"
-_USES = pytest.StashKey[list[Use]]()
 _ON_REPORT = "reference_rt_uses"
 """The attribute of a test's report: pytest-xdist hands attributes over that are JSON."""
 
@@ -73,63 +65,6 @@ def folders(config: pytest.Config) -> tuple[Path | None, Path | None]:
     return report, history
 
 
-def note(item: pytest.Item, fixture: str, call: int, **what: Any) -> None:
-    """Note a use;  what: the other values of a `Use`."""
-    use = {"test": item.nodeid, "fixture": fixture, "call": call, "folder": ""}
-    use |= {"headline": "", "reason": "", "cause": None, "z": None, "pictures": [], "seconds": 0.0}
-    item.stash.setdefault(_USES, []).append(use | what)
-
-
-def of_case(case: "Case", passed: bool) -> Use:
-    """What is noted of a case."""
-    from comparisons.report.thumbnails import small_pictures
-    from comparisons.results.files import plain
-    from comparisons.results.headline import headline
-
-    cause = None
-    if case.cause is not None:
-        cause = {"name": case.cause.name, "evidence": case.cause.evidence}
-    return {
-        "verdict": case.verdict,
-        "passed": passed,
-        "headline": headline(case),
-        "reason": case.reason,
-        "cause": cause,
-        "z": plain(z_of(case)),
-        "pictures": small_pictures(case),
-    }
-
-
-def of_checks(checks: "Sequence[Check]", pictures: Sequence[Path]) -> Use:
-    """What is noted of the checks of a material.  pictures: files of what is wrong."""
-    from comparisons.report.thumbnails import shrunk_url
-
-    failed = [check for check in checks if not check]
-    reasons = [f"{check.name}: {check.reason}" for check in failed or checks]
-    return {
-        "verdict": "differ" if failed else "agree",
-        "passed": not failed,
-        "headline": "; ".join(reasons[:1]) if failed else "no check found anything",
-        "reason": "; ".join(reasons),
-        "folder": str(pictures[0].parent) if pictures else "",
-        "pictures": [(shrunk_url(path), path.stem) for path in pictures],
-    }
-
-
-def z_of(case: "Case") -> float | None:
-    """The bias of the image mean in standard errors, of the channel that is farthest from zero;
-    None without noise."""
-    for rung in case.rungs:
-        biases, errors = (
-            rung.numbers.get(key) for key in ("relative_bias", "standard_error_of_bias")
-        )
-        if isinstance(biases, dict) and isinstance(errors, dict):
-            pairs = [(b, errors.get(name)) for name, b in biases.items()]
-            found = [bias / error for bias, error in pairs if bias is not None and error]
-            return max(found, key=abs, default=None)
-    return None
-
-
 class Session:
     """Collects the uses of a session, and writes the page and the history at its end."""
 
@@ -142,8 +77,8 @@ class Session:
     def pytest_runtest_makereport(self, item: pytest.Item) -> Iterator[None]:
         """Hand the uses over with the report of the phase that they belong to."""
         report = yield
-        setattr(report, _ON_REPORT, item.stash.get(_USES, []))
-        item.stash[_USES] = []
+        setattr(report, _ON_REPORT, item.stash.get(USES, []))
+        item.stash[USES] = []
         return report
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
@@ -179,7 +114,8 @@ class Session:
         if self._report is not None:
             seconds = time.perf_counter() - self._begun
             written = session_page.write(self._report, order, past, seconds)
-            lines.append(", ".join(relative(path, self._config.rootpath) for path in written))
+            root = self._config.rootpath
+            lines.append(", ".join(os.path.relpath(path, root) for path in written))
         return lines
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
@@ -188,14 +124,3 @@ class Session:
             terminalreporter.section("reference_rt")
             for line in self._lines:
                 terminalreporter.write_line(line)
-
-
-def key_of(use: Use) -> str:
-    """The name of a use, the same in each session."""
-    number = "" if use["call"] == 1 else f" {use['call']}"
-    return f"{use['test']} ({use['fixture']}{number})"
-
-
-def relative(path: str | Path, folder: Path) -> str:
-    """A path as seen from a folder."""
-    return Path(os.path.relpath(path, folder)).as_posix()

@@ -1,5 +1,6 @@
 """The page and `results.json` over all uses of gates in a pytest session."""
 
+import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -7,7 +8,7 @@ from typing import Any
 from urllib.parse import quote
 
 from comparisons.gate.history import Past
-from comparisons.gate.session import Use, key_of, relative
+from comparisons.gate.uses import Use, key_of
 from comparisons.report.page import MOST_BYTES, ORDER, SIGNS
 from comparisons.report.templates import encoded, template
 from comparisons.report.templates import write as write_page
@@ -48,7 +49,7 @@ def write(
     for use in uses:
         one = past.get(key_of(use), Past(()))
         told = {key: value for key, value in use.items() if key != "pictures"}
-        told["folder"] = use["folder"] and relative(use["folder"], folder)
+        told["folder"] = use["folder"] and _relative(use["folder"], folder)
         listed.append(told | {"history": [vars(o) for o in one.runs], "changes": one.changes})
     counts = Counter(use["verdict"] for use in uses)
     results, page = folder / "results.json", folder / "report.html"
@@ -82,9 +83,14 @@ def _view(use: Use, past: Past, folder: Path) -> dict[str, Any]:
     """A use as the template takes it."""
     own = Path(use["folder"] or ".", "report.html")
     place = own if own.is_file() else own.parent
-    link = quote(relative(place, folder)) if use["folder"] else ""
+    link = quote(_relative(place, folder)) if use["folder"] else ""
     return {**use, "name": key_of(use), "link": link, "past": past}
 
 
 def _rank(verdict: str) -> int:
     return VERDICTS.index(verdict)
+
+
+def _relative(path: str | Path, folder: Path) -> str:
+    """A path as seen from a folder."""
+    return Path(os.path.relpath(path, folder)).as_posix()

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from comparisons.gate import session
+from comparisons.gate import session, uses
 
 VERDICTS = {"right": "agree", "off": "differ", "noisy": "inconclusive", "invalid": "invalid"}
 """Of cases, by those of `comparisons.truth.judge`."""
@@ -57,7 +57,7 @@ def truth_gate(request: pytest.FixtureRequest) -> Callable[[str, Any], None]:
         if request.config.pluginmanager.get_plugin(session.NAME) is not None:
             told = {"verdict": VERDICTS[verdict.verdict], "passed": right, "reason": verdict.reason}
             told["headline"] = f"{name}: {verdict.verdict}"
-            session.note(request.node, "truth_gate", call, **told)
+            uses.note(request.node, "truth_gate", call, **told)
         if not right:
             pytest.fail(f"{name}: {verdict.verdict}: {verdict.reason}")
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from gate_checks import PLUGIN
 
-from comparisons.gate import history, session, session_page
+from comparisons.gate import history, session_page, uses
 from comparisons.results.case import Case, Cause, Images, RungResult
 
 pytest_plugins = ["pytester"]
@@ -102,17 +102,17 @@ def test_those_that_fail_come_first(pytester: pytest.Pytester) -> None:
 def test_every_use_is_on_the_page(pytester: pytest.Pytester, processes: tuple[str, ...]) -> None:
     pytester.makepyfile(test_it=MODULE)
     text, results = run(pytester, *processes)
-    uses = results["uses"]
-    found = [(u["test"], u["fixture"], u["call"], u["verdict"]) for u in uses]
+    noted = results["uses"]
+    found = [(u["test"], u["fixture"], u["call"], u["verdict"]) for u in noted]
     assert found == [(f"test_it.py::test_{test}", *rest) for test, *rest in EXPECTED]
     assert results["counts"] == {"error": 1, "differ": 3, "agree": 4, "unchanged": 2}
     assert "10 uses of gates: 1 error, 3 differ, 4 agree, 2 unchanged" in text
-    assert [u["passed"] for u in uses] == [u["verdict"] in ("agree", "unchanged") for u in uses]
+    assert [u["passed"] for u in noted] == [u["verdict"] in ("agree", "unchanged") for u in noted]
     # A difference that the test expects is shown all the same.
-    assert [u["outcome"] for u in uses[:3]] == ["passed"] * 3
-    assert uses[5]["cause"]["name"] == "constant gain of 1.02"
-    assert abs(uses[1]["z"]) < 5 < abs(uses[2]["z"])
-    assert uses[5]["z"] is None
+    assert [u["outcome"] for u in noted[:3]] == ["passed"] * 3
+    assert noted[5]["cause"]["name"] == "constant gain of 1.02"
+    assert abs(noted[1]["z"]) < 5 < abs(noted[2]["z"])
+    assert noted[5]["z"] is None
 
     page = (pytester.path / "seen" / "report.html").read_text()
     # Those that fail come first; each has pictures, and a page of its own that is there.
@@ -157,7 +157,7 @@ def test_a_verdict_that_changes_is_named(
     assert page.count("changed 2 times") == 2  # in the list, and for readers of the strip
 
 
-def use(verdict: str, test: str = "t", z: float | None = None, call: int = 1) -> session.Use:
+def use(verdict: str, test: str = "t", z: float | None = None, call: int = 1) -> uses.Use:
     passed = verdict in ("agree", "unchanged")
     what = {"verdict": verdict, "passed": passed, "z": z, "outcome": "passed", "folder": ""}
     texts = {"headline": "<b>", "reason": "", "cause": None, "pictures": [], "seconds": 0.0}
@@ -227,25 +227,25 @@ def test_z_is_that_of_the_channel_farthest_from_zero() -> None:
         "relative_bias": {"R": 0.01, "G": -0.02, "B": None},
         "standard_error_of_bias": {"R": 0.01, "G": 0.004, "B": 0.0},
     }
-    assert session.z_of(case("agree", numbers)) == pytest.approx(-5.0)
-    assert session.z_of(case("agree", {})) is None
+    assert uses.z_of(case("agree", numbers)) == pytest.approx(-5.0)
+    assert uses.z_of(case("agree", {})) is None
 
 
 def test_names_are_escaped_and_big_pages_leave_pictures_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     picture = np.random.default_rng(1).uniform(size=(8, 8, 3))
-    noted = session.of_case(
+    noted = uses.of_case(
         case("agree", {}, images=Images(picture, picture), cause=Cause("<i>", "&", 1.0)), True
     )
-    uses = [use("agree", "<script>") | noted, use("differ", "u") | noted | {"passed": False}]
-    session_page.write(tmp_path, uses, {}, 1.0)
+    noted_two = [use("agree", "<script>") | noted, use("differ", "u") | noted | {"passed": False}]
+    session_page.write(tmp_path, noted_two, {}, 1.0)
     page = (tmp_path / "report.html").read_text()
     assert "<script" not in page
     assert "<i>" not in page
     assert page.count("data:image/png") == 6
     monkeypatch.setattr(session_page, "MOST_BYTES", len(page) - 100)
-    session_page.write(tmp_path, uses, {}, 1.0)
+    session_page.write(tmp_path, noted_two, {}, 1.0)
     assert (tmp_path / "report.html").read_text().count("data:image/png") == 3
 
 
@@ -258,7 +258,7 @@ def test_the_page_fits_a_phone(tmp_path: Path, browser: Any) -> None:
         for k, verdict in enumerate(verdicts)
     ]
     noted = use("differ", long, z=-1.5) | {"headline": "a" * 300, "reason": "why"}
-    session_page.write(tmp_path, [noted], {session.key_of(noted): history.Past(tuple(runs))}, 1.0)
+    session_page.write(tmp_path, [noted], {uses.key_of(noted): history.Past(tuple(runs))}, 1.0)
     for width in (400, 1400):
         page = browser.new_page(viewport={"width": width, "height": 800})
         page.goto((tmp_path / "report.html").as_uri())
