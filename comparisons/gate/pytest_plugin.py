@@ -21,6 +21,7 @@ import importlib
 import re
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -167,6 +168,10 @@ class Gate:
         # Names that differ only in replaced characters must not share a folder.
         unique = hashlib.sha256(nodeid.encode()).hexdigest()[:8]
         folder = self._out / f"{plain[:80]}-{unique}-{self._calls}"
+        # Before the check, which removes folders that it made: another process of pytest-xdist may
+        # be about to write there.
+        with suppress(OSError):
+            self._out.mkdir(parents=True, exist_ok=True)
         files = [folder / n for n in ("results.json", "report.html", "case.json", "pictures.exr")]
         check_writable(*files)
         for file in files:
