@@ -49,7 +49,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--image-gate-baselines",
         metavar="DIR",
-        default="baselines",
         help="the folder of baselines (default: baselines, in the root folder)",
     )
     session.pytest_addoption(parser)
@@ -79,6 +78,15 @@ def pair_gate(request: pytest.FixtureRequest) -> "PairGate":
     return PairGate(request.node, request.config)
 
 
+def _limit(text: str) -> float:
+    """The smallest bias that must be detectable, by default.  Raises pytest.UsageError."""
+    try:
+        return float(text or 0.005)
+    except ValueError:
+        told = f"image_gate_limit: expected a number such as 0.005, got '{text}'"
+        raise pytest.UsageError(told) from None
+
+
 _CALLS = pytest.StashKey[int]()
 """Calls of gates in a test so far."""
 
@@ -94,8 +102,10 @@ class Gate:
         report, _ = session.folders(config)
         self._has_pages = report is not None
         usual = self._root / "image-gate" if report is None else report / "tests"
-        self._out = self._root / (config.getoption("--image-gate-out") or usual)
-        self._baselines = self._root / str(config.getoption("--image-gate-baselines"))
+        self._out = self._root / (session.option(config, "image_gate_out") or usual)
+        kept = session.option(config, "image_gate_baselines")
+        self._baselines = self._root / (kept or "baselines")
+        self._limit = _limit(str(config.getini("image_gate_limit")))
 
     def _judge(
         self,
@@ -207,7 +217,7 @@ class ImageGate(Gate):
         baseline: str = "",
         reference: Any = None,
         variance: str | Path | None = None,
-        limit: float = 0.005,
+        limit: float | None = None,
         noise_free: bool = False,
         tolerance: float = 0.001,
         tone_curve: str = "",
@@ -243,7 +253,7 @@ class ImageGate(Gate):
                 variance=None if variance is None else Path(variance),
                 baseline=baseline,
                 baselines=self._baselines,
-                limit=limit,
+                limit=self._limit if limit is None else limit,
                 noise_free=noise_free,
                 tolerance=tolerance,
                 tone_curve=tone_curve,
@@ -270,7 +280,7 @@ class DerivativeGate(Gate):
         primal: "Callable[[float, int], Any] | None" = None,
         at: float | None = None,
         step: float | None = None,
-        limit: float = 0.005,
+        limit: float | None = None,
     ) -> "Case":
         """Fail the test unless `candidate` is the derivative of a picture by a parameter.
 
@@ -298,7 +308,7 @@ class DerivativeGate(Gate):
                 primal=primal,
                 at=at,
                 step=step,
-                limit=limit,
+                limit=self._limit if limit is None else limit,
                 name=name,
             )
             return case_of([picture.radiance for picture in pictures], asked)
@@ -372,7 +382,7 @@ class PairGate(Gate):
         scene: str | Path | None = None,
         judged: bool = False,
         spp: int | None = None,
-        limit: float = 0.005,
+        limit: float | None = None,
         noise_free: bool = False,
         rim: int = 0,
     ) -> "Case":
@@ -394,7 +404,8 @@ class PairGate(Gate):
             from reference_rt.rendering.scene import Scene
 
             known = None if scene is None else Scene.load(self._root / scene)
-            asked = Asked(limit, name, known, spp, judged, noise_free, rim)
+            margin = self._limit if limit is None else limit
+            asked = Asked(margin, name, known, spp, judged, noise_free, rim)
             return pair_case(pictures, pictures_of(b), asked)
 
         return self._judge(a, case_of)

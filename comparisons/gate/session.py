@@ -19,12 +19,25 @@ if TYPE_CHECKING:
     from comparisons.gate.history import Past
 
 NAME = "reference_rt_session"
+
+INI = {
+    "image_gate_out": "default of --image-gate-out",
+    "image_gate_baselines": "default of --image-gate-baselines",
+    "image_gate_limit": "default of the argument `limit` of image_gate, pair_gate, derivative_gate",
+    "reference_rt_report": "default of --reference-rt-report",
+    "reference_rt_history": "default of --reference-rt-history",
+}
+"""What pytest's configuration file may say."""
+
 _ON_REPORT = "reference_rt_uses"
 """The attribute of a test's report: pytest-xdist hands attributes over that are JSON."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """`--reference-rt-report` and `--reference-rt-history`."""
+    """`--reference-rt-report` and `--reference-rt-history`, and the defaults of all options in
+    pytest's configuration file."""
+    for name, what in INI.items():
+        parser.addini(name, what, default="")
     group = parser.getgroup("image_gate")
     group.addoption(
         "--reference-rt-report",
@@ -60,9 +73,14 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def folders(config: pytest.Config) -> tuple[Path | None, Path | None]:
     """Of the page and of the history, as the options say."""
-    names = (config.getoption("--reference-rt-report"), config.getoption("--reference-rt-history"))
-    report, history = (None if name is None else config.rootpath / str(name) for name in names)
+    names = (option(config, "reference_rt_report"), option(config, "reference_rt_history"))
+    report, history = (None if not name else config.rootpath / name for name in names)
     return report, history
+
+
+def option(config: pytest.Config, name: str) -> str:
+    """An option's value, or that of pytest's configuration file; "" if there is none."""
+    return str(config.getoption(name) or config.getini(name) or "")
 
 
 class Session:

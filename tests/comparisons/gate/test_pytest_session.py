@@ -157,6 +157,20 @@ def test_a_verdict_that_changes_is_named(
     assert page.count("changed 2 times") == 2  # in the list, and for readers of the strip
 
 
+@pytest.mark.slow
+def test_the_configuration_file_has_defaults(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(test_it=MODULE)
+    text = '[tool.pytest.ini_options]\nreference_rt_report = "made"\nimage_gate_limit = "{}"\n'
+    for limit, verdict in (("0.005", "agree"), ("0.0011", "inconclusive")):
+        pytester.makepyprojecttoml(text.format(limit))
+        pytester.runpytest_subprocess(*PLUGIN, "-p", "no:cacheprovider", "-k", "derivative")
+        (found,) = json.loads((pytester.path / "made" / "results.json").read_text())["uses"]
+        assert found["verdict"] == verdict
+    pytester.makepyprojecttoml(text.format("little"))
+    refused = pytester.runpytest_subprocess(*PLUGIN, "-k", "derivative")
+    assert "image_gate_limit: expected a number" in refused.stdout.str()
+
+
 def use(verdict: str, test: str = "t", z: float | None = None, call: int = 1) -> uses.Use:
     passed = verdict in ("agree", "unchanged")
     what = {"verdict": verdict, "passed": passed, "z": z, "outcome": "passed", "folder": ""}
