@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import comparisons
-from reference_rt import Film, Scene, Whitted, render
+from reference_rt import Film, Point, Scene, Sphere, Whitted, render
 
 GATE = """
 import numpy as np
@@ -20,7 +20,8 @@ comparisons.gate(picture, reference=picture, noise_free=True)
 
 def test_renders_and_verdicts_are_logged(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO)
-    render(Scene(film=Film(width=4, height=3), integrator=Whitted()), spp=4)
+    lit = {"shapes": (Sphere(center=(0, 0, -3)),), "lights": (Point(position=(0, 2, 0), intensity=(1, 1, 1)),)}
+    render(Scene(film=Film(width=4, height=3), integrator=Whitted(), **lit), spp=4)
     picture = np.ones((4, 4, 3))
     comparisons.gate(picture, reference=picture, noise_free=True, name="room")
     told = {record.name: record.getMessage() for record in caplog.records}
