@@ -20,7 +20,10 @@ comparisons.gate(picture, reference=picture, noise_free=True)
 
 def test_renders_and_verdicts_are_logged(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO)
-    lit = {"shapes": (Sphere(center=(0, 0, -3)),), "lights": (Point(position=(0, 2, 0), intensity=(1, 1, 1)),)}
+    lit = {
+        "shapes": (Sphere(center=(0, 0, -3)),),
+        "lights": (Point(position=(0, 2, 0), intensity=(1, 1, 1)),),
+    }
     render(Scene(film=Film(width=4, height=3), integrator=Whitted(), **lit), spp=4)
     picture = np.ones((4, 4, 3))
     comparisons.gate(picture, reference=picture, noise_free=True)
