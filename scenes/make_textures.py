@@ -126,7 +126,7 @@ def sky(width: int = 256, rows: int = 128) -> npt.NDArray[np.float32]:
 
 
 def exposed_sky() -> bytes:
-    """A small sky as a .hdr file (Ward 1991) whose header says that it is twice as bright as meant."""
+    """A small sky as a .hdr file (Ward 1991), twice as bright as meant, as its header says."""
     blocks = sky().astype(np.float64).reshape(16, 8, 32, 8, 3).mean(axis=(1, 3))
     shared = np.frexp(2.0 * blocks.max(axis=-1))[1]
     mantissas = np.floor(256.0 * np.ldexp(2.0 * blocks, -shared[..., None]))
