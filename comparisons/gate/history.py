@@ -14,6 +14,7 @@ from typing import Any
 from comparisons.gate.uses import Use, key_of
 from comparisons.results.files import write_json
 from reference_rt.util.files import discard, read_text
+from reference_rt.util.processes import tied
 
 LOOKED_AT = 20
 """Sessions over which a change of a verdict counts."""
@@ -103,7 +104,7 @@ def _commit(root: Path) -> str:
     words = ["git", "-C", str(root), "describe", "--always", "--dirty=+", "--abbrev=40"]
     words.append("--exclude=*")
     with suppress(OSError, subprocess.TimeoutExpired):
-        found = subprocess.run(words, capture_output=True, text=True, timeout=10, check=False)
-        told = found.stdout.strip()
+        found = subprocess.run(words, capture_output=True, timeout=10, check=False, **tied())
+        told = found.stdout.decode().strip()
         return "" if found.returncode or told.endswith("+") else told
     return ""
