@@ -97,7 +97,7 @@ def test_a_call_that_cannot_be_judged_is_on_the_page(pytester: pytest.Pytester) 
     page = (pytester.path / "seen" / "report.html").read_text()
     assert re.findall(r'data-verdict="(\w+)"', page) == ["error"]
     assert noted["headline"] == noted["reason"]
-    assert noted["headline"] in page
+    assert noted["headline"] in page.replace("<wbr>", "")
 
 
 @pytest.mark.slow
