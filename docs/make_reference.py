@@ -1,8 +1,8 @@
 """Makes docs/scene_reference.md and its pictures: `python docs/make_reference.py [NAME...]`.
 
 Fields, ranges, defaults and descriptions are from the JSON Schema; examples are from
-reference_examples.yaml.  NAME: only the pictures of these types; `text`: none.  The page is always
-written.
+reference_examples.yaml.  NAME: only the pictures of these types, or of the values of these fields,
+such as Bitmap.wrap; `text`: none.  The page is always written.
 """
 
 import sys
@@ -10,7 +10,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from docs_pages import DOCS
-from reference_scenes import EXAMPLES, PICTURES, WIDTH, picture_of
+from reference_scenes import (
+    EXAMPLES,
+    PICTURES,
+    VALUE_SIZE,
+    WIDTH,
+    picture_of,
+    picture_of_value,
+)
 
 import reference_rt as rt
 from reference_rt import json_schema
@@ -106,6 +113,8 @@ def sections() -> list[tuple[str, str, list[str]]]:
 
 
 SECTIONS = sections()
+SIDE_BY_SIDE = {"Filters", "Samplers", "Integrators"}
+"""Sections that begin with the pictures of all their types: these are of one scene each."""
 LISTED = {name for _, _, names in SECTIONS for name in names}
 """The types that have a heading."""
 
@@ -128,9 +137,12 @@ def page() -> str:
         "## The scene",
         "",
         *table(SCHEMA, ()),
+        *strips("Scene"),
     ]
     for title, text, names in SECTIONS:
         lines += ["", f"## {title}", "", text]
+        if title in SIDE_BY_SIDE:
+            lines += strip({word(name): f"{name}.jpg" for name in names})
         shared = shared_fields(names)
         if shared:
             lines += ["", "All of them have these fields:", ""]
@@ -182,7 +194,42 @@ def entry(name: str, shared: Iterable[str]) -> list[str]:
         lines += [f"![{word(name)}](pictures/reference/{name}.jpg){{ width={WIDTH} }}", ""]
         lines += ["```yaml", *wrapped(EXAMPLES[name]["yaml"]), "```", ""]
     rows = table(part, shared)
-    return [*lines, *rows] if rows else lines[:-1]
+    return [*lines, *rows, *strips(name)] if rows else lines[:-1]
+
+
+def values_of(value: Mapping[str, Any]) -> list[str]:
+    """The words that a field may be, or that its list may hold; none of other fields."""
+    parts = [value, *value.get("anyOf", ()), value.get("items", {})]
+    return [word for part in parts for word in part.get("enum", ())]
+
+
+FIELDS = {
+    f"{name}.{field}": words
+    for name, part in {"Scene": SCHEMA, **TYPES}.items()
+    for field, value in part["properties"].items()
+    if (words := values_of(value))
+}
+"""The values of each field that are words."""
+
+
+def strips(name: str) -> list[str]:
+    """The pictures of all values of each field of a type."""
+    lines = []
+    for field, words in FIELDS.items():
+        if field.startswith(f"{name}."):
+            key = field.partition(".")[2]
+            pictures = {f"{key}: {word}": f"values/{field}.{word}.jpg" for word in words}
+            lines += strip(pictures)
+    return lines
+
+
+def strip(pictures: Mapping[str, str]) -> list[str]:
+    """Pictures side by side, with what stands below each."""
+    lines = ["", '<div class="values" markdown>']
+    for text, file in pictures.items():
+        picture = f"![{text}](pictures/reference/{file}){{ width={VALUE_SIZE[0]} }}"
+        lines += [f'<figure markdown="span">{picture}<figcaption>{text}</figcaption></figure>']
+    return [*lines, "</div>"]
 
 
 def word(name: str) -> str:
@@ -305,8 +352,11 @@ def anchor(text: str) -> str:
 def main() -> None:
     """Write the page, and the pictures that are asked for."""
     PICTURES.mkdir(parents=True, exist_ok=True)
-    for name in sys.argv[1:] or EXAMPLES:
-        if name != "text":
+    (PICTURES / "values").mkdir(exist_ok=True)
+    for name in sys.argv[1:] or [*EXAMPLES, *FIELDS]:
+        for value in FIELDS.get(name, ()):
+            picture_of_value(name, value)
+        if name in EXAMPLES:
             picture_of(name)
     with replacing(PAGE) as temporary:
         temporary.write_text(page(), encoding="utf-8")

@@ -3,9 +3,10 @@
 import shlex
 import sys
 import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -26,7 +27,12 @@ from comparisons.commands.truth import truth_gate
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.cli.options import AllowMissing, Defaults, adjusted, by_name, duration
 from reference_rt.cli.quantities import seconds_of
+from reference_rt.cli.watching import stamps, wait_for_change
 from reference_rt.util.errors import ReferenceRtError, UsageError, printable
+
+if TYPE_CHECKING:
+    from comparisons.gate.pictures_in import Picture
+    from comparisons.results.case import Case
 
 
 @guarded
@@ -153,6 +159,13 @@ def gate(
         ),
     ] = "",
     witness: Witness = None,
+    beside: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=FILE",
+            help="Show this picture, another renderer's, on the page too; it is not judged.",
+        ),
+    ] = None,
     pair: Annotated[
         tuple[str, str] | None,
         typer.Option(
@@ -184,6 +197,14 @@ def gate(
             help="Leave out the outermost pixels, which a wide filter makes differ by convention.",
         ),
     ] = 0,
+    watch: Annotated[
+        bool,
+        typer.Option(
+            "--watch",
+            help="Judge again whenever a candidate or a --reference is written; Ctrl-C ends, with "
+            "the last verdict's exit code.",
+        ),
+    ] = False,
     out: Annotated[
         Path, typer.Option("--out", "-o", help="Folder for results.json and report.html.")
     ] = Path("out"),
@@ -202,7 +223,6 @@ def gate(
     usage; 3: invalid picture, scene or baseline; 4: the renderer could not run, or the baseline is
     missing or stale.
     """
-    started = time.perf_counter()
     with compare_extra("the gate"):
         from comparisons.commands.outputs import Outputs
         from comparisons.compare.looks import SECONDS
@@ -228,7 +248,7 @@ def gate(
         alone: dict[str, Any] = {"reference": reference, "variance": variance, "truth": truth}
         alone |= {"baseline": baseline, "command": command, "browser": browser, "step": step}
         alone |= {"witness": witness, "derivative": derivative, "tone-curve": tone_curve}
-        alone |= {"from": renderer}
+        alone |= {"from": renderer, "watch": watch, "beside": beside}
         alone = {f"--{name}": value for name, value in alone.items()} | {"candidates": candidates}
         for name, value in {**alone, "--reference-layer": reference_layer}.items():
             if value:
@@ -249,6 +269,8 @@ def gate(
     if [command is None, browser is None, not candidates].count(False) != 1:
         raise UsageError("expected either candidates, --command, --browser or --pair")
     driven = command is not None or browser is not None
+    if driven and watch:
+        raise UsageError("--watch: waits for files; expected candidates")
     driving: dict[str, Any] = {"replicates": replicates, "seed": seed, "suffix": suffix}
     driving |= {"time-limit": time_limit, "fixed": fixed or None}
     given = [name for name, value in driving.items() if value is not None]
@@ -268,6 +290,7 @@ def gate(
         others |= {"variance": variance, "baseline": baseline, "fixed": fixed, "rim": rim}
         others |= {"noise-free": noise_free, "witness": witness, "browser": browser}
         others |= {"allow-missing": allow_missing, "tone-curve": tone_curve, "from": renderer}
+        others |= {"watch": watch, "beside": beside}
         for name, value in {**others, "junit": junit, "github": github, "define": define}.items():
             if value:
                 raise UsageError(f"--{name}: does not apply to {which}; expected one of them")
@@ -280,6 +303,9 @@ def gate(
             candidates or (), derivative, scene, reference or (), layer, out,
             spp=spp, size=size, limit=limit, step=step, threads=threads,
         )  # fmt: skip
+    if beside and rim:
+        raise UsageError("--beside: does not apply to --rim; expected one of them")
+    shown = pictures_beside(beside or ())
     if step is not None:
         raise UsageError("--step: only applies to --derivative; expected that too")
     described = (
@@ -322,60 +348,119 @@ def gate(
     for_ci = Formats(junit, github)
     kept = () if run is None else ("candidates",)
     Outputs(out, ("results.json", "report.html"), kept, others=for_ci.files).prepare()
-    driver: Driver | None = None
-    failed: ReferenceRtError | None = None
-    try:
-        files = [p for path in reference or () for p in read_candidates(path, theirs)]
-        request = Request(
-            scene=reading.scene(described),
-            references=reading.judge(files),
-            variance=variance,
-            baseline=baseline or "",
-            baselines=baselines,
-            limit=limit,
-            noise_free=noise_free,
-            tolerance=tolerance,
-            tone_curve=tone_curve,
-            threads=threads,
-            rim=rim,
-            name=name,
-            witness=witness,
-        )
-        with ProgressLine() as progress:
-            if run is not None:
-                if browser is not None and described is not None:
-                    write_resolved(described, run.scene or out, float32=True)
-                driver = Driver(run, out / "candidates", progress.line, reading.read)
-                case = gated_renderer(request, driver, rounds, progress.line, progress)
-            else:
-                pictures = [p for path in candidates or () for p in read_candidates(path, layer)]
-                case = gated(request, reading.read(pictures), progress)
-            case = reading.told(case)
-    except UsageError:
-        raise
-    except ReferenceRtError as error:
-        failed = error
-        if isinstance(error, SizeError) and command and size and "{width}" not in command:
-            failed = SizeError(f"{error}; pass {{width}} and {{height}} to it in --command")
-        case = not_run(name, failed)
-    else:
-        case = replace(case, seconds={"candidate": {"render": driver.seconds}} if driver else {})
-    trace = "" if scene is None else trace_command(scene, size, by_name(define))
-    case = replace(case, again=shlex.join(["reference-rt", *sys.argv[1:]]), trace=trace)
-    names = [str(path) for path in candidates or (driver.made if driver else ())]
-    facts = {"limit": limit, "candidates": names}
-    facts |= {"baseline": baseline} if baseline else {}
-    facts |= {"command": command} if command else {}
-    facts |= {"browser": browser} if browser else {}
-    facts |= witness_facts(witness) | reading.facts(renderer)
-    results, report = outputs.write(case, out, facts, time.perf_counter() - started)
-    about = {} if scene is None else {case.scene: scene.as_posix()}
-    for_ci.write("gate", [case], about, title=f"gate: {case.scene}")
-    if failed is not None:
-        raise failed
-    say(f"{case.scene}: {case.verdict}: {headline(case)}")
-    if case.cause is not None:
-        say(f"  {case.cause.name}: {case.cause.evidence}")
-    biases.tell(terminal.console(), case)
-    tell(f"{results}, {report}")
-    raise typer.Exit(outputs.code_of(case))
+
+    def judge_once() -> int:
+        """Write the outputs, say the verdict, and return its exit code."""
+        started = time.perf_counter()
+        driver: Driver | None = None
+        failed: ReferenceRtError | None = None
+        try:
+            files = [p for path in reference or () for p in read_candidates(path, theirs)]
+            request = Request(
+                scene=reading.scene(described),
+                references=reading.judge(files),
+                variance=variance,
+                baseline=baseline or "",
+                baselines=baselines,
+                limit=limit,
+                noise_free=noise_free,
+                tolerance=tolerance,
+                tone_curve=tone_curve,
+                threads=threads,
+                rim=rim,
+                name=name,
+                witness=witness,
+            )
+            with ProgressLine() as progress:
+                if run is not None:
+                    if browser is not None and described is not None:
+                        write_resolved(described, run.scene or out, float32=True)
+                    driver = Driver(run, out / "candidates", progress.line, reading.read)
+                    case = gated_renderer(request, driver, rounds, progress.line, progress)
+                else:
+                    pictures = [
+                        p for path in candidates or () for p in read_candidates(path, layer)
+                    ]
+                    case = gated(request, reading.read(pictures), progress)
+                case = with_others(reading.told(case), shown)
+        except UsageError:
+            raise
+        except ReferenceRtError as error:
+            failed = error
+            if isinstance(error, SizeError) and command and size and "{width}" not in command:
+                failed = SizeError(f"{error}; pass {{width}} and {{height}} to it in --command")
+            case = not_run(name, failed)
+        else:
+            case = replace(
+                case, seconds={"candidate": {"render": driver.seconds}} if driver else {}
+            )
+        trace = "" if scene is None else trace_command(scene, size, by_name(define))
+        case = replace(case, again=shlex.join(["reference-rt", *sys.argv[1:]]), trace=trace)
+        names = [str(path) for path in candidates or (driver.made if driver else ())]
+        facts = {"limit": limit, "candidates": names}
+        facts |= {"baseline": baseline} if baseline else {}
+        facts |= {"command": command} if command else {}
+        facts |= {"browser": browser} if browser else {}
+        facts |= witness_facts(witness) | reading.facts(renderer)
+        results, report = outputs.write(case, out, facts, time.perf_counter() - started)
+        about = {} if scene is None else {case.scene: scene.as_posix()}
+        for_ci.write("gate", [case], about, title=f"gate: {case.scene}")
+        if failed is not None:
+            raise failed
+        say(f"{case.scene}: {case.verdict}: {headline(case)}")
+        if case.cause is not None:
+            say(f"  {case.cause.name}: {case.cause.evidence}")
+        biases.tell(terminal.console(), case)
+        tell(f"{results}, {report}")
+        return outputs.code_of(case)
+
+    if watch:
+        watched = [*(candidates or ()), *(reference or ()), *([variance] if variance else ())]
+        raise typer.Exit(judged_again(judge_once, watched))
+    raise typer.Exit(judge_once())
+
+
+def pictures_beside(given: Sequence[str]) -> dict[str, tuple["Picture", ...]]:
+    """The pictures of NAME=FILE, by name.  Raises UsageError, ImageError."""
+    from comparisons.gate.pictures_in import read_candidates
+
+    found = {}
+    for text in given:
+        whose, _, file = text.partition("=")
+        if not whose or not file or whose in found:
+            expected = "a name for each" if whose in found else "NAME=FILE, such as Cycles=c.exr"
+            raise UsageError(f"--beside: expected {expected}, got '{text}'")
+        found[whose] = read_candidates(Path(file))
+    return found
+
+
+def with_others(case: "Case", pictures: Mapping[str, tuple["Picture", ...]]) -> "Case":
+    """The case with other renderers' pictures for its page.  Raises ImageError."""
+    from comparisons.gate.reference import check_sizes, size_of, stacked
+
+    if case.images is None:
+        return case
+    others = dict(case.images.others)
+    for whose, replicates in pictures.items():
+        check_sizes(replicates, size_of(case.images.reference), "as the reference")
+        others[whose] = stacked(replicates).mean(axis=0)
+    return replace(case, images=replace(case.images, others=others))
+
+
+def judged_again(judge: Callable[[], int], files: Sequence[Path]) -> int:
+    """Judge, and again whenever one of the files has been written, until an interruption; the last
+    exit code.  Outputs of the judgement before stay until the next ones replace them."""
+    while True:
+        before = stamps(files)
+        try:
+            code = judge()
+        except UsageError:
+            raise
+        except ReferenceRtError as error:
+            say(f"error: {error}", err=True)
+            code = error.exit_code
+        say("waiting for another candidate; Ctrl-C ends", err=True)
+        try:
+            wait_for_change(files, before)
+        except KeyboardInterrupt:
+            return code

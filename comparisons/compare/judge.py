@@ -157,7 +157,9 @@ def judge(evidence: Evidence, limit: float) -> Case:
             if evidence.witness is not None and pair is not None:
                 heard, picture = evidence.witness(pair, evidence.sides)
                 rungs.append(heard)
-                images = replace(images, witness=picture)
+                if picture is not None:
+                    whose = heard.numbers.get("whose", "the witness's")
+                    images = replace(images, others={whose: picture})
     rest_of = None
     if rendered is not None and evidence.rest_of is not None:
         rest_of = partial(evidence.rest_of, rendered)

@@ -1,5 +1,6 @@
 """`comparisons.compare(scene)`: one scene against Mitsuba, from Python."""
 
+import logging
 import os
 from collections.abc import Callable
 
@@ -11,6 +12,8 @@ from comparisons.mitsuba.backend import mitsuba
 from comparisons.renderers import WitnessName
 from reference_rt.rendering.render import with_settings
 from reference_rt.rendering.scene import Scene
+
+_LOG = logging.getLogger(__name__)
 
 
 def compare_one(
@@ -33,7 +36,8 @@ def compare_one(
     as many as the noise asks for; others are added until the question is decided or `time_limit`
     seconds have passed; None: one look.  limit: the smallest relative bias of the image mean that
     must be detectable.  threads: ours, None for all cores.  witness: a third renderer, whose
-    pictures say who stands alone.  say: called with a line about each step.
+    pictures say who stands alone.  say: called with a line about each step;
+    by default these go to the logger of this module, as information.
 
     Mitsuba runs in this process.  Raises SceneError, ReferenceUnavailableError.
     """
@@ -48,5 +52,6 @@ def compare_one(
         limit=limit,
         witness=witness,
     )
-    case = compare_scene(Subject(loaded), budget, say or (lambda line: None), threads)
+    case = compare_scene(Subject(loaded), budget, say or _LOG.info, threads)
+    _LOG.info("%s: %s: %s", case.scene, case.verdict, case.reason)
     return NotebookCase.of(case)

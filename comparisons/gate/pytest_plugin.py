@@ -19,12 +19,17 @@ It imports nothing but pytest until it is used.
 import hashlib
 import importlib
 import re
+import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+
+from comparisons.gate import session, uses
+from comparisons.gate.session import pytest_configure as pytest_configure
 
 if TYPE_CHECKING:
     from comparisons.gate.material import Check
@@ -33,21 +38,20 @@ if TYPE_CHECKING:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """`--image-gate-out` and `--image-gate-baselines`."""
+    """`--image-gate-out` and `--image-gate-baselines`, and what `session` adds."""
     group = parser.getgroup("image_gate", "compare pictures with scenes and baselines")
     group.addoption(
         "--image-gate-out",
         metavar="DIR",
-        default="image-gate",
         help="folder for results.json and, for failures, the pictures and a page, in a folder per "
         "test (default: image-gate, in the root folder)",
     )
     group.addoption(
         "--image-gate-baselines",
         metavar="DIR",
-        default="baselines",
         help="the folder of baselines (default: baselines, in the root folder)",
     )
+    session.pytest_addoption(parser)
 
 
 @pytest.fixture
@@ -74,6 +78,19 @@ def pair_gate(request: pytest.FixtureRequest) -> "PairGate":
     return PairGate(request.node, request.config)
 
 
+def _limit(text: str) -> float:
+    """The smallest bias that must be detectable, by default.  Raises pytest.UsageError."""
+    try:
+        return float(text or 0.005)
+    except ValueError:
+        told = f"image_gate_limit: expected a number such as 0.005, got '{text}'"
+        raise pytest.UsageError(told) from None
+
+
+_CALLS = pytest.StashKey[int]()
+"""Calls of gates in a test so far."""
+
+
 class Gate:
     """The gate for one test; each call has a folder of its own."""
 
@@ -81,8 +98,14 @@ class Gate:
 
     def __init__(self, node: pytest.Item, config: pytest.Config) -> None:
         self._node, self._root, self._calls = node, config.rootpath, 0
-        self._out = self._root / str(config.getoption("--image-gate-out"))
-        self._baselines = self._root / str(config.getoption("--image-gate-baselines"))
+        self._noted = config.pluginmanager.get_plugin(session.NAME) is not None
+        report, _ = session.folders(config)
+        self._has_pages = report is not None
+        usual = self._root / "image-gate" if report is None else report / "tests"
+        self._out = self._root / (session.option(config, "image_gate_out") or usual)
+        kept = session.option(config, "image_gate_baselines")
+        self._baselines = self._root / (kept or "baselines")
+        self._limit = _limit(str(config.getini("image_gate_limit")))
 
     def _judge(
         self,
@@ -95,7 +118,7 @@ class Gate:
         self._begin("comparisons.gate.request")
         from reference_rt.util.errors import ReferenceRtError
 
-        failed = ""
+        failed, begun = "", time.perf_counter()
         given: list[tuple[Picture, Path | None]] = []
         try:
             folder = self._folder()
@@ -107,7 +130,11 @@ class Gate:
             failed = f"{self.fixture}: {error}"
         if failed:
             kept, unkept = _kept(given)
+            self._note_error(failed)
             pytest.fail("\n".join([failed, *kept, *unkept]))
+        if self._noted:
+            seconds = time.perf_counter() - begun
+            self._note(folder=str(folder), seconds=seconds, **uses.of_case(case, passed))
         self._node.user_properties.append((self.fixture, f"{case.verdict}: {case.reason}"))
         if not passed:
             _, unkept = _kept(given)
@@ -115,10 +142,20 @@ class Gate:
             pytest.fail("\n".join([told, *unkept]))
         return case
 
+    def _note(self, **what: Any) -> None:
+        """Note this call for the page of the session, if there is one."""
+        if self._noted:
+            uses.note(self._node, self.fixture, self._calls, **what)
+
+    def _note_error(self, message: str) -> None:
+        """Note a call that could not be judged."""
+        self._note(verdict="error", passed=False, headline=message, reason=message)
+
     def _begin(self, module: str) -> None:
         """A call of the gate, which needs a module.  Fails the test if its extra is missing."""
         __tracebackhide__ = True
-        self._calls += 1
+        # Of all gates of the test, whose folders are beside each other.
+        self._calls = self._node.stash[_CALLS] = self._node.stash.get(_CALLS, 0) + 1
         missing = ""
         try:
             importlib.import_module(module)
@@ -128,6 +165,7 @@ class Gate:
             missing = needs(self.fixture, "compare", error.name)
         # Failing outside of `except`: pytest would show the handled error, with all its frames.
         if missing:
+            self._note_error(missing)
             pytest.fail(missing)
 
     def _folder(self) -> Path:
@@ -140,6 +178,10 @@ class Gate:
         # Names that differ only in replaced characters must not share a folder.
         unique = hashlib.sha256(nodeid.encode()).hexdigest()[:8]
         folder = self._out / f"{plain[:80]}-{unique}-{self._calls}"
+        # Before the check, which removes folders that it made: another process of pytest-xdist may
+        # be about to write there.
+        with suppress(OSError):
+            self._out.mkdir(parents=True, exist_ok=True)
         files = [folder / n for n in ("results.json", "report.html", "case.json", "pictures.exr")]
         check_writable(*files)
         for file in files:
@@ -149,12 +191,14 @@ class Gate:
         return folder
 
     def _write(self, case: "Case", folder: Path, baseline: str) -> bool:
-        """Write results.json, for a failure also the page and the pictures; whether it passes."""
+        """Write results.json; for a failure, or a page of the session, also the page, and for a
+        failure the pictures.  Whether it passes."""
         from comparisons.gate import outputs
         from comparisons.results.stored_case import write_case
 
         passed = outputs.code_of(case) == 0
-        outputs.write(case, folder, {"baseline": baseline} if baseline else {}, page=not passed)
+        facts = {"baseline": baseline} if baseline else {}
+        outputs.write(case, folder, facts, page=self._has_pages or not passed)
         if not passed:
             write_case(folder, case)
         return passed
@@ -173,7 +217,7 @@ class ImageGate(Gate):
         baseline: str = "",
         reference: Any = None,
         variance: str | Path | None = None,
-        limit: float = 0.005,
+        limit: float | None = None,
         noise_free: bool = False,
         tolerance: float = 0.001,
         tone_curve: str = "",
@@ -209,7 +253,7 @@ class ImageGate(Gate):
                 variance=None if variance is None else Path(variance),
                 baseline=baseline,
                 baselines=self._baselines,
-                limit=limit,
+                limit=self._limit if limit is None else limit,
                 noise_free=noise_free,
                 tolerance=tolerance,
                 tone_curve=tone_curve,
@@ -236,7 +280,7 @@ class DerivativeGate(Gate):
         primal: "Callable[[float, int], Any] | None" = None,
         at: float | None = None,
         step: float | None = None,
-        limit: float = 0.005,
+        limit: float | None = None,
     ) -> "Case":
         """Fail the test unless `candidate` is the derivative of a picture by a parameter.
 
@@ -264,7 +308,7 @@ class DerivativeGate(Gate):
                 primal=primal,
                 at=at,
                 step=step,
-                limit=limit,
+                limit=self._limit if limit is None else limit,
                 name=name,
             )
             return case_of([picture.radiance for picture in pictures], asked)
@@ -298,6 +342,9 @@ class MaterialGate(Gate):
         from reference_rt.util.errors import ReferenceRtError
 
         lines: list[str] = []
+        found: list[Check] = []
+        pictures: list[Path] = []
+        begun = time.perf_counter()
         try:
             folder = self._folder()
             asked = {"views": views, "eta": eta, "reciprocal": reciprocal, "seed": seed}
@@ -308,9 +355,15 @@ class MaterialGate(Gate):
                 if check.maps:
                     picture = folder / f"{check.name}.png"
                     check.write_picture(picture)
+                    pictures.append(picture)
                     lines.append(f"kept: {_relative(picture, self._root)}")
         except ReferenceRtError as error:
             lines = [f"{self.fixture}: {error}"]
+            self._note_error(lines[0])
+        else:
+            if self._noted:
+                seconds = time.perf_counter() - begun
+                self._note(seconds=seconds, **uses.of_checks(found, pictures))
         if lines:
             pytest.fail("\n".join(lines))
         return found
@@ -329,7 +382,7 @@ class PairGate(Gate):
         scene: str | Path | None = None,
         judged: bool = False,
         spp: int | None = None,
-        limit: float = 0.005,
+        limit: float | None = None,
         noise_free: bool = False,
         rim: int = 0,
     ) -> "Case":
@@ -351,7 +404,8 @@ class PairGate(Gate):
             from reference_rt.rendering.scene import Scene
 
             known = None if scene is None else Scene.load(self._root / scene)
-            asked = Asked(limit, name, known, spp, judged, noise_free, rim)
+            margin = self._limit if limit is None else limit
+            asked = Asked(margin, name, known, spp, judged, noise_free, rim)
             return pair_case(pictures, pictures_of(b), asked)
 
         return self._judge(a, case_of)

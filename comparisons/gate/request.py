@@ -1,5 +1,6 @@
 """A gate's request: what the candidates are compared with."""
 
+import logging
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -38,6 +39,8 @@ from comparisons.statistics import Margins
 from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import UsageError
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -102,8 +105,9 @@ def gated(
 ) -> Case:
     """The verdict.  Raises ImageError, SceneError, UsageError, BaselineMissingError,
     BaselineEditedError."""
-    judge = prepared(request, candidates, say)
-    return judge.case(candidates)
+    case = prepared(request, candidates, say).case(candidates)
+    _LOG.info("%s: %s: %s", case.scene, case.verdict, case.reason)
+    return case
 
 
 def gate(

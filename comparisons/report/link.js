@@ -2,7 +2,7 @@
 
 const LINK_MILLISECONDS = 300;
 /** Values that are not written. */
-const DEFAULTS = { view: "side", of: "candidate", stops: "0", colours: "srgb", sort: "rank", order: "up", cases: "list" };
+const DEFAULTS = { view: "side", of: "candidate", pair: "0,1", stops: "0", colours: "srgb", sort: "rank", order: "up", cases: "list" };
 
 /** The state in an address's fragment; null if it is none of ours. */
 function readFragment(fragment) {

@@ -88,7 +88,8 @@ def fitted(
 
 
 def _packed(images: Images, factor: int, most_bytes: int, bits: Bits = COARSE) -> Fitted:
-    pixels = images.candidate[..., 0].size + images.reference[..., 0].size
+    every = (images.candidate, images.reference, *images.others.values())
+    pixels = sum(picture[..., 0].size for picture in every)
     # Packing takes seconds for a picture that cannot fit anyway.
     while factor <= COARSEST and FEWEST_BYTES * pixels > most_bytes * factor**2:
         factor *= 2
@@ -236,10 +237,9 @@ def _script() -> str:
 
 def _view(case: Case, mapped: bool, walls: Mapping[str, float]) -> dict[str, Any]:
     """A case as the template takes it.  mapped: whether it has a map of FLIP."""
-    from comparisons.report.thumbnails import of_witness
+    from comparisons.report.thumbnails import of_others
 
     short, seen = in_short(case)
-    whose = next((r.numbers["whose"] for r in case.rungs if "whose" in r.numbers), "the witness's")
     pictures = _thumbnails(case)
     return {
         "case": case,
@@ -256,7 +256,8 @@ def _view(case: Case, mapped: bool, walls: Mapping[str, float]) -> dict[str, Any
         "pictures": pictures,
         "layers": [],
         "figures": _figures(case, pictures, mapped) if pictures else [],
-        "witness": of_witness(case.images, case.sides, whose) if pictures and case.images else [],
+        "others": of_others(case.images, case.sides) if pictures and case.images else [],
+        "whose": [*case.sides, *(case.images.others if case.images else ())],
         "histograms": _histograms(case, pictures) if pictures else [],
         "metrics": _metrics(case.metrics) if case.metrics else None,
         "times": _times(case),

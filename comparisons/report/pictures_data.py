@@ -13,6 +13,7 @@ NaN, infinities and zeros are exact.
 import base64
 import json
 import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -71,6 +72,7 @@ class Unpacked:
     reference: FloatArray
     difference: FloatArray | None
     error: FloatArray | None
+    others: tuple[FloatArray, ...] = ()
 
 
 def pack(images: Images, factor: int = 1, bits: Bits = COARSE) -> dict[str, Any]:
@@ -78,8 +80,8 @@ def pack(images: Images, factor: int = 1, bits: Bits = COARSE) -> dict[str, Any]
 
     With a factor above 1 the pixels are means over factor x factor of the given ones.  The stream
     holds the codes of the reference, the candidate, the rest of the difference and the standard
-    error (the last two where there are any): of each first all the highest bytes, last all the
-    lowest ones, in the order rows, columns, channels.
+    error (the last two where there are any), and of other renderers' pictures: of each first all
+    the highest bytes, last all the lowest ones, in the order rows, columns, channels.
     """
     images = reduced_images(images, factor)
     candidate, reference = images.candidate, images.reference
@@ -95,7 +97,10 @@ def pack(images: Images, factor: int = 1, bits: Bits = COARSE) -> dict[str, Any]
     else:
         kept["candidate"] = coded(candidate, bits.radiance)
         streams.append(kept["candidate"].codes)
-    described = {name: picture.described() for name, picture in kept.items()}
+    described: dict[str, Any] = {name: picture.described() for name, picture in kept.items()}
+    others = [coded(picture, bits.radiance) for picture in images.others.values()]
+    streams += [picture.codes for picture in others]
+    described["others"] = [picture.described() for picture in others]
     return {"factor": factor, "digits": bits.digits, **described, "bytes": _deflated(streams)}
 
 
@@ -107,14 +112,18 @@ def unpack(data: dict[str, Any]) -> Unpacked:
     reference = _coded(data["reference"], reference_codes).decoded()
     if "rest" not in data:
         candidate = _coded(data["candidate"], candidate_codes).decoded()
-        return Unpacked(candidate, reference, None, None)
+        return Unpacked(candidate, reference, None, None, _others(data, streams))
     candidate_codes = reference_codes + _unzigzag(candidate_codes)
     candidate = _coded(data["candidate"], candidate_codes).decoded()
     rest = _coded(data["rest"], next(streams)).decoded()
     with np.errstate(invalid="ignore", over="ignore"):
         difference = candidate - reference + rest
     error = _coded(data["error"], next(streams)).decoded() if "error" in data else None
-    return Unpacked(candidate, reference, difference, error)
+    return Unpacked(candidate, reference, difference, error, _others(data, streams))
+
+
+def _others(data: dict[str, Any], streams: Iterator[Codes]) -> tuple[FloatArray, ...]:
+    return tuple(_coded(one, next(streams)).decoded() for one in data["others"])
 
 
 def as_json(data: dict[str, Any]) -> str:
@@ -151,7 +160,9 @@ def reduced_images(images: Images, factor: int) -> Images:
     error = images.error
     if error is not None:
         error = np.sqrt(_block_sums(error**2, factor)) / _block_counts(error, factor)
-    return Images(reduced(images.candidate, factor), reduced(images.reference, factor), error)
+    others = {whose: reduced(picture, factor) for whose, picture in images.others.items()}
+    pair = reduced(images.candidate, factor), reduced(images.reference, factor)
+    return Images(*pair, error, others)
 
 
 def _block_sums(image: FloatArray, factor: int) -> FloatArray:
@@ -200,12 +211,12 @@ def _deflated(streams: list[Codes]) -> str:
 def _inflated(raw: bytes, data: dict[str, Any]) -> list[Codes]:
     """The codes of each stream, flat."""
     streams, at = [], 0
-    for name in ("reference", "candidate", "rest", "error"):
-        if name in data:
-            count = 3 * data[name]["width"] * data[name]["height"]
-            planes = np.frombuffer(raw, np.uint8, 4 * count, at).reshape(4, count)
-            streams.append(planes.T.copy().view(">u4")[:, 0].astype(np.uint32))
-            at += 4 * count
+    described = [data[name] for name in ("reference", "candidate", "rest", "error") if name in data]
+    for one in [*described, *data["others"]]:
+        count = 3 * one["width"] * one["height"]
+        planes = np.frombuffer(raw, np.uint8, 4 * count, at).reshape(4, count)
+        streams.append(planes.T.copy().view(">u4")[:, 0].astype(np.uint32))
+        at += 4 * count
     return streams
 
 

@@ -1,5 +1,6 @@
 """Templates of pages: all text is escaped, and files are written whole or not at all."""
 
+import json
 import re
 from collections.abc import Callable
 from functools import cache
@@ -67,7 +68,7 @@ def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"shown": shown, "label": label, "rows": rows_of}
+    environment.filters |= {"shown": shown, "label": label, "rows": rows_of, "json": json.dumps}
     environment.filters |= {"typeset": typeset, "flip": flip, "soft": soft, **filters}
     return environment.get_template(name)
 

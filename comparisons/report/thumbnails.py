@@ -3,13 +3,14 @@
 import base64
 import io
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
 from comparisons.report.pictures_data import reduced
-from comparisons.results.case import FloatArray, Images
+from comparisons.results.case import Case, FloatArray, Images
 from comparisons.statistics.metrics import (
     count_nonfinite,
     encode,
@@ -75,15 +76,24 @@ def thumbnails(images: Images, is_signed: bool = False) -> Thumbnails:
     )
 
 
-def of_witness(images: Images, sides: tuple[str, str], whose: str) -> list[tuple[Thumbnail, str]]:
-    """A third renderer's picture and what each of the two differs from it, with their titles; none
-    where there is no third one.  whose: its."""
-    if images.witness is None:
+def small_pictures(case: Case) -> list[tuple[str, str]]:
+    """URLs and titles of both pictures and of their difference; none without pictures."""
+    images = case.images
+    if images is None or not images.candidate.size or not images.reference.size:
         return []
-    found = [(_exposed(images.witness, white_level(images.reference)), whose)]
-    for picture, side in zip((images.candidate, images.reference), sides, strict=True):
-        span, difference = _difference(Images(picture, images.witness))
-        found.append((difference, f"{side} − {whose}, −{span:.2g} to +{span:.2g}"))
+    found = thumbnails(images, case.is_signed)
+    pictures = [(found.candidate.url, case.sides[0]), (found.reference.url, case.sides[1])]
+    return pictures + ([(found.difference.url, "difference")] if found.difference else [])
+
+
+def of_others(images: Images, sides: tuple[str, str]) -> list[tuple[Thumbnail, str]]:
+    """Other renderers' pictures, and what each of the two differs from them, with titles."""
+    found = []
+    for whose, other in images.others.items():
+        found.append((_exposed(other, white_level(images.reference)), whose))
+        for picture, side in zip((images.candidate, images.reference), sides, strict=True):
+            span, difference = _difference(Images(picture, other))
+            found.append((difference, f"{side} − {whose}, −{span:.2g} to +{span:.2g}"))
     return found
 
 
@@ -139,6 +149,13 @@ def png_url(pixels: FloatArray) -> str:
     buffer = io.BytesIO()
     Image.fromarray(np.rint(pixels).astype(np.uint8)).save(buffer, "PNG", optimize=True)
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+
+
+def shrunk_url(path: Path, longest: int = 4 * LONGEST) -> str:
+    """The data: URL of a picture's file, made smaller."""
+    with Image.open(path) as image:
+        image.thumbnail((longest, longest))
+        return png_url(np.asarray(image.convert("RGB"), np.float64))
 
 
 # ---- the FLIP map of a case: where the pictures look different to people, as a PNG ---------------

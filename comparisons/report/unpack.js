@@ -19,7 +19,8 @@ function codesBeside(base, zigzag) {
   return base.map((code, i) => code + ((zigzag[i] >>> 1) ^ -(zigzag[i] & 1)));
 }
 
-/** What `pack` packed: {factor, candidate, reference, difference, error, z}, null where absent. */
+/** What `pack` packed: {factor, candidate, reference, difference, error, z}, null where absent, and
+ *  a list of others. */
 async function unpack(data) {
   const bytes = await inflate(data.bytes);
   let start = 0;
@@ -46,7 +47,38 @@ async function unpack(data) {
     pictures.error = decode(data.error, next(data.error));
     pictures.z = quotient(pictures);
   }
+  pictures.others = data.others.map((stored) => decode(stored, next(stored)));
   return pictures;
+}
+
+const negative = (picture) => picture && { ...picture, values: picture.values.map((value) => -value) };
+
+/** Of all pictures, by number (the candidate, the reference, the others), two as candidate and
+ *  reference.  Noise is known of the difference of the first two alone. */
+function paired(pictures, left, right) {
+  const all = [pictures.candidate, pictures.reference, ...pictures.others];
+  const [candidate, reference] = [all[left], all[right]];
+  const pair = { ...pictures, all, candidate, reference };
+  if (left + right === 1) {
+    const turned = left > right ? negative : (picture) => picture;
+    return { ...pair, difference: turned(pictures.difference), z: turned(pictures.z) };
+  }
+  const values = candidate.values.map((value, i) => value - reference.values[i]);
+  return { ...pair, difference: { ...candidate, values }, error: null, z: null };
+}
+
+/** The share of differences below which the end of their colours lies, as in thumbnails.py. */
+const DIFFERENCE_SHARE = 0.995;
+
+/** Of a difference: the end of its colours. */
+function spanOf({ width, height, values }) {
+  const sizes = new Float64Array(width * height);
+  for (let i = 0; i < sizes.length; i += 1) {
+    const most = Math.max(...[0, 1, 2].map((k) => Math.abs(values[3 * i + k])));
+    sizes[i] = Number.isFinite(most) ? most : 0;
+  }
+  sizes.sort();
+  return sizes[Math.floor(DIFFERENCE_SHARE * (sizes.length - 1))] || sizes.at(-1);
 }
 
 function difference({ candidate, reference }, rest) {

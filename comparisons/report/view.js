@@ -19,6 +19,9 @@ class CaseView {
     this.section = section;
     this.box = section.querySelector(".pictures");
     this.row = this.box.querySelector(".row");
+    /** Whose all pictures are, and which of them stand on the left and on the right. */
+    this.whose = JSON.parse(this.box.dataset.whose);
+    this.sides = [0, 1];
     this.choose("");
     this.figures = [...this.row.querySelectorAll("figure")].map((element) => this.figure(element));
     this.crops = [...section.querySelectorAll(".places button")].map((button) => new Crop(button));
@@ -43,14 +46,50 @@ class CaseView {
     this.factor = this.data.factor;
     /** Of what is read. */
     const digits = this.data.digits;
-    this.digits = { candidate: digits, reference: digits, difference: digits > 3 ? digits : 2, z: 2 };
+    this.digits = { candidate: digits, reference: digits, other: digits, difference: digits > 3 ? digits : 2, z: 2 };
     const { white, span } = layer ? stored.dataset : this.box.dataset;
-    [this.white, this.span, this.pictures] = [Number(white), Number(span), null];
+    [this.white, this.ownSpan, this.stored] = [Number(white), Number(span), null];
     for (const figure of this.figures ?? []) {
       const { width, height } = this.data[figure.kind === "candidate" ? "candidate" : "reference"];
       Object.assign(figure, { width, height });
-      figure.element.hidden = layer !== "" && (figure.kind === "z" || figure.kind === "flip");
     }
+    if (layer || this.figures) this.choosePair(0, 1);
+  }
+
+  /** Put two pictures, by number, on the left and on the right. */
+  choosePair(left, right) {
+    this.sides = [left, right];
+    const names = this.sides.map((side) => this.whose[side]);
+    for (const element of this.box.querySelectorAll("[data-side]")) {
+      element.textContent = names[Number(element.dataset.side)];
+    }
+    [...this.box.querySelectorAll(".side")].forEach((select, k) => (select.value = this.sides[k]));
+    for (const row of this.box.querySelectorAll("[data-number]")) {
+      row.hidden = this.layer !== "" || this.sides.includes(Number(row.dataset.number));
+    }
+    this.pictures = null;
+  }
+
+  /** Show the pair that an address names, such as "0,2". */
+  follow(pair, look) {
+    const sides = (pair ?? "").split(",").map((text) => (/^\d+$/.test(text) ? Number(text) : this.whose.length));
+    if (sides.length !== 2 || sides[0] === sides[1] || !sides.every((side) => side < this.whose.length)) return;
+    this.showPair(sides, look);
+  }
+
+  /** The next picture on a side (0 or 1), not the one on the other side. */
+  nextOn(side, look) {
+    if (this.layer || this.whose.length < 3) return;
+    const sides = [...this.sides];
+    do sides[side] = (sides[side] + 1) % this.whose.length;
+    while (sides[0] === sides[1]);
+    this.showPair(sides, look);
+  }
+
+  showPair(sides, look) {
+    this.choosePair(...sides);
+    this.onlook(this.section);
+    return this.show(look);
   }
 
   /** A canvas in place of the thumbnail; the map of FLIP is a picture already. */
@@ -72,8 +111,15 @@ class CaseView {
 
   /** Decode, unless it is done, and draw. */
   async show(look) {
-    this.pictures ??= await unpack(this.data);
+    this.stored ??= await unpack(this.data);
+    this.pictures = paired(this.stored, ...this.sides);
     this.look = look;
+    const asJudged = this.sides[0] + this.sides[1] === 1;
+    this.span = asJudged || !this.pictures.difference ? this.ownSpan : spanOf(this.pictures.difference);
+    for (const { element, kind } of this.figures) {
+      const isLayer = this.layer !== "";
+      element.hidden = (kind === "z" && (isLayer || !this.pictures.z)) || (kind === "flip" && (isLayer || !asJudged));
+    }
     const own = { ...look, white: this.white, span: this.span, kind: this.kindOfValues() };
     const drawn = this.figures.filter(({ kind, element }) => kind !== "flip" && !element.hidden);
     for (const figure of drawn) {
@@ -91,9 +137,9 @@ class CaseView {
 
   /** The candidate alone, on a canvas in place of what is in `element`. */
   async drawInto(element, look) {
-    const { candidate } = this.pictures ?? (await unpack(this.data));
+    const { candidate } = this.stored ?? (await unpack(this.data));
     const canvas = document.createElement("canvas");
-    const own = { ...look, white: this.white, span: this.span, kind: this.kindOfValues() };
+    const own = { ...look, white: this.white, span: this.ownSpan, kind: this.kindOfValues() };
     paintKind(canvas, "candidate", candidate, own);
     element.replaceChildren(canvas);
   }
@@ -106,7 +152,7 @@ class CaseView {
 
   /** Give the memory back; what is drawn stays. */
   forget() {
-    this.pictures = null;
+    [this.stored, this.pictures] = [null, null];
   }
 
   exposed({ stops, colours }) {
@@ -140,6 +186,15 @@ class CaseView {
     this.box.querySelector(".layer")?.addEventListener("change", ({ target }) => {
       this.choose(target.value);
       this.show(this.look);
+    });
+    [...this.box.querySelectorAll(".side")].forEach((select, k) => {
+      select.addEventListener("change", () => {
+        const [before, other, chosen] = [this.sides[k], this.sides[1 - k], Number(select.value)];
+        if (this.layer) this.choose((this.box.querySelector(".layer").value = ""));
+        // What stands on the other side changes places with it.
+        const freed = chosen === other ? before : other;
+        this.showPair(k === 0 ? [chosen, freed] : [freed, chosen], this.look);
+      });
     });
     this.wipe = this.box.querySelector(".wipe input");
     this.wipe.addEventListener("input", () => this.setWipe(Number(this.wipe.value)));
@@ -330,8 +385,9 @@ class CaseView {
       this.trace.hidden = false;
     }
     for (const row of this.box.querySelectorAll("[data-row]")) {
-      const kind = row.dataset.row;
-      const values = this.values(this.pictures[kind], x, y);
+      const { row: kind, number } = row.dataset;
+      const picture = number ? this.pictures.all[Number(number)] : this.pictures[kind];
+      const values = this.values(picture, x, y);
       [...row.cells].slice(1).forEach((cell, k) => {
         cell.textContent = k < values.length ? reading(values[k], this.digits[kind]) : "–";
       });

@@ -167,7 +167,8 @@ function state() {
   const { mode, which } = document.body.dataset;
   const boxes = [...document.querySelectorAll("[name=verdict]")];
   const checked = boxes.filter((box) => box.checked).map((box) => box.value);
-  const { x, y } = views.get(looked)?.cursor ?? {};
+  const view = views.get(looked);
+  const { x, y } = view?.cursor ?? {};
   const { key, down } = overview.sorted;
   return {
     case: looked?.dataset.name ?? "",
@@ -175,6 +176,7 @@ function state() {
     of: mode === "flip" || mode === "single" ? which : "candidate",
     x: x ?? "",
     y: y ?? "",
+    pair: view?.sides.join() ?? "",
     stops: String(look.stops),
     colours: look.colours,
     search: find("#search").value,
@@ -207,6 +209,7 @@ async function follow(fragment) {
   if (!section) return;
   section.querySelector(".body").open = true;
   goTo(section);
+  viewOf(section)?.follow(wanted.pair, look);
   const [x, y] = [Number(wanted.x), Number(wanted.y)];
   if (wanted.x !== undefined && Number.isInteger(x) && Number.isInteger(y)) viewOf(section)?.setCursor(x, y);
 }
@@ -253,6 +256,8 @@ const KEYS = {
   n: () => step(1),
   p: () => step(-1),
   f: flipKey,
+  a: () => viewOf(current())?.nextOn(0, look),
+  b: () => viewOf(current())?.nextOn(1, look),
   c: () => colour(COLOURS[(COLOURS.indexOf(look.colours) + 1) % COLOURS.length]),
   "+": () => expose(look.stops + 1),
   "=": () => expose(look.stops + 1),

@@ -62,8 +62,8 @@ class Images:
     candidate: FloatArray
     reference: FloatArray
     error: FloatArray | None = None
-    witness: FloatArray | None = None
-    """A third renderer's, where one was asked."""
+    others: Mapping[str, FloatArray] = field(default_factory=dict)
+    """Of the same scene by other renderers, by whose they are: a witness's; shown, not judged."""
     layers: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
     """Other pictures of both sides by name: of hits of the rays through the pixels' centres."""
     reference_error: FloatArray | None = None

@@ -22,7 +22,7 @@ from reference_rt.util.files import discard, read_input, read_text
 
 CASE, PICTURES = "case.json", "pictures.exr"
 
-SCHEMA = 3
+SCHEMA = 4
 """Version of the layout; raised whenever a reader of the former layout would misread the new
 one."""
 
@@ -31,7 +31,7 @@ _NUMBER = "number"
 
 _CHANNELS = "RGB"
 
-_SIDES = "candidate", "reference"
+_SIDES, _OTHERS = ("candidate", "reference"), "others"
 
 _KEYS = {
     f.name: {"rungs": "tiers"}.get(f.name, f.name)
@@ -137,10 +137,12 @@ def _write_pictures(
 ) -> dict[str, tuple[int, int]]:
     """All pictures as channels of one file, in its upper left corner; smaller ones are padded with
     NaN."""
-    names = [f.name for f in dataclasses.fields(images) if f.name != "layers"]
+    named = ("layers", "others")
+    names = [f.name for f in dataclasses.fields(images) if f.name not in named]
     pictures = {n: getattr(images, n) for n in names if getattr(images, n) is not None}
     for layer, pair in images.layers.items():
         pictures |= {f"{side}/{layer}": one for side, one in zip(_SIDES, pair, strict=True)}
+    pictures |= {f"{_OTHERS}/{whose}": picture for whose, picture in images.others.items()}
     for name, picture in pictures.items():
         if picture.ndim != 3 or picture.shape[2] != 3 or picture.size == 0:
             raise ValueError(f"{name}: expected (height, width, 3), got {picture.shape}")
@@ -171,7 +173,9 @@ def _read_pictures(path: Path, record: StoredCase) -> Images:
         pairs = {
             n: (pictures.pop(f"candidate/{n}"), pictures.pop(f"reference/{n}")) for n in layers
         }
-        return Images(**pictures, layers=pairs)
+        whose = [name for name in pictures if name.startswith(f"{_OTHERS}/")]
+        others = {name.partition("/")[2]: pictures.pop(name) for name in whose}
+        return Images(**pictures, layers=pairs, others=others)
     except (KeyError, TypeError):
         raise StoredCaseError(f"{path}: lacks a picture that {CASE} lists") from None
 

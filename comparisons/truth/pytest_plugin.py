@@ -6,23 +6,32 @@
 It imports nothing but pytest until it is used.
 """
 
+import itertools
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from comparisons.gate import session, uses
+
+VERDICTS = {"right": "agree", "off": "differ", "noisy": "inconclusive", "invalid": "invalid"}
+"""Of cases, by those of `comparisons.truth.judge`."""
+
 
 @pytest.fixture
-def truth_gate() -> Callable[[str, Any], None]:
+def truth_gate(request: pytest.FixtureRequest) -> Callable[[str, Any], None]:
     """truth_gate(name, pictures) fails the test unless pictures are right for the case `name`.
 
     pictures: linear radiance, (height, width, 3) or (replicates, height, width, 3): arrays, or a
     list of files (EXR, PFM, NPY).
     """
 
+    calls = itertools.count(1)
+
     def check(name: str, pictures: Any) -> None:
         __tracebackhide__ = True
+        call = next(calls)
         missing = ""
         try:
             import numpy as np
@@ -44,7 +53,12 @@ def truth_gate() -> Callable[[str, Any], None]:
             pictures = stacked([p for path in pictures for p in read_candidates(Path(path))])
         array = np.asarray(pictures, np.float64)
         verdict = judge(case.compute(), array if array.ndim == 4 else array[None])
-        if verdict.verdict != "right":
+        right = verdict.verdict == "right"
+        if request.config.pluginmanager.get_plugin(session.NAME) is not None:
+            told = {"verdict": VERDICTS[verdict.verdict], "passed": right, "reason": verdict.reason}
+            told["headline"] = f"{name}: {verdict.verdict}"
+            uses.note(request.node, "truth_gate", call, **told)
+        if not right:
             pytest.fail(f"{name}: {verdict.verdict}: {verdict.reason}")
 
     return check

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 import typer.core
 
-from reference_rt.cli import options
+from reference_rt.cli import defaults, options
 from reference_rt.cli.guarded import guarded, is_output_lost, lost_output, say
 from reference_rt.cli.options import (
     AllowMissing,
@@ -64,7 +64,9 @@ def _print_version(wanted: bool) -> None:
 
 
 @app.callback()
+@guarded
 def _options(
+    context: typer.Context,
     version: Annotated[
         bool,
         typer.Option(
@@ -72,7 +74,13 @@ def _options(
         ),
     ] = False,
 ) -> None:
-    pass
+    path = defaults.find(Path.cwd())
+    name = context.invoked_subcommand
+    group = context.command
+    if path is not None and name is not None and isinstance(group, typer.core.TyperGroup):
+        known = group.commands
+        complete = not _OWN.issuperset(known)  # else those of other packages are not loaded
+        context.default_map = {name: defaults.of_command(path, name, known, context, complete)}
 
 
 @app.command()
@@ -359,6 +367,31 @@ def doctor() -> None:
             say(line)
     if not all(check.works for check in found):
         raise typer.Exit(1)
+
+
+@app.command()
+@guarded
+def check(
+    scenes: Annotated[
+        list[Path], typer.Argument(help="Scene files, such as those that a commit changes.")
+    ],
+    allow_missing: AllowMissing = False,
+) -> None:
+    """Read scene files and the files that they name, and print every error; exit code 3 if there is
+    one."""
+    from reference_rt.rendering.scene import Scene
+    from reference_rt.util.errors import SceneError
+
+    wrong = 0
+    for path in scenes:
+        try:
+            assert Scene.load(path, {}, allow_missing).tables  # reads the files that it names
+        except SceneError as error:
+            wrong += 1
+            for one in (error, *error.others):
+                say(f"error: {one}", err=True)
+    if wrong:
+        raise typer.Exit(SceneError.exit_code)
 
 
 @app.command()

@@ -13,6 +13,7 @@ from reference_rt.cli.guarded import say
 from reference_rt.cli.picture_above import first_look, pixels_of
 from reference_rt.cli.quantities import percentage
 from reference_rt.cli.terminal_picture import Pixels, draws_sixels, half_blocks, room, sixels
+from reference_rt.cli.watching import POLLED, Stamp, stamp
 from reference_rt.rendering.loop import Limits
 from reference_rt.rendering.picture import Picture
 from reference_rt.rendering.render import Session, with_settings
@@ -85,8 +86,8 @@ def watch(load: Callable[[], Scene], path: Path, view: View, wanted: Wanted) -> 
                     time.sleep(_PUMPED)
 
 
-_PUMPED, _POLLED = 0.05, 0.3
-"""Seconds between two calls of a view that waits, and between two looks at files."""
+_PUMPED = 0.05
+"""Seconds between two calls of a view that waits."""
 
 
 class _ChangedError(Exception):
@@ -97,28 +98,20 @@ class _Files:
     """Files that may change."""
 
     def __init__(self) -> None:
-        self._stamps: dict[Path, tuple[int, int] | None] = {}
+        self._stamps: dict[Path, Stamp] = {}
         self._next = 0.0
 
     def add(self, paths: Iterable[Path]) -> None:
         """Watch these files, too, from now on."""
         for path in paths:
-            self._stamps.setdefault(path, _stamp(path))
+            self._stamps.setdefault(path, stamp(path))
 
     def check(self) -> None:
         """Called often, looks now and then.  Raises _ChangedError."""
         if time.monotonic() >= self._next:
-            self._next = time.monotonic() + _POLLED
-            if any(_stamp(path) != stamp for path, stamp in self._stamps.items()):
+            self._next = time.monotonic() + POLLED
+            if any(stamp(path) != known for path, known in self._stamps.items()):
                 raise _ChangedError
-
-
-def _stamp(path: Path) -> tuple[int, int] | None:
-    try:
-        found = path.stat()
-    except OSError:  # editors replace a file: there is none for a moment
-        return None
-    return found.st_mtime_ns, found.st_size
 
 
 def files_of(scene: Scene) -> list[Path]:

@@ -1,6 +1,7 @@
 """`render`: from a scene, or its file, to a picture; `Session`: a render that may end early."""
 
 import functools
+import logging
 import math
 import os
 import shutil
@@ -39,6 +40,8 @@ from reference_rt.scene.model import SceneModel
 from reference_rt.util.errors import ImageError, SceneError, UsageError
 from reference_rt.util.memory import resident_memory
 from reference_rt.util.workers import Processes, Workers
+
+_LOG = logging.getLogger(__name__)
 
 Progress = Callable[[str, float], None]
 """Called with the phase ("compile" or "render") and the fraction of it that is done."""
@@ -201,6 +204,11 @@ class Session:
             self.loop.run(look)
         finally:
             self.seconds["render"] = time.perf_counter() - began
+            film, seconds = self.scene.film, self.seconds
+            told = self.scene.name, film.width, film.height, int(self.frame.done.min())
+            spent = seconds["compile"], seconds["render"]
+            text = "%s: %d x %d pixels, %d samples each; kernels %.2f s, rendering %.2f s"
+            _LOG.info(text, *told, *spent)
 
     @property
     def taken(self) -> Taken:

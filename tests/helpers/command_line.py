@@ -54,6 +54,7 @@ ARGUMENTS = {
     ],
     "versions": ["3.9.1", "3.9.1", "--scene", str(Path(SCENE).with_name("cornell_box.yaml"))],
     "doctor": [],
+    "check": [SCENE],
     "schema": [],
     "warm-up": [],
 }

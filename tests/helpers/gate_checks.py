@@ -1,5 +1,6 @@
 """A scene for the gate, pictures of it, and the gate's verdict on them: for its tests."""
 
+import importlib.metadata
 import json
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,16 @@ from reference_rt.core.arrays import FloatArray
 from reference_rt.core.exr import write_exr
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
+
+# Where the package is installed pytest finds the plugin by itself, and takes it once only.
+PLUGIN = (
+    ()
+    if any(
+        e.module == "comparisons.gate.pytest_plugin"
+        for e in importlib.metadata.entry_points(group="pytest11")
+    )
+    else ("-p", "comparisons.gate.pytest_plugin")
+)
 
 BALL = """\
 camera: {type: perspective, eye: [0, 0, 4], target: [0, 0, 0], fov: 40}

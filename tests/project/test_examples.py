@@ -2,6 +2,7 @@
 
 import ast
 import gc
+import itertools
 import json
 import re
 import runpy
@@ -119,37 +120,49 @@ def test_gate_a_renderer(run, power, verdict):
     assert run("gate_a_renderer", power).startswith(verdict)
 
 
-NOTEBOOK = json.loads((ROOT / "examples/tour.ipynb").read_text(encoding="utf-8"))
-CODE = ["".join(c["source"]) for c in NOTEBOOK["cells"] if c["cell_type"] == "code"]
+NOTEBOOKS = {
+    path.stem: [
+        cell
+        for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]
+        if cell["cell_type"] == "code"
+    ]
+    for path in (ROOT / "examples").glob("*.ipynb")
+}
+"""The cells of code of each."""
 
 
-def test_the_notebook_is_stored_with_its_outputs():
-    """Readers of the repository see them; what they hold is what `test_tour` computes."""
-    cells = [c for c in NOTEBOOK["cells"] if c["cell_type"] == "code"]
-    assert [c["execution_count"] for c in cells] == [1, 2, 3, 4, 5]
-    kinds = [{kind for output in c["outputs"] for kind in output["data"]} for c in cells[1:]]
-    assert ["text/html" in kind for kind in kinds] == [True, False, False, True]
-    assert "agree" in "".join(cells[-1]["outputs"][0]["data"]["text/html"])
-    assert (ROOT / "examples/tour.ipynb").stat().st_size < 100_000
+def test_a_notebook_is_stored_with_its_outputs():
+    """Readers of the repository see them; what they hold is what the tests below compute."""
+    kinds = {"tour": ["html", "", "", "html"], "is_it_right": ["png", "html", "text"]}
+    assert set(NOTEBOOKS) == set(kinds)
+    for name, cells in NOTEBOOKS.items():
+        assert [c["execution_count"] for c in cells] == list(range(1, len(cells) + 1))
+        for cell, kind in zip(cells[1:], kinds[name], strict=True):
+            output, *_ = cell["outputs"]
+            shown = {key.rpartition("/")[2] for key in output.get("data", {})} or {"text"}
+            assert (kind or "plain") in shown
+            assert str(Path.home()) not in json.dumps(cell["outputs"])
+        assert (ROOT / f"examples/{name}.ipynb").stat().st_size < 100_000
+    assert "agree" in "".join(NOTEBOOKS["tour"][-1]["outputs"][0]["data"]["text/html"])
 
 
-def cells_run(code):
+def cells_run(name):
     """What each cell shows: the value of its last line, as in Jupyter."""
     names = {"__name__": "__main__"}
-    for source in code:
+    for source in ("".join(cell["source"]) for cell in NOTEBOOKS[name]):
         *first, last = ast.parse(source).body
-        exec(compile(ast.Module(first, []), "tour.ipynb", "exec"), names)
+        exec(compile(ast.Module(first, []), name, "exec"), names)
         if isinstance(last, ast.Expr):
-            yield eval(compile(ast.Expression(last.value), "tour.ipynb", "eval"), names)
+            yield eval(compile(ast.Expression(last.value), name, "eval"), names)
         else:
-            exec(compile(ast.Module([last], []), "tour.ipynb", "exec"), names)
+            exec(compile(ast.Module([last], []), name, "exec"), names)
             yield None
 
 
 @pytest.mark.slow
 def test_tour(monkeypatch):
     monkeypatch.chdir(ROOT)
-    _, picture, fields, (t, shape, _), case = cells_run(CODE)
+    _, picture, fields, (t, shape, _), case = cells_run("tour")
     assert picture._repr_png_().startswith(b"\x89PNG")
     assert "data:image/png" in picture._repr_html_()
     assert all(fields.values())
@@ -160,6 +173,26 @@ def test_tour(monkeypatch):
     assert "agree" in page
     assert "reference_rt" not in repr(case)
     assert repr(case).startswith("<Case scene: agree: no difference was found")
+
+
+@pytest.mark.slow
+def test_is_it_right(monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    case, figure, wrong, _ = cells_run("is_it_right")
+    assert case.verdict == "agree", case.reason
+    for line in figure.axes[0].lines:
+        _, errors = line.get_xydata().T
+        # 4 times the samples: a quarter of the squared error, with half as much for chance.
+        assert len(errors) == 4
+        assert all(after < before / 2 for before, after in itertools.pairwise(errors))
+    assert wrong.verdict == "differ"
+    said = capsys.readouterr().out
+    found, expected = (
+        [float(x) for x in text.split()] for text in re.findall(r"\[([\d. ]+)\]", said)[:2]
+    )
+    assert all(one > other for one, other in zip(found, expected, strict=True))
+    first = re.search(r"hits shapes\[\d\], rectangle, material '(\w+)'", said)
+    assert first[1] == "red"
 
 
 def test_two_back_ends(run):

@@ -72,7 +72,7 @@ LINES = [
 ]
 
 
-WORKING = [f"explain {SCENE}", "schema"]
+WORKING = [f"explain {SCENE}", f"check {SCENE}", "schema"]
 """They need none."""
 
 

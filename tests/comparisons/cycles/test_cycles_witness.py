@@ -150,7 +150,7 @@ def test_the_gate_hears_a_witness(monkeypatch):
     case = gate.gated(asked, dark)
     assert case.verdict == "differ"
     assert "candidate's stands alone" in case.reason
-    assert case.images.witness.shape == (48, 48, 3)
+    assert [picture.shape for picture in case.images.others.values()] == [(48, 48, 3)]
     assert len(heard) == 1
     for wrong in ({"scene": None}, {"rim": 2}):
         with pytest.raises(UsageError, match="got a witness"):

@@ -1,25 +1,14 @@
 """The pytest plugin from outside: test modules that use it, run by pytest itself."""
 
-import importlib.metadata
 import json
 import re
 
 import numpy as np
 import pytest
 from command_line import invoke
-from gate_checks import BALL
+from gate_checks import BALL, PLUGIN
 
 pytest_plugins = ["pytester"]
-
-# Where the package is installed pytest finds the plugin by itself, and takes it once only.
-PLUGIN = (
-    ()
-    if any(
-        e.module == "comparisons.gate.pytest_plugin"
-        for e in importlib.metadata.entry_points(group="pytest11")
-    )
-    else ("-p", "comparisons.gate.pytest_plugin")
-)
 
 SCENE = (
     BALL

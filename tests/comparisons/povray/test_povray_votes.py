@@ -329,7 +329,7 @@ def test_compare_and_gate_hear_it():
     only = ("statistics", "images")
     case = compare_scene(Subject(scene), budget, lambda line: None, 2, only)
     assert (case.verdict, case.rungs[-1].status) == ("agree", "agree"), case.reason
-    assert case.images.witness is not None
+    assert list(case.images.others) == ["POV-Ray's"]
     case = compare_scene(Subject(wrong, wrong, scene), budget, lambda line: None, 2, only)
     assert case.verdict == "differ"
     assert "POV-Ray's stands alone" in case.reason

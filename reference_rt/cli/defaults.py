@@ -1,0 +1,86 @@
+"""Defaults of commands from a project's file: [tool.reference_rt.COMMAND] of its pyproject.toml."""
+
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from reference_rt.util.errors import UsageError, meant_by
+
+FILE = "pyproject.toml"
+
+SECTION = "reference_rt"
+"""Of the table `tool`."""
+
+SHARED = ("threads",)
+"""Options that may stand in the section itself, for every command that has them."""
+
+
+def find(folder: Path) -> Path | None:
+    """The file of the project that a folder is in: the nearest with our section."""
+    for parent in (folder, *folder.parents):
+        path = parent / FILE
+        if path.is_file() and f"tool.{SECTION}".encode() in path.read_bytes():
+            return path
+    return None
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Our section.  Raises UsageError."""
+    try:
+        found = tomllib.loads(path.read_text(encoding="utf-8")).get("tool", {}).get(SECTION, {})
+    except (OSError, ValueError) as error:
+        raise UsageError(f"{path}: cannot be read: {error}") from None
+    if not isinstance(found, dict):
+        raise UsageError(f"{path}: tool.{SECTION}: expected a table")
+    return found
+
+
+def of_command(
+    path: Path, name: str, commands: Mapping[str, Any], context: Any, complete: bool
+) -> dict[str, Any]:
+    """The values of the options of a command, by their parameters' names.  Paths are relative to
+    the file's folder.  commands: by name;  complete: whether these are all.  Raises UsageError for
+    what is no option, and for a value that is none of it."""
+    section = read(path)
+    shared = {key: section.pop(key) for key in SHARED if key in section}
+    where = f"{path}: tool.{SECTION}"
+    for table in section if complete else ():
+        if table not in commands:
+            raise UsageError(f"{where}.{table}: is no command{_meant(table, [*commands, *SHARED])}")
+    own = section.get(name, {})
+    if not isinstance(own, dict):
+        raise UsageError(f"{where}.{name}: expected a table of the command's options")
+    options = {
+        opt.removeprefix("--"): parameter
+        for parameter in commands[name].params
+        for opt in parameter.opts
+        if opt.startswith("--")
+    }
+    found = {}
+    for key, value in (shared | own).items():
+        option = options.get(key.replace("_", "-"))
+        if option is None:
+            if key in own:
+                raise UsageError(f"{where}.{name}.{key}: is no option{_meant(key, list(options))}")
+            continue
+        try:
+            cast = option.process_value(context, value)
+        except Exception as error:
+            told = getattr(error, "message", str(error))
+            raise UsageError(f"{where}.{name}.{key}: {told}") from None
+        found[option.name] = _placed(value, cast, path.parent)
+    return found
+
+
+def _placed(value: Any, cast: Any, folder: Path) -> Any:
+    """A value; where it means a path, relative to `folder`, the path as seen from here."""
+    if isinstance(cast, list | tuple):
+        return [_placed(*pair, folder) for pair in zip(value, cast, strict=True)]
+    return os.path.relpath(folder / cast) if isinstance(cast, Path) else value
+
+
+def _meant(name: str, known: list[str]) -> str:
+    close = meant_by(name, known)
+    return f"; expected {close[0]}" if close else f"; expected one of {', '.join(sorted(known))}"

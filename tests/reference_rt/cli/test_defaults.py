@@ -1,0 +1,86 @@
+"""Defaults of commands from a project's pyproject.toml."""
+
+from pathlib import Path
+
+import pytest
+from command_line import SCENE, invoke
+
+
+@pytest.fixture
+def project(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def write(text: str) -> None:
+    Path("pyproject.toml").write_text(text)
+
+
+def test_a_table_has_the_options_of_its_command(project: Path) -> None:
+    write("[tool.reference_rt.trace]\npixel = '0,99999'\n[tool.reference_rt.render]\nspp = 1\n")
+    result = invoke("trace", SCENE)
+    assert "99999" in result.stderr  # which the picture has not
+    # The command line is stronger.
+    assert "99999" not in invoke("trace", SCENE, "--pixel", "0,77777").stderr
+
+
+def test_paths_are_relative_to_the_file(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write('[tool.reference_rt.convert]\noutput = "made/x.json"\n')
+    inside = project / "a" / "b"
+    inside.mkdir(parents=True)
+    monkeypatch.chdir(inside)
+    result = invoke("convert", SCENE)
+    assert result.exit_code == 0, result.output
+    assert [path.name for path in (project / "made").iterdir()] == ["x.json"]
+    # The nearest file with such a section counts.
+    (inside / "pyproject.toml").write_text("[tool.other]\n")
+    (project / "made" / "x.json").unlink()
+    assert invoke("convert", SCENE).exit_code == 0
+    (project / "a" / "pyproject.toml").write_text('[tool.reference_rt.convert]\noutput = "y.json"')
+    assert invoke("convert", SCENE).exit_code == 0
+    assert (project / "a" / "y.json").exists()
+
+
+def test_what_all_commands_have_stands_in_the_section(project: Path) -> None:
+    write("[tool.reference_rt]\nthreads = 0\n")
+    told = "tool.reference_rt.render.threads: "
+    assert told in invoke("render", SCENE, "-o", "x.exr").stderr  # at least 1 is expected
+    assert invoke("check", SCENE).exit_code == 0  # has no threads
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (
+            "[tool.reference_rt.rendr]\nspp = 1",
+            "tool.reference_rt.rendr: is no command; ",
+        ),
+        ("[tool.reference_rt]\nspp = 1", "tool.reference_rt.spp: is no command"),
+        ("[tool.reference_rt.check]\nspp = 1", "tool.reference_rt.check.spp: is no option; expec"),
+        ("[tool.reference_rt]\ncheck = 1", "tool.reference_rt.check: expected a table"),
+        ("[tool.reference_rt.check]\nallow-missing = 'x'", "check.allow-missing: "),
+        ("[tool.reference_rt.check]\nallow-missing = ", "pyproject.toml: cannot be read: "),
+        ("[tool]\nreference_rt = 1 # tool.reference_rt", "tool.reference_rt: expected a table"),
+    ],
+)
+def test_what_is_wrong_is_told(project: Path, text: str, told: str) -> None:
+    write(text)
+    result = invoke("check", SCENE)
+    assert result.exit_code == 2
+    assert told in result.stderr
+    assert "pyproject.toml" in result.stderr
+
+
+def test_check_prints_every_error_of_every_file(project: Path) -> None:
+    Path("a.yaml").write_text("camera: {type: fisheye}\nfilm: {width: -1}\n")
+    Path("b.yaml").write_text("""
+materials: {m: {type: diffuse}}
+shapes: [{type: mesh, file: none.ply, material: m}]
+lights: [{type: constant, radiance: 1}]
+""")
+    result = invoke("check", "a.yaml", SCENE, "b.yaml", "none.yaml")
+    assert result.exit_code == 3
+    for told in ("a.yaml:1: ", "a.yaml:2: ", "b.yaml:3: ", "none.ply", "none.yaml"):
+        assert told in result.stderr, told
+    assert Path(SCENE).name not in result.stderr
+    assert invoke("check", SCENE).exit_code == 0
