@@ -90,7 +90,7 @@ def derivatives(
     with closing(Pool(workers or 1)) as pool:
         options = Options(out, workers=pool, threads=threads, fresh=fresh, tell=tell)
         facts = {"suite": f"{suite.NAME}: {asked.about}"}
-        run = run_cases(planned, options, suite=suite.NAME, facts=facts)
+        run = run_cases(planned, options, asked.case_seconds, suite.NAME, facts)
     writes.finish(lambda: "\n".join(suite.table(planned, run.cases).markdown()))
     undecided = [case for case in run.cases if case.verdict in ("inconclusive", "invalid")]
     raise typer.Exit(exit_code(undecided, run.missing) if undecided or run.missing else 0)

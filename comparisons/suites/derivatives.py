@@ -35,6 +35,9 @@ class Derivatives(Description):
     """Samples per pixel of each replicate."""
     seconds: Seconds
     """For the replicates of each pair of a parameter and an integrator."""
+    case_seconds: Seconds
+    """After which a pair is given up: some trees of edges take longer to build than all pictures
+    of the others."""
     limit: Annotated[float, Field(gt=0)]
     """The smallest relative bias of the image mean that must be detectable."""
     parameters: dict[str, Annotated[tuple[str, ...], Field(strict=False)]]
@@ -108,6 +111,8 @@ def verdict_on(case: Case) -> str:
     noise hides the answer, the factor of samples that would decide it; of what is right the seconds
     in which Mitsuba's noise falls to a percent of the derivative's size."""
     rungs = {rung.name: rung for rung in case.rungs}
+    if (failed := rungs.get("run", rungs.get("scene"))) is not None:
+        return failed.reason.partition(";")[0]
     found = rungs["derivative"]
     if case.verdict == "not-comparable":
         return "refused"

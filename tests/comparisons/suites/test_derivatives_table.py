@@ -1,5 +1,6 @@
 """The table of the suite of derivatives: a parameter a row, an integrator a column."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -47,6 +48,12 @@ def case(verdict: str, cause: str = "", adjoint: str = "agree", **numbers: objec
 )
 def test_a_cell(found: Case, cell: str) -> None:
     assert suite.verdict_on(found) == cell
+
+
+def test_a_cell_of_a_case_that_was_given_up() -> None:
+    told = "took longer than 90 s; see stderr.txt"
+    found = replace(case("invalid"), rungs=(RungResult("run", "invalid", told),))
+    assert suite.verdict_on(found) == "took longer than 90 s"
 
 
 def test_rows_and_columns() -> None:
