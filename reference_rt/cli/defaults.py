@@ -17,6 +17,11 @@ SHARED = ("threads",)
 """Options that may stand in the section itself, for every command that has them."""
 
 
+NEVER = frozenset({"command", "pair", "browser", "renderer", "scheduler", "cluster"})
+"""Options that run programs, or reach others: the file may have come with somebody's scenes, and
+who stands in its folder has not asked for that."""
+
+
 def find(folder: Path) -> Path | None:
     """The file of the project that a folder is in: the nearest with our section."""
     for parent in (folder, *folder.parents):
@@ -65,20 +70,31 @@ def of_command(
             if key in own:
                 raise UsageError(f"{where}.{name}.{key}: is no option{_meant(key, list(options))}")
             continue
+        if NEVER.intersection(opt.removeprefix("--") for opt in option.opts):
+            told = "expected on the command line alone, since it may run programs"
+            raise UsageError(f"{where}.{name}.{key}: {told}")
         try:
             cast = option.process_value(context, value)
         except Exception as error:
             told = getattr(error, "message", str(error))
             raise UsageError(f"{where}.{name}.{key}: {told}") from None
-        found[option.name] = _placed(value, cast, path.parent)
+        try:
+            found[option.name] = _placed(value, cast, path.parent)
+        except ValueError:
+            told = f"expected a path within the file's folder, got '{value}'"
+            raise UsageError(f"{where}.{name}.{key}: {told}") from None
     return found
 
 
 def _placed(value: Any, cast: Any, folder: Path) -> Any:
-    """A value; where it means a path, relative to `folder`, the path as seen from here."""
+    """A value; where it means a path, relative to `folder`, the path as seen from here.  Raises
+    ValueError for one that leaves the folder, by a link too."""
     if isinstance(cast, list | tuple):
         return [_placed(*pair, folder) for pair in zip(value, cast, strict=True)]
-    return os.path.relpath(folder / cast) if isinstance(cast, Path) else value
+    if not isinstance(cast, Path):
+        return value
+    (folder / cast).resolve().relative_to(folder.resolve())
+    return os.path.relpath(folder / cast)
 
 
 def _meant(name: str, known: list[str]) -> str:

@@ -41,6 +41,39 @@ def test_paths_are_relative_to_the_file(project: Path, monkeypatch: pytest.Monke
     assert (project / "a" / "y.json").exists()
 
 
+@pytest.mark.parametrize(
+    ("table", "option"),
+    [
+        ("gate", "command = 'touch x'"),
+        ("gate", "pair = ['touch x', 'touch y']"),
+        ("gate", "browser = true"),
+        ("fuzz", "renderer = 'touch x'"),
+        ("render", "scheduler = 'tcp://127.0.0.1:8786'"),
+        ("render", "cluster = 'cluster.yaml'"),
+    ],
+)
+def test_what_runs_programs_is_refused(project: Path, table: str, option: str) -> None:
+    """Who renders a stranger's scene in its folder has not asked for it."""
+    write(f"[tool.reference_rt.{table}]\n{option}\n")
+    result = invoke(table, *([] if table == "fuzz" else [SCENE]))
+    assert result.exit_code == 2
+    assert "expected on the command line alone" in result.stderr
+    assert not Path("x").exists()
+
+
+def test_paths_stay_within_the_folder(
+    project: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    Path("linked").symlink_to(elsewhere, target_is_directory=True)
+    for path in (f"{elsewhere}/x.json", "../x.json", "a/../../x.json", "linked/x.json"):
+        write(f"[tool.reference_rt.convert]\noutput = '{path}'\n")
+        result = invoke("convert", SCENE)
+        assert result.exit_code == 2, path
+        assert "expected a path within the file's folder" in result.stderr
+    assert not [*elsewhere.iterdir()]
+
+
 def test_what_all_commands_have_stands_in_the_section(project: Path) -> None:
     write("[tool.reference_rt]\nthreads = 0\n")
     told = "tool.reference_rt.render.threads: "
