@@ -85,7 +85,7 @@ class Volumes:
         return volume_of(self.scene.media[leaf.interior])
 
     def check_lamps(self) -> None:
-        """Cycles loses light that a medium scatters back to the lamp that has mirrored it (findings,
+        """Cycles loses light that a medium scatters back to the lamp that reflected it (findings,
         `cycles-lamps-in-fog`).  Raises NoCounterpartError."""
         scatter = any(any(medium.albedo) for medium in self.scene.media.values())
         materials = self.scene.materials.values()
