@@ -4,9 +4,9 @@ Sensitivity: faults are planted in pictures (`of_pictures`), scenes (`of_scenes`
 source (`of_sources`; `of_readers` and `of_transport`: those that both renderers may share; of media
 both kinds in `of_media`), and compared with a suite's budgets; a `fault.Finding` says whether a
 fault was caught, and at which rung.  `power`: the fraction of runs that catch a fault, by its size;
-`calibration`: how often the bias that a verdict states as detectable is detected.  `mutation`: random changes of the kernels
-(`mutants`), and what the rungs say to them.  `specificity`: right renderers of twelve kinds
-(`right`) are judged with many seeds, and false alarms are counted.
+`calibration`: how often the bias that a verdict states as detectable is detected.  `mutation`:
+random changes of the kernels (`mutants`), and what the rungs say to them.  `specificity`: right
+renderers of twelve kinds (`right`) are judged with many seeds, and false alarms are counted.
 
 `mirrored`: mistakes in our renderer and in our code on Mitsuba's side at once (`of_mirrored`):
 which other sources and cases of truth see them.
