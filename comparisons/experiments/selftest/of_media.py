@@ -7,13 +7,13 @@ from reference_rt.media import HenyeyGreenstein, Isotropic
 BALLS, FOG, MILK, INK = "coloured_fog", "fog", "milk_glass", "absorbing_glass"
 
 OF_SCENES = (
-    SceneFault("a medium 10 % denser", BALLS, named("media", "even", {"scale": 1.1})),
-    SceneFault("albedo of a medium 5 % low", BALLS,
-               named("media", "even", {"albedo": (0.9025, 0.855, 0.665)})),
+    SceneFault("a medium three times as dense", BALLS, named("media", "even", {"scale": 3.0})),
+    SceneFault("albedo of a medium halved", BALLS,
+               named("media", "even", {"albedo": (0.475, 0.45, 0.35)})),
     SceneFault("g of the other sign", BALLS,
                named("media", "forth", {"phase": HenyeyGreenstein(g=-0.8)})),
-    SceneFault("isotropic for Henyey and Greenstein", BALLS,
-               named("media", "forth", {"phase": Isotropic()})),
+    SceneFault("isotropic for Henyey and Greenstein", FOG,
+               named("media", "fog", {"phase": Isotropic()})),
     SceneFault("two media exchanged", BALLS, entry("shapes", 3, interior="back")),
     SceneFault("a medium outside of its shape", BALLS,
                entry("shapes", 2, interior=None, exterior="even")),
