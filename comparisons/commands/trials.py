@@ -163,7 +163,7 @@ def _mirror(
 def stability(
     out: Annotated[Path, out_folder("results and the page", "DIR")] = Path("out/stability"),
     family: Annotated[
-        list[str] | None, typer.Option(help="Only this family, F1 to F13: repeat for several.")
+        list[str] | None, typer.Option(help="Only this family, F1 to F14: repeat for several.")
     ] = None,
     full: Annotated[
         bool, typer.Option("--full/--quick", help="All settings: about 20 minutes instead of 2.")

@@ -18,14 +18,14 @@ import numpy as np
 import reference_rt as rt
 from comparisons import shapes
 from comparisons.cameras import type_of as type_of_camera
+from comparisons.cycles.media import Volumes
 from comparisons.cycles.surfaces import placed_arrays, triangles_of, type_name
 from comparisons.geometry import affine
-from comparisons.geometry.flatten import copies_of, place_of
+from comparisons.geometry.flatten import Leaf, copies_of, place_of
 from comparisons.geometry.frame import SHARE, round32
 from comparisons.integrators import type_of as type_of_integrator
 from comparisons.lights import type_of as type_of_light
 from comparisons.materials import type_of as type_of_material
-from comparisons.media import refuse_media
 from comparisons.renderers import NoCounterpartError, Reasons
 from comparisons.renderers.vocabulary import Data, plain_rgb
 from comparisons.shapes.soup import Soup
@@ -50,17 +50,23 @@ MOST_TRIANGLES = 5_000_000
 @dataclass
 class Writing:
     """A scene being written.  folder: of its files;  files: how many there are;  named: the
-    materials;  reasons: why Cycles is not eligible;  glass, lamps: the boxes (2, 3) around shapes
-    of glass, and around those that emit;  reach: the largest coordinate of a vertex."""
+    materials, with their volumes;  shaders: by the material's name;  reasons: why Cycles is not
+    eligible;  glass, lamps: the boxes (2, 3) around shapes of glass, and around those that emit;
+    reach: the largest coordinate of a vertex;  volumes: of its media."""
 
     scene: Scene
     folder: Path
     files: int = 0
     named: dict[str, Data] = field(default_factory=dict)
+    shaders: dict[str | None, Data] = field(default_factory=dict)
     reasons: Reasons = field(default_factory=Reasons)
     glass: list[FloatArray] = field(default_factory=list)
     lamps: list[FloatArray] = field(default_factory=list)
     reach: float = 0.0
+    volumes: Volumes = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.volumes = Volumes(self.scene)
 
     def colour(self, value: Any) -> Any:
         """A colour, or the texture of this name.  Raises NoCounterpartError."""
@@ -84,6 +90,12 @@ class Writing:
         if (to_cycles := type_of_material(material).to_cycles) is None:
             raise NoCounterpartError(f"the material {material.type}")
         return to_cycles(material, self)
+
+    def shader_of(self, name: str | None) -> Data:
+        """The same, made once."""
+        if name not in self.shaders:
+            self.shaders[name] = self.shader(name)
+        return self.shaders[name]
 
     def save(self, array: FloatArray | None = None, **arrays: Any) -> str:
         """The name of a new file that holds an array, or arrays by name."""
@@ -111,7 +123,7 @@ def write(scene: Scene, folder: Path, threads: int | None = None) -> None:
         ):
             raise NoCounterpartError(f"mirrors along paths of more than {MOST_MIRRORINGS} edges")
     with writing.reasons.collected():
-        refuse_media(scene)
+        found["volume"] = writing.volumes.world()
     with writing.reasons.collected():
         found["camera"] = camera_of(scene.camera, scene.film)
     for light in scene.lights:
@@ -128,6 +140,9 @@ def write(scene: Scene, folder: Path, threads: int | None = None) -> None:
     found["meshes"] = _meshes(writing)
     with writing.reasons.collected():
         _check_places(writing)
+    for check in (writing.volumes.check_places, writing.volumes.check_lamps):
+        with writing.reasons.collected():
+            check()
     writing.reasons.check()
     (folder / "scene.json").write_text(json.dumps(found), encoding="utf-8")
 
@@ -209,13 +224,15 @@ def _meshes(writing: Writing) -> list[Data]:
                     key, kind = id(leaf.shape), type_name(leaf.shape)
                     if key not in made:
                         made[key] = triangles_of(leaf.shape, scene.folder)
-                    surface, name = made[key], _material(leaf.material, writing)
-                    if surface.uvs is None and _has_texture(writing.named[name]["shader"]):
+                    surface, shader = made[key], writing.shader_of(leaf.material)
+                    if surface.uvs is None and _has_texture(shader):
                         raise NoCounterpartError(f"the shape {kind} under a texture")
                     m = affine.map_in(leaf.shape, place_of(scene, leaf, copy.outer))
                     vertices = affine.apply_points(m, surface.positions)
                     if not _holds(vertices[surface.faces[:MEASURED]]):
                         raise NoCounterpartError(f"the shape {kind}, too small for float32")
+                    volume = writing.volumes.inside(leaf, vertices, shader)
+                    name = _material(leaf, volume, writing)
                     _note_place(leaf.shape, writing.named[name], vertices, writing)
                     one: Data = {"material": name}
                     if copy.instance < 0 or affine.mirrors(m):
@@ -265,13 +282,17 @@ VIEW = 1e-3
 """Least distance of the target over the scene's size: float32 holds the view to 1e-4 then."""
 
 
-def _material(name: str | None, writing: Writing) -> str:
-    """The name, in what is written, of a shape's material."""
+def _material(leaf: Leaf, volume: list[Data] | None, writing: Writing) -> str:
+    """The name, in what is written, of a shape's material and its volume."""
+    name = leaf.material
     key = "" if name is None else name
+    if volume is not None:
+        key = f"{key}\n{leaf.interior}"
     if key not in writing.named:
         material = None if name is None else writing.scene.materials[name]
         sampling = "FRONT" if isinstance(material, Emissive) else "NONE"
-        writing.named[key] = {"sampling": sampling, "shader": writing.shader(name)}
+        shader = writing.shader_of(name)
+        writing.named[key] = {"sampling": sampling, "shader": shader, "volume": volume}
     return key
 
 

@@ -90,6 +90,20 @@ class Graph:
         node.image = image
         return node.outputs[0]
 
+    # Media: coefficients of all parts add up.
+
+    def volume(self, parts: Any) -> Any:
+        found = None
+        for part in parts:
+            node = self.node("ShaderNodeVolumeCoefficients", phase=part["phase"])
+            node.inputs["Absorption Coefficients"].default_value = part["absorption"]
+            node.inputs["Scatter Coefficients"].default_value = part["scatter"]
+            if part["g"] is not None:
+                node.inputs["Anisotropy"].default_value = part["g"]
+            one = node.outputs[0]
+            found = one if found is None else self._added(found, one)
+        return found
+
     # Materials: a shader, or None for black.
 
     def shader(self, value: Any) -> Any:
@@ -97,6 +111,10 @@ class Graph:
 
     def black(self) -> Any:
         return None
+
+    def clear(self) -> Any:
+        """Of what is no surface, and bounds no volume."""
+        return self.node("ShaderNodeBsdfTransparent", {0: (1.0,) * 4}).outputs[0]
 
     def diffuse(self, colour: Any) -> Any:
         inputs = {"Color": self.colour(colour), "Roughness": 0.0}
@@ -124,6 +142,9 @@ class Graph:
         a, b = (self.shader(one) for one in of)
         if a is None or b is None:
             return a or b
+        return self._added(a, b)
+
+    def _added(self, a: Any, b: Any) -> Any:
         return self.node("ShaderNodeAddShader", {0: a, 1: b}).outputs[0]
 
     def mix(self, weight: Any, first: Any, second: Any) -> Any:
@@ -144,10 +165,14 @@ def material(name: str, value: Any, folder: Path) -> Any:
     found.use_nodes = True
     found.cycles.emission_sampling = value["sampling"]
     graph = Graph(found.node_tree, folder)
-    shader = graph.shader(value["shader"])
-    output = graph.node("ShaderNodeOutputMaterial")
-    if shader is not None:
-        graph.tree.links.new(shader, output.inputs["Surface"])
+    output, shader = graph.node("ShaderNodeOutputMaterial"), value["shader"]
+    if value["volume"] is not None:
+        graph.tree.links.new(graph.volume(value["volume"]), output.inputs["Volume"])
+    # A volume without a surface is no edge of a path.
+    if value["volume"] is None or shader["type"] != "clear":
+        surface = graph.shader(shader)
+        if surface is not None:
+            graph.tree.links.new(surface, output.inputs["Surface"])
     return found
 
 
@@ -253,7 +278,7 @@ def build(folder: Path) -> None:
     )
     cycles.blur_glossy = 0.0
     cycles.caustics_reflective = cycles.caustics_refractive = True
-    for kind in ("", "diffuse_", "glossy_", "transmission_"):
+    for kind in ("", "diffuse_", "glossy_", "transmission_", "volume_"):
         setattr(cycles, f"{kind}max_bounces" if kind == "" else f"{kind}bounces", value["bounces"])
     cycles.transparent_max_bounces = 1024
     cycles.pixel_filter_type, cycles.filter_width = "BOX", 1.0
@@ -276,7 +301,9 @@ def build(folder: Path) -> None:
     strength = max(max(value["background"]), 1e-30)
     colour = [x / strength for x in value["background"]] + [1.0]
     shader = graph.node("ShaderNodeBackground", {"Color": colour, "Strength": strength}).outputs[0]
-    graph.node("ShaderNodeOutputWorld", {"Surface": shader})
+    output = graph.node("ShaderNodeOutputWorld", {"Surface": shader})
+    if value["volume"] is not None:
+        graph.tree.links.new(graph.volume(value["volume"]), output.inputs["Volume"])
     camera(value["camera"], scene)
 
 

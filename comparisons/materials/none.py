@@ -27,7 +27,7 @@ NO_SURFACE = MaterialType(
     from_mitsuba={"null": _from_mitsuba},
     note=None,
     errors=None,
-    to_cycles=None,
+    to_cycles=lambda material, writing: {"type": "clear"},
     to_gltf=None,
     to_pbrt=_to_pbrt,
 )

@@ -12,6 +12,7 @@ from comparisons.mitsuba.colours import colour, constant, luminance
 from comparisons.mitsuba.context import UntranslatableError
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.plugin_table import NUMBER, PluginTable, Row
+from comparisons.renderers import NoCounterpartError
 from reference_rt.media import AnyPhase, BlendPhase, HenyeyGreenstein, Isotropic, Rayleigh
 
 Data = dict[str, Any]
@@ -23,7 +24,8 @@ class PhaseType:
 
     description: our class;  plugin: Mitsuba's;  to_mitsuba: its dictionary;  from_mitsuba: that of
     an element, which raises SceneError;  asymmetry: g of the Henyey-Greenstein function that it
-    is, for renderers that know no other.
+    is, for renderers that know no other;  to_cycles: the parts of it, each with its share of the
+    light.
     """
 
     description: type[Any]
@@ -31,6 +33,7 @@ class PhaseType:
     to_mitsuba: Callable[[Any], Data]
     from_mitsuba: Callable[[Reading, Node], Any]
     asymmetry: Callable[[Any], float] | None
+    to_cycles: Callable[[Any], list[tuple[float, Data]]] | None
 
 
 HG = PluginTable("hg", (Row("g", "g", NUMBER, 0.8),))
@@ -39,6 +42,25 @@ HG = PluginTable("hg", (Row("g", "g", NUMBER, 0.8),))
 def _blend_to_mitsuba(phase: BlendPhase) -> Data:
     first, second = translate_phase(phase.first), translate_phase(phase.second)
     return {"type": "blendphase", "weight": phase.weight, "0_first": first, "1_second": second}
+
+
+MOST_IN_CYCLES = 0.99
+"""|g| up to which Cycles' phase function in float32 is right to 0.1 %; it cuts g off at 0.999."""
+
+
+def _cycles_hg(g: float) -> Data:
+    if abs(g) > MOST_IN_CYCLES:
+        raise NoCounterpartError(f"phase functions of |g| above {MOST_IN_CYCLES}")
+    return {"phase": "HENYEY_GREENSTEIN", "g": float(g)}
+
+
+def _blend_to_cycles(phase: BlendPhase) -> list[tuple[float, Data]]:
+    found = []
+    for share, part in ((1.0 - phase.weight, phase.first), (phase.weight, phase.second)):
+        to_cycles = type_of(part).to_cycles
+        assert to_cycles is not None
+        found += [(share * own, function) for own, function in to_cycles(part)]
+    return found
 
 
 def _blend_from_mitsuba(reading: Reading, node: Node) -> BlendPhase:
@@ -89,6 +111,7 @@ PHASES = (
         to_mitsuba=lambda phase: {"type": "isotropic"},
         from_mitsuba=lambda reading, node: Isotropic(),
         asymmetry=lambda phase: 0.0,
+        to_cycles=lambda phase: [(1.0, _cycles_hg(0.0))],
     ),
     PhaseType(
         description=HenyeyGreenstein,
@@ -96,6 +119,7 @@ PHASES = (
         to_mitsuba=HG.write,
         from_mitsuba=HG.reader(HenyeyGreenstein),
         asymmetry=lambda phase: float(phase.g),
+        to_cycles=lambda phase: [(1.0, _cycles_hg(phase.g))],
     ),
     PhaseType(
         description=Rayleigh,
@@ -103,6 +127,7 @@ PHASES = (
         to_mitsuba=lambda phase: {"type": "rayleigh"},
         from_mitsuba=lambda reading, node: Rayleigh(),
         asymmetry=None,
+        to_cycles=lambda phase: [(1.0, {"phase": "RAYLEIGH", "g": None})],
     ),
     PhaseType(
         description=BlendPhase,
@@ -110,6 +135,7 @@ PHASES = (
         to_mitsuba=_blend_to_mitsuba,
         from_mitsuba=_blend_from_mitsuba,
         asymmetry=None,
+        to_cycles=_blend_to_cycles,
     ),
 )
 """All types of phase functions."""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 FOLDERS = (
-    *("accel", "cameras", "core", "integrators", "lights", "materials"),
+    *("accel", "cameras", "core", "integrators", "lights", "materials", "media"),
     *("sampling", "shapes", "textures", "rendering"),
 )
 """Folders of the package with kernels."""

@@ -1,6 +1,6 @@
 """Where renderers fail as scenes become extreme, decided by exact arithmetic and closed forms.
 
-`reference-rt stability` runs 13 families, F1 to F13, a module or a folder each: its docstring
+`reference-rt stability` runs 14 families, F1 to F14, a module or a folder each: its docstring
 states the law (what must hold), the range, the counts of cases and what passes; its `FAMILY` has
 the law in one sentence.  A family has series: functions `measure(draw, x)` with the decorator
 `series`, which return an `Outcome` for each contestant (ours, Mitsuba, textbook methods) at a point

@@ -12,6 +12,8 @@ import reference_rt as rt
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, compare_scene
 from comparisons.cycles import backend
+from comparisons.truth.case import cases
+from comparisons.truth.renderers import load, row_of
 from reference_rt.core.transform import Scale, Translate
 
 pytestmark = [
@@ -24,6 +26,7 @@ SCENES = Path(__file__).parents[3] / "scenes"
 VOTERS = (
     *("camera_thin_lens", "caustic_glass", "colour_bleeding", "cornell_box"),
     *("far_origin", "filter_catmull_rom", "filter_gaussian", "filter_lanczos"),
+    *("coloured_fog", "milk_glass"),
     *("filter_mitchell", "filter_tent", "index_matched", "light_directional", "light_shapes"),
     *("material_blend", "material_conductor", "material_two_sided", "mesh_knot", "near_delta"),
     *("soft_shadows", "tilted_lamps", "tiny"),
@@ -42,6 +45,20 @@ def _case(*scenes, spp=32):
     )
     (rung,) = (rung for rung in case.rungs if rung.name == "witness")
     return case, rung
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("smoke_ball", "smoke_box", "ink_in_glass", "milk_in_glass", "point_in_fog"),
+        *("sun_on_air", "sun_through_dust", "point_by_ball", "ball_of_fog", "ball_of_milk"),
+    ],
+)
+def test_cycles_media_are_right(name):
+    """By formula: absorption, boundaries of glass, phase functions, any number of scatterings."""
+    scene = load(SCENES / "truth" / f"{name}.yaml", 64)
+    (row,) = row_of(cases()[name], scene, ["cycles"])
+    assert row.status == "right", row.reason
 
 
 def _scene(name):
@@ -80,6 +97,8 @@ FAULTS = {
     "a ring": ("caustic_glass", "materials.gold.eta", (1.5, 1.5, 1.5)),
     "a blend's weight": ("material_blend", "materials.worn.weight", 0.5),
     "a sphere's radius": ("caustic_glass", "shapes.0.radius", 0.66),
+    "a medium's density": ("coloured_fog", "media.even.scale", 1.5),
+    "a phase function": ("coloured_fog", "media.forth.phase.g", -0.8),
 }  # fmt: skip
 
 

@@ -13,10 +13,12 @@ from comparisons.experiments.selftest import (
     PictureFault,
     SceneFault,
     SourceFault,
+    of_media,
     of_readers,
 )
 from comparisons.experiments.selftest.fault import Finding, finding
 from comparisons.experiments.selftest.mutant_worker import BUDGET
+from comparisons.experiments.selftest.of_media import PHASE
 from comparisons.experiments.selftest.run import Outcome, markdown
 from comparisons.experiments.selftest.sensitivity import StaleFaultError, patched_text
 from comparisons.experiments.selftest.specificity import Alarms
@@ -63,6 +65,26 @@ def test_what_no_second_reader_says_is_seen_by_another_rung(
     assert statuses() == ["agree"]
     plant(monkeypatch, fault)
     assert statuses() == ["differ"]
+
+
+@pytest.mark.parametrize(
+    "name", [f.name for f in of_media.FAULTS if isinstance(f, SourceFault) and f.file == PHASE]
+)
+def test_a_fault_of_phase_functions_is_seen_by_its_rung(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The rung names the phase function: it is no flight that differs."""
+    fault = SOURCE_FAULTS[name]
+
+    def found() -> RungResult:
+        subject = Subject(Scene.load(SCENES / f"{fault.scene}.yaml"))
+        evidence = gather(subject, BUDGET, lambda step: None, 1, (fault.rung,))
+        return next(rung for rung in evidence.rungs if rung.name == fault.rung)
+
+    assert found().status == "agree"
+    plant(monkeypatch, fault)
+    assert found().status == "differ"
+    assert "phase function" in found().reason
 
 
 @pytest.mark.parametrize("fault", of(SceneFault))

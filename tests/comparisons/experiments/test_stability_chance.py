@@ -14,11 +14,12 @@ from comparisons.experiments.stability.harness.chance import Mean
 from comparisons.experiments.stability.harness.outcomes import FloatArray
 from comparisons.experiments.stability.harness.series import family
 from comparisons.experiments.stability.harness.worlds import judge
+from comparisons.experiments.stability.media.turns import phases_of
 
 
 def test_the_level_of_a_full_run_is_that_of_all_its_tests() -> None:
     """The table of `chance`, counted; the areas and radiances of 1 are drawn once."""
-    f10, f11, f12 = (family(name).by_name for name in ("F10", "F11", "F12"))
+    f10, f11, f12, f14 = (family(name).by_name for name in ("F10", "F11", "F12", "F14"))
     closed = len(f10["closed furnace"].values)
     opened = len(f10["open furnace"].values) * len(furnaces._white(0.1)) * len(COSINES)
     densities = len(f11["densities"].values) * len(PURE) * 3
@@ -28,7 +29,20 @@ def test_the_level_of_a_full_run_is_that_of_all_its_tests() -> None:
     ]
     roulette = 3 * len(f12["roulette"].values)
     assert (closed, opened, densities, *lamps, roulette) == (8, 432, 135, 52, 26, 24)
-    assert 2 * chance.LEVEL * (closed + 2 * opened + densities + sum(lamps) + roulette) < 2.3e-5
+    media = [
+        len(f14[name].values) * cases
+        for name, cases in (
+            ("half spaces", 1),
+            ("white layers", 3),
+            ("unlike colours", 3),
+            ("absorption behind glass", 1),
+            ("phase densities", len(phases_of(2.0))),
+        )
+    ]
+    assert media == [6, 33, 15, 14, 18]
+    tests = closed + 2 * opened + densities + sum(lamps) + roulette + sum(media)
+    assert tests == 1195
+    assert 2 * chance.LEVEL * tests < 2.4e-5
 
 
 def stages(*means: Mean) -> Callable[[int], Mean]:

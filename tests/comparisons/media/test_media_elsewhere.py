@@ -9,7 +9,6 @@ import pytest
 from pbrt_reader import written
 
 import reference_rt as rt
-from comparisons.cycles.translate import write as write_cycles
 from comparisons.gltf import write_gltf
 from comparisons.pbrt import write_pbrt
 from comparisons.povray.translate import picture as povray_picture
@@ -60,8 +59,6 @@ def test_resolved_scenes_have_media_and_sides(tmp_path: Path):
 
 def test_others_refuse_media(tmp_path: Path):
     scene = Scene.load(SCENES / "absorbing_glass.yaml")
-    with pytest.raises(NoCounterpartError, match="media"):
-        write_cycles(scene, tmp_path)
     with pytest.raises(NoCounterpartError, match="media"):
         povray_picture(scene)
     with pytest.raises(SceneError, match="cannot express media"):

@@ -1,6 +1,6 @@
 """Two-stage tests of means of random numbers: how seldom a right renderer fails by chance.
 
-All that is statistical is in F10, F11 and F12.  A full run asks, of either contestant,
+All that is statistical is in F10, F11, F12 and F14.  A full run asks, of either contestant,
 
 | series | cases | tests of a case |
 |---|---|---|
@@ -8,9 +8,11 @@ All that is statistical is in F10, F11 and F12.  A full run asks, of either cont
 | F10 open furnace | 432 | 2: no more than all, as much as the integral |
 | F11 densities | 135 | 1 |
 | F12 light area, radiance, roulette | 52, 26, 24 | 1 |
+| F14 half spaces, white layers, unlike colours | 6, 33, 15 | 1 |
+| F14 absorption behind glass, phase densities | 14, 18 | 1 |
 
-1,109 tests, each with a false alarm of at most `LEVEL`: by the union bound, a full run of both
-contestants has one with a chance of at most 2.3e-5, a quick run with less than 4e-6.
+1,195 tests, each with a false alarm of at most `LEVEL`: by the union bound, a full run of both
+contestants has one with a chance of at most 2.4e-5, a quick run with less than 4e-6.
 
 - A picture's mean is suspect where it is `ERRORS` standard errors off, which by chance it is with
   1e-4, the root of `LEVEL`; it fails where `AGAIN` times as many fresh samples are as far off to

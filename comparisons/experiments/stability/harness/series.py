@@ -208,6 +208,7 @@ MODULES = {
     "F11": "bsdfs",
     "F12": "radiometry",
     "F13": "contact",
+    "F14": "media",
 }
 
 

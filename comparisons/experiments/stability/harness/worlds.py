@@ -51,7 +51,8 @@ _MATERIALS: Mapping[str, Any] = {
 
 class World(NamedTuple):
     """shapes, materials: the visible ones;  sky: radiance from all sides;  expected: radiance of
-    every pixel;  path: fields of the integrator;  rounding: its relative error, per u."""
+    every pixel;  path: fields of the integrator;  rounding: its relative error, per u;  media: of
+    the shapes."""
 
     shapes: tuple[Any, ...]
     materials: Mapping[str, Any]
@@ -60,6 +61,7 @@ class World(NamedTuple):
     path: Mapping[str, Any]
     sky: float = 0.0
     rounding: float = 64.0
+    media: Mapping[str, Any] = {}
 
 
 def scene_of(world: World, pixels: int, spp: int, seed: int, hidden: bool) -> rt.Scene:
@@ -71,6 +73,7 @@ def scene_of(world: World, pixels: int, spp: int, seed: int, hidden: bool) -> rt
         sampler=rt.Sobol(spp=spp, seed=seed) if hidden else rt.Independent(spp=spp, seed=seed),
         integrator=rt.Path(**world.path),
         hierarchy="sah",
+        media=dict(world.media),
         materials={**(_MATERIALS if hidden else {}), **world.materials},
         shapes=(*(_HIDDEN if hidden else ()), *world.shapes),
         lights=lights,
