@@ -109,6 +109,7 @@ class Known:
 _QUARTER = 1.0 / (4.0 * math.pi)
 
 RENDERERS = {
+    "babylon": Known("Babylon.js", "9.35.0", None, (), Changes()),
     "cycles": Known(
         "Cycles",
         "5.0.1",
@@ -145,7 +146,7 @@ RENDERERS = {
             "2 / (1 + (distance / fade_distance)^fade_power)",
             "a camera whose `right` is positive mirrors right-handed scenes",
         ),
-        Changes(lights={"directional": math.pi}),
+        Changes(lights={"point": math.pi, "directional": math.pi}),
     ),
     "radiance": Known(
         "Radiance",
@@ -172,7 +173,13 @@ RENDERERS = {
             "its point lights are seen as balls, and do not fade with distance without ATTENUATION",
             "highlights are Blinn's, with the exponent of Phong's, without -shade_phong",
         ),
-        Changes(mirrored=True, right=0.5, down=0.5, lights={"directional": math.pi}),
+        Changes(
+            mirrored=True,
+            right=0.5,
+            down=0.5,
+            lights={"point": math.pi, "directional": math.pi},
+        ),
     ),
+    "three": Known("three.js", "0.187.0", None, (), Changes()),
 }
 """By the name that `gate --from` takes; measured by `python docs/measure_conventions.py NAME`."""
