@@ -1,7 +1,7 @@
 """Six small scenes by each renderer, judged by the gate: `python docs/measure_renderers.py NAME...`.
 
 `NAME=PYTHON` draws in another environment, since some packages exclude others.  Each scene is drawn
-by `drive_renderers` with the numbers of its lights as they stand, and judged by `gate --from
+by `drivers` with the numbers of its lights as they stand, and judged by `gate --from
 NAME:numbers`.  A cell that does not agree has a formula below, and what is left of the picture
 beyond it.
 """
@@ -26,8 +26,9 @@ from comparisons.rungs.edges import DARK, TOLERANCE
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 
-sys.path.insert(0, str(Path(__file__).parent))
-from drive_renderers import BY_CENTRES, HasNoneError, Words, drawn_by
+sys.path.insert(0, str(Path(__file__).with_name("drivers")))
+from draw import BY_CENTRES, drawn_by
+from words import HasNoneError, Words
 
 Array = npt.NDArray[Any]
 
@@ -146,7 +147,7 @@ def drawn(name: str, scene: Words, python: str = "") -> Array:
         file, out = Path(folder) / "scene.json", Path(folder) / "out.npy"
         file.write_text(json.dumps(scene), encoding="utf-8")
         given = [str(file), str(out), ",".join(map(str, seeds)), str(spp)]
-        command = [python, str(Path(__file__).with_name("drive_renderers.py")), name, *given]
+        command = [python, str(Path(__file__).parent / "drivers" / "draw.py"), name, *given]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode == 3:
             raise HasNoneError(done.stdout.strip().splitlines()[-1])

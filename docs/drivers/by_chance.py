@@ -1,300 +1,29 @@
-"""Draws a small scene by another renderer: what the two `measure_` scripts of renderers share.
+"""Path tracers."""
 
-`python docs/drive_renderers.py NAME scene.json out.npy SEEDS SPP` writes (seeds, height, width, 3)
-as the renderer gives it, unturned.  The scene is one of ours, of few words: a camera at the origin
-that looks along -z with `fov` across, spheres, and rectangles and boxes with a `matrix` each; the
-materials and lights of `words`.  Numbers of lights are copied as they stand.
-
-It needs NumPy and the renderer: tachyon and POV-Ray by apt, bpy, pyluxcore, pyradiance, raysect and
-mitsuba by pip in the environment that runs it, since some exclude others.  `drive_browsers` has
-three.js and Babylon.js.
-"""
-
-import json
 import math
 import os
-import subprocess
-import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-
-Array = npt.NDArray[Any]
-Words = dict[str, Any]
-
-SMALL, SUN = 1e-3, 0.05
-"""Radius of the balls that stand for points, and degrees across the disc that stands for parallel
-light, where a renderer has neither."""
-
-NEAR = 1e-3
-"""POV-Ray's `fade_distance`, below which its points do not fade."""
-
-
-class HasNoneError(Exception):
-    """The renderer lacks a word of the scene."""
-
-
-def rgb(value: Any) -> tuple[float, float, float]:
-    r, g, b = np.broadcast_to(np.asarray(value, float), 3).tolist()
-    return r, g, b
-
-
-def text(values: Any) -> str:
-    return " ".join(f"{v:.9g}" for v in np.ravel(values))
-
-
-def commas(values: Any) -> str:
-    return f"<{', '.join(f'{v:.12g}' for v in np.ravel(values))}>"
-
-
-def size(scene: Words) -> tuple[int, int, float, float]:
-    """Pixels, and half the view at distance 1, across and up."""
-    width, height = scene["film"]["width"], scene["film"]["height"]
-    half = math.tan(math.radians(scene["camera"]["fov"] / 2.0))
-    return width, height, half, half * height / width
-
-
-def longer(scene: Words) -> float:
-    """Degrees along the longer side."""
-    _, _, x, y = size(scene)
-    return 2.0 * math.degrees(math.atan(max(x, y)))
-
-
-def placed(shape: Words) -> Array:
-    """(4, 4): from the square or the cube of side 2 to the scene."""
-    (step,) = shape["transform"]
-    return np.vstack([np.array(step["matrix"], float), [0.0, 0.0, 0.0, 1.0]])
-
-
-FACES = [[[x, -1, -1], [x, x, -x], [x, 1, 1], [x, -x, x]] for x in (-1, 1)]
-CUBE = np.array([np.roll(face, turn, axis=1) for face in FACES for turn in range(3)], float)
-"""(6, 4, 3): corners of the cube's faces, counter-clockwise from outside."""
-SQUARE = np.array([[[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]], float)
-
-
-def quads(shape: Words) -> Array:
-    """(n, 4, 3): a rectangle's or a box's."""
-    matrix = placed(shape)
-    corners = CUBE if shape["type"] == "box" else SQUARE
-    return np.asarray(corners @ matrix[:3, :3].T + matrix[:3, 3])
-
-
-def mesh(shape: Words, n: int = 128) -> tuple[Array, Array, Array | None]:
-    """Corners, triangles, and normals where they are smooth, for renderers that have no others."""
-    if shape["type"] != "sphere":
-        corners = quads(shape)
-        first = 4 * np.arange(len(corners))[:, None]
-        both = [first + [0, 1, 2], first + [0, 2, 3]]
-        return corners.reshape(-1, 3), np.concatenate(both), None
-    theta, phi = np.linspace(0.0, math.pi, n + 1), np.arange(2 * n) * math.pi / n
-    t, p = np.meshgrid(theta, phi, indexing="ij")
-    unit = np.stack([np.sin(t) * np.cos(p), np.cos(t), np.sin(t) * np.sin(p)], axis=-1)
-    unit = unit.reshape(-1, 3)
-    i, j = np.meshgrid(np.arange(n), np.arange(2 * n), indexing="ij")
-    a, b = i * 2 * n + j, i * 2 * n + (j + 1) % (2 * n)
-    upper, lower = np.stack([a, b, a + 2 * n], -1)[1:], np.stack([b, b + 2 * n, a + 2 * n], -1)[:-1]
-    faces = np.concatenate([upper.reshape(-1, 3), lower.reshape(-1, 3)])
-    return unit * shape["radius"] + shape["center"], faces, unit
-
-
-def inside(scene: Words) -> bool:
-    """Whether the eye is inside of a ball."""
-    balls = [shape for shape in scene["shapes"] if shape["type"] == "sphere"]
-    return any(math.dist((0, 0, 0), ball["center"]) < ball["radius"] for ball in balls)
-
-
-def look(scene: Words, shape: Words) -> tuple[str, Words]:
-    material = scene["materials"][shape["material"]]
-    return str(material["type"]), material
-
-
-def lights(scene: Words) -> list[tuple[str, Words]]:
-    return [(str(light["type"]), light) for light in scene.get("lights", [])]
-
-
-def words(name: str, table: dict[str, Any], what: str) -> Any:
-    if what not in table:
-        raise HasNoneError(f"{name} has no {what}")
-    return table[what]
-
-
-def run(*command: str, folder: Path) -> str:
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise SystemExit(f"{command[0]}: {(done.stdout + done.stderr)[-800:]}")
-    return done.stdout
-
-
-def ppm16(file: Path, width: int, height: int) -> Array:
-    """The last picture of 16 bits of a PPM file."""
-    data = file.read_bytes()[-6 * width * height :]
-    return np.frombuffer(data, ">u2").reshape(height, width, 3) / 65535.0
-
-
-def tachyon(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Iterator[Array]:
-    width, height, _, y = size(scene)
-    said = f"""BEGIN_SCENE
-RESOLUTION {width} {height}
-CAMERA ZOOM {0.5 / y} ASPECTRATIO 1.0 ANTIALIASING 0 RAYDEPTH 12
-CENTER 0.0 0.0 0.0 VIEWDIR 0.0 0.0 -1.0 UPDIR 0.0 1.0 0.0 END_CAMERA
-BACKGROUND 0 0 0
-"""
-    looks = {
-        "diffuse": lambda m: ("0.0 DIFFUSE 1.0 SPECULAR 0.0", "", m["reflectance"]),
-        "emissive": lambda m: ("1.0 DIFFUSE 0.0 SPECULAR 0.0", "", m["radiance"]),
-        "mirror": lambda m: (f"0.0 DIFFUSE 0.0 SPECULAR {rgb(m['reflectance'])[0]}", "", 1.0),
-        "phong": lambda m: (
-            "0.0 DIFFUSE 1.0 SPECULAR 0.0",
-            f"PHONG PLASTIC {math.pi * rgb(m['specular'])[0]} PHONG_SIZE {m['exponent']}",
-            math.pi * np.array(rgb(m["diffuse"])),
-        ),
-    }
-    for shape in scene["shapes"]:
-        kind, m = look(scene, shape)
-        ambient, shine, colour = words("tachyon", looks, kind)(m)
-        finish = f"TEXTURE AMBIENT {ambient} OPACITY 1.0 {shine} COLOR {text(rgb(colour))} TEXFUNC 0"
-        if shape["type"] == "sphere":
-            said += f"SPHERE CENTER {text(shape['center'])} RAD {shape['radius']} {finish}\n"
-            continue
-        for a, b, c, d in quads(shape):
-            for corners in ((a, b, c), (a, c, d)):
-                names = zip(("V0", "V1", "V2"), corners, strict=True)
-                said += f"TRI {' '.join(f'{v} {text(at)}' for v, at in names)} {finish}\n"
-    fade = "ATTENUATION CONSTANT 0.0 LINEAR 0.0 QUADRATIC 1.0 COLOR"
-    lamps = {
-        "point": lambda l: (
-            f"LIGHT CENTER {text(l['position'])} RAD 0.0001 {fade} {text(rgb(l['intensity']))}\n"
-        ),
-        "directional": lambda l: (
-            f"DIRECTIONAL_LIGHT DIRECTION {text(l['direction'])} COLOR {text(rgb(l['irradiance']))}\n"
-        ),
-    }
-    said += "".join(words("tachyon", lamps, kind)(light) for kind, light in lights(scene))
-    (folder / "s.dat").write_text(f"{said}END_SCENE\n", encoding="utf-8")
-    run("tachyon", "s.dat", "-shade_phong", "-format", "PPM48", "-o", "s.ppm", folder=folder)
-    yield ppm16(folder / "s.ppm", width, height)
-
-
-def povray(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Iterator[Array]:
-    width, height, x, y = size(scene)
-    said = f"""#version 3.7;
-global_settings {{ assumed_gamma 1 max_trace_level 60 adc_bailout 0 }}
-camera {{ perspective location 0 direction -z right x*{2 * x} up y*{2 * y} }}
-"""
-    none = "finish { ambient 0 diffuse 0"
-    looks = {
-        "diffuse": lambda m: f"pigment {{ rgb {commas(rgb(m['reflectance']))} }} "
-        "finish { ambient 0 diffuse 1 }",
-        "emissive": lambda m: f"pigment {{ rgb {commas(rgb(m['radiance']))} }} {none} emission 1 }}",
-        "mirror": lambda m: f"pigment {{ rgb 0 }} {none} reflection "
-        f"{{ {commas(rgb(m['reflectance']))} }} }}",
-        "dielectric": lambda m: f"pigment {{ rgbt 1 }} {none} reflection {{ 0, 1 fresnel }} "
-        f"conserve_energy }} interior {{ ior {m['interior_ior']} }}",
-        "phong": lambda m: f"pigment {{ rgb {commas(math.pi * np.array(rgb(m['diffuse'])))} }} "
-        f"finish {{ ambient 0 diffuse 1 phong {math.pi * rgb(m['specular'])[0]} "
-        f"phong_size {m['exponent']} }}",
-    }
-    for shape in scene["shapes"]:
-        kind, m = look(scene, shape)
-        finish = words("POV-Ray", looks, kind)(m)
-        if shape["type"] == "sphere":
-            said += f"sphere {{ {commas(shape['center'])}, {shape['radius']} {finish} }}\n"
-        elif shape["type"] == "box":
-            matrix = commas(placed(shape)[:3].T)
-            said += f"box {{ -1, 1 {finish} matrix {matrix} }}\n"
-        else:
-            for corners in quads(shape):
-                at = ", ".join(commas(c) for c in (*corners, corners[0]))
-                said += f"polygon {{ 5, {at} {finish} }}\n"
-    fade = f"fade_distance {NEAR} fade_power 2"
-    lamps = {
-        "point": lambda l: f"light_source {{ {commas(l['position'])} rgb "
-        f"{commas(np.array(rgb(l['intensity'])) / (2.0 * NEAR**2))} {fade} }}\n",
-        "directional": lambda l: f"light_source {{ {commas(-100.0 * np.array(l['direction']))} rgb "
-        f"{commas(rgb(l['irradiance']))} parallel point_at 0 }}\n",
-        "constant": lambda l: f"background {{ rgb {commas(rgb(l['radiance']))} }}\n",
-    }
-    said += "".join(words("POV-Ray", lamps, kind)(light) for kind, light in lights(scene))
-    if any(look(scene, shape)[0] in ("diffuse", "phong") for shape in scene["shapes"]):
-        for shape in scene["shapes"]:
-            kind, m = look(scene, shape)
-            said += _povray_area(shape, m, fade) if kind == "emissive" else ""
-    (folder / "s.pov").write_text(said, encoding="utf-8")
-    dims = (f"+W{width}", f"+H{height}", "+FP16", "-D", "-A", "File_Gamma=1", "+WT1")
-    run("povray", "+Is.pov", "+Os.ppm", *dims, folder=folder)
-    yield ppm16(folder / "s.ppm", width, height)
-
-
-POINTS = 16
-"""Along a side of POV-Ray's area lamps."""
-
-
-def _povray_area(shape: Words, material: Words, fade: str) -> str:
-    """A square lamp as POV-Ray has it: a grid of lights, whose strength for its first kernel of a
-    cosine, a spotlight of tightness 1 all around, is the lamp's intensity along its normal."""
-    a, b, _, d = quads(shape)[0]
-    area = float(np.linalg.norm(np.cross(b - a, d - a)))
-    normal, middle = np.cross(b - a, d - a) / area, (b + d) / 2.0
-    strength = commas(area * np.array(rgb(material["radiance"])) / (2.0 * NEAR**2) / math.pi)
-    sides = (1.0 - 1.0 / POINTS) * (b - a), (1.0 - 1.0 / POINTS) * (d - a)
-    grid = f"area_light {commas(sides[0])}, {commas(sides[1])}, {POINTS}, {POINTS}"
-    lobe = f"spotlight point_at {commas(middle + normal)} radius 89.99 falloff 90 tightness 1"
-    return f"light_source {{ {commas(middle)} rgb {strength} {fade} {lobe} {grid} area_illumination }}\n"
-
-
-def radiance(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Iterator[Array]:
-    import pyradiance  # type: ignore[import-not-found]
-
-    programs = Path(pyradiance.__file__).parent / "bin"
-    width, height, x, y = size(scene)
-    looks = {
-        "diffuse": lambda m: f"plastic {{}} 0 0 5 {text(rgb(m['reflectance']))} 0 0",
-        "emissive": lambda m: f"light {{}} 0 0 3 {text(rgb(m['radiance']))}",
-        "mirror": lambda m: f"metal {{}} 0 0 5 {text(rgb(m['reflectance']))} 1 0",
-        "dielectric": lambda m: f"dielectric {{}} 0 0 5 1 1 1 {m['interior_ior']} 0",
-        "phong": lambda m: f"plasfunc {{}} 2 phong phong.cal 0 5 "
-        f"{text(math.pi * np.array(rgb(m['diffuse'])) / (1.0 - rgb(m['specular'])[0]))} "
-        f"{rgb(m['specular'])[0]} {m['exponent']}",
-    }
-    # The function is multiplied by its share, which diffuse light lacks, and the cosine over π.
-    (folder / "phong.cal").write_text(
-        "phong(x,y,z) = if(N(x,y,z), 3.14159265358979*max(R(x,y,z), 0)^A5/N(x,y,z), 0);\n"
-        "N(x,y,z) = x*Nx + y*Ny + z*Nz;\n"
-        "R(x,y,z) = 2*N(x,y,z)*(-(Dx*Nx + Dy*Ny + Dz*Nz)) + x*Dx + y*Dy + z*Dz;\n"
-        "max(a,b) = if(a-b, a, b);\n",
-        encoding="utf-8",
-    )
-    said = ""
-    for k, shape in enumerate(scene["shapes"]):
-        kind, m = look(scene, shape)
-        said += f"void {words('Radiance', looks, kind)(m).format(f'm{k}')}\n"
-        if shape["type"] == "sphere":
-            said += f"m{k} sphere s{k} 0 0 4 {text(shape['center'])} {shape['radius']}\n"
-            continue
-        for j, corners in enumerate(quads(shape)):
-            said += f"m{k} polygon s{k}_{j} 0 0 12 {text(corners)}\n"
-    disc = math.pi * math.sin(math.radians(SUN / 2.0)) ** 2
-    lamps = {
-        "point": lambda l: f"void light l 0 0 3 {text(np.array(rgb(l['intensity'])) / math.pi / SMALL**2)}\n"
-        f"l sphere p 0 0 4 {text(l['position'])} {SMALL}\n",
-        "directional": lambda l: f"void light l 0 0 3 {text(np.array(rgb(l['irradiance'])) / disc)}\n"
-        f"l source p 0 0 4 {text(-np.array(l['direction']))} {SUN}\n",
-        "constant": lambda l: f"void glow k 0 0 4 {text(rgb(l['radiance']))} 0\nk source d 0 0 4 0 0 1 360\n",
-    }
-    said += "".join(words("Radiance", lamps, kind)(light) for kind, light in lights(scene))
-    (folder / "s.rad").write_text(said, encoding="utf-8")
-    angles = [2.0 * math.degrees(math.atan(half)) for half in (x, y)]
-    view = f"-vtv -vp 0 0 0 -vd 0 0 -1 -vu 0 1 0 -vh {angles[0]} -vv {angles[1]}"
-    rays = f"{programs}/vwrays -ff -pa 0 -pj 0 {view} -x {width} -y {height}"
-    exact = "-dj 0 -ds 0.02 -dt 0 -ab 0 -lr 100 -lw 1e-9"
-    steps = f"{programs}/oconv s.rad > s.oct; {rays} | {programs}/rtrace -fff -h {exact} s.oct > s.raw"
-    run("sh", "-c", steps, folder=folder)
-    yield np.fromfile(folder / "s.raw", np.float32).reshape(height, width, 3).astype(float)
+from words import (
+    SMALL,
+    SUN,
+    Array,
+    Words,
+    inside,
+    lights,
+    longer,
+    look,
+    mesh,
+    placed,
+    rgb,
+    size,
+    text,
+    words,
+)
 
 
 def luxcore(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Iterator[Array]:
@@ -566,6 +295,7 @@ def raysect(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Itera
         camera.pixel_samples, camera.spectral_bins, camera.quiet = spp, 1, True
         camera.min_wavelength, camera.max_wavelength = 500, 501
         camera.ray_max_depth, camera.ray_extinction_min_depth = 100, 50
+        camera.ray_important_path_weight = 0.9
         camera.render_engine = SerialEngine()
         camera.observe()
         return np.array(pipeline.frame.mean).T  # by column and row
@@ -634,43 +364,3 @@ def mitsuba(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Itera
     loaded = mi.load_dict({"type": "scene", "integrator": path, **parts})
     for seed in seeds:
         yield np.array(mi.render(loaded, seed=seed)).astype(float)
-
-
-def three(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Iterator[Array]:
-    from drive_browsers import drawn
-
-    yield drawn("three", scene, folder)
-
-
-def babylon(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Iterator[Array]:
-    from drive_browsers import drawn
-
-    yield drawn("babylon", scene, folder)
-
-
-Driver = Callable[[Words, Path, Sequence[int], int], Iterator[Array]]
-BY_CENTRES: dict[str, Driver] = {
-    one.__name__: one for one in (babylon, povray, radiance, tachyon, three)
-}
-"""One sample of each pixel, no random numbers."""
-BY_CHANCE: dict[str, Driver] = {one.__name__: one for one in (cycles, luxcore, mitsuba, raysect)}
-DRIVERS = {**BY_CENTRES, **BY_CHANCE}
-
-
-def drawn_by(name: str, scene: Words, seeds: Sequence[int] = (1,), spp: int = 64) -> Array:
-    """(seeds, height, width, 3), of one picture where there are no random numbers."""
-    with tempfile.TemporaryDirectory() as folder:
-        return np.stack(list(DRIVERS[name](scene, Path(folder), seeds, spp)))
-
-
-if __name__ == "__main__":
-    name, scene_file, out, seeds, spp = sys.argv[1:]
-    out = os.path.abspath(out)
-    described = json.loads(Path(scene_file).read_text(encoding="utf-8"))
-    try:
-        np.save(out, drawn_by(name, described, [int(k) for k in seeds.split(",")], int(spp)))
-        code = 0
-    except HasNoneError as error:
-        print(error, flush=True)
-        code = 3
-    os._exit(code)  # pyluxcore and bpy need not be taken down

@@ -1,4 +1,4 @@
-"""three.js and Babylon.js as drivers of `drive_renderers`: pages in headless Chromium.
+"""three.js and Babylon.js: pages in headless Chromium.
 
 It needs Chromium, Playwright, and a folder of packages, NODE_MODULES or examples/three/node_modules,
 with three or babylonjs by npm.  The gate's own browser answers the pages' requests.
@@ -7,10 +7,11 @@ with three or babylonjs by npm.  The gate's own browser answers the pages' reque
 import json
 import os
 import shutil
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from drive_renderers import Array, HasNoneError, Words, lights, look, quads, rgb, size
+from words import Array, HasNoneError, Words, lights, look, quads, rgb, size
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "three" / "node_modules"
 
@@ -22,7 +23,17 @@ def packages() -> Path:
     return Path(os.environ.get("NODE_MODULES", EXAMPLE))
 
 
-def drawn(name: str, scene: Words, folder: Path) -> Array:
+def three(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Iterator[Array]:
+    yield _drawn("three", scene, folder)
+
+
+def babylon(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Iterator[Array]:
+    if {"emissive", "diffuse"} <= {look(scene, shape)[0] for shape in scene["shapes"]}:
+        raise HasNoneError("Babylon.js loads the tables of its area lamps from a server")
+    yield _drawn("babylon", scene, folder)
+
+
+def _drawn(name: str, scene: Words, folder: Path) -> Array:
     """Of memory, whose first row is the bottom: turned, as a canvas shows it."""
     from playwright.sync_api import sync_playwright
 
@@ -48,10 +59,7 @@ def drawn(name: str, scene: Words, folder: Path) -> Array:
     return np.asarray(picture[..., :3], float)
 
 
-MATERIALS = {
-    "three": ("diffuse", "emissive", "mirror", "phong"),
-    "babylon": ("diffuse", "emissive", "mirror", "phong"),
-}
+MATERIALS = ("diffuse", "emissive", "mirror", "phong")
 """What they have without rays: glass bends a picture of what is behind it, once."""
 
 
@@ -62,8 +70,8 @@ def _plain(name: str, scene: Words) -> Words:
     kinds = {look(scene, shape)[0] for shape in scene["shapes"]}
     for shape in scene["shapes"]:
         kind, m = look(scene, shape)
-        if kind not in MATERIALS[name]:
-            raise HasNoneError(f"{name} has no {kind}: it has no rays")
+        if kind not in MATERIALS:
+            raise HasNoneError(f"{name} traces no rays, which a {kind} takes")
         colours = {key: rgb(m[key]) for key in m.keys() - {"type", "exponent", "half_vector"}}
         one: Words = {"kind": kind, "exponent": m.get("exponent"), **colours}
         one |= {key: shape[key] for key in ("center", "radius") if key in shape}
@@ -71,7 +79,12 @@ def _plain(name: str, scene: Words) -> Words:
             one["corners"] = np.round(quads(shape)[0], 12).tolist()
             one["lights"] = kind == "emissive" and "diffuse" in kinds
         things.append(one)
-    lamps = [{"kind": kind, **light} for kind, light in lights(scene)]
+    lamps = []
+    for kind, light in lights(scene):
+        colours = {key: rgb(light[key]) for key in light.keys() & {"intensity", "irradiance"}}
+        lamps.append({"kind": kind, **light, **colours})
+    if any(lamp["kind"] == "constant" for lamp in lamps):
+        raise HasNoneError(f"{name} has no even sky without a picture of it")
     fov = 2.0 * float(np.degrees(np.arctan(y)))
     return {"width": width, "height": height, "fov": fov, "things": things, "lamps": lamps}
 
@@ -162,10 +175,17 @@ const camera = new B.TargetCamera("c", B.Vector3.Zero(), scene);
 camera.setTarget(new B.Vector3(0, 0, -1));
 camera.fov = said.fov * Math.PI / 180; camera.minZ = 0.1; camera.maxZ = 100;
 scene.clearColor = new B.Color4(0, 0, 0, 1);
+scene.imageProcessingConfiguration.applyByPostProcess = true; // radiance, and no curve
 const meshes = [], mirrors = [], blockers = [];
 for (const one of said.things) {
-  const look = new B.StandardMaterial("m", scene);
+  // Lights fade with the square of the distance on this kind of material alone.
+  const fades = one.kind === "diffuse" && said.lamps.some((lamp) => lamp.kind !== "directional");
+  const look = new B[fades ? "PBRMaterial" : "StandardMaterial"]("m", scene);
   look.backFaceCulling = false;
+  if (fades) {
+    look.metallic = 0; look.roughness = 1; look.metallicF0Factor = 0; look.albedoColor = linear(one.reflectance);
+    look.brdf.baseDiffuseModel = B.Constants.MATERIAL_DIFFUSE_MODEL_LAMBERT;
+  }
   look.diffuseColor = linear(one.diffuse ?? one.reflectance ?? [0, 0, 0]);
   look.specularColor = linear(one.specular ?? [0, 0, 0]);
   look.specularPower = one.exponent ?? 64;
@@ -174,7 +194,6 @@ for (const one of said.things) {
   if (one.corners) {
     const data = new B.VertexData(), [a, b, , d] = one.corners.map(vector);
     const n = B.Vector3.Cross(b.subtract(a), d.subtract(a)).normalize();
-    if (one.lights) throw new Error("none");
     mesh = new B.Mesh("s", scene);
     data.positions = one.corners.flat(); data.indices = [0, 1, 2, 0, 2, 3];
     data.normals = [n, n, n, n].flatMap((v) => [v.x, v.y, v.z]);
@@ -194,7 +213,7 @@ for (const one of said.things) {
   mesh.material = look;
   meshes.push(mesh);
 }
-for (const mirror of mirrors) mirror.renderList = meshes;
+for (const mirror of mirrors) mirror.renderList = meshes.filter((one) => one.material.reflectionTexture !== mirror);
 for (const one of said.lamps) {
   const at = vector(one.position ?? one.origin ?? one.direction);
   const lamp = one.kind === "point" ? new B.PointLight("l", at, scene)
