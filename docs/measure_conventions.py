@@ -119,7 +119,7 @@ def measured(name: str) -> dict[str, Any]:
         number = lamp.get("intensity", lamp.get("irradiance"))
         unit = number * ALBEDO / math.pi / (1.0 if kind == "directional" else DISTANCE**2)
         try:
-            shown = float(np.median((picture(name, wall, 64) / cosines)[28:36, 28:36]))
+            shown = float(np.median((picture(name, wall, 64) / cosines)[31:33, 31:33]))
         except HasNoneError:
             continue
         found["lamps"][kind] = shown / unit

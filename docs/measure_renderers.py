@@ -7,10 +7,11 @@ beyond it.
 """
 
 import json
+import os
 import subprocess
 import sys
 import tempfile
-from dataclasses import replace
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -117,36 +118,38 @@ NEAREST = {
 """In place of Phong's, of renderers that have none: a metal of GGX microfacets that reflects all,
 or Blinn's half vector."""
 
+CODES = {"povray": 2.0**-16, "tachyon": 2.0**-16}
+"""Steps of the files of those that write 16 bits."""
+
+SEEDS = [1 + 1000003 * k for k in range(16)]
+WIDTH, HEIGHT, FOV = 64, 48, 40.0
 
 
 def described(name: str, scene: str) -> Words:
-    """As the renderer gets it: it takes light by way of one surface, and glass to its end."""
+    """As the renderer gets it, and ours: paths as long as glass needs."""
     said = SCENES[scene]
     if scene == "Phong" and name in NEAREST:
         said = {**said, "materials": {"it": NEAREST[name]}}
-    by_centres = name in BY_CENTRES and scene != "area lamp"
-    spp = 1 if by_centres else 256 if scene in ("glass", "mirror") else 64
+    noise = name not in BY_CENTRES
+    spp = (256 if scene == "glass" else 64) if noise else 1
     return {
-        "camera": {"type": "perspective", "eye": (0, 0, 0), "target": (0, 0, -1), "fov": 40.0},
-        "film": {"width": 64, "height": 48},
-        "sampler": {"type": "grid" if by_centres else "sobol", "spp": spp},
-        "integrator": {
-            "type": "whitted" if by_centres else "path",
-            "max_depth": 60 if by_centres else 64,
-        },
+        "camera": {"type": "perspective", "eye": (0, 0, 0), "target": (0, 0, -1), "fov": FOV},
+        "film": {"width": WIDTH, "height": HEIGHT},
+        "sampler": {"type": "sobol" if noise else "grid", "spp": spp},
+        "integrator": {"type": "path" if noise else "whitted", "max_depth": 60},
         **said,
     }
 
 
 def drawn(name: str, scene: Words, python: str = "") -> Array:
     """(replicates, height, width, 3).  Raises HasNoneError."""
-    seeds, spp = [1001, 2002, 3003, 4004], scene["sampler"]["spp"]
+    spp = scene["sampler"]["spp"]
     if not python:
-        return drawn_by(name, scene, seeds, spp)
+        return drawn_by(name, scene, SEEDS, spp)
     with tempfile.TemporaryDirectory() as folder:
         file, out = Path(folder) / "scene.json", Path(folder) / "out.npy"
         file.write_text(json.dumps(scene), encoding="utf-8")
-        given = [str(file), str(out), ",".join(map(str, seeds)), str(spp)]
+        given = [str(file), str(out), ",".join(map(str, SEEDS)), str(spp)]
         command = [python, str(Path(__file__).parent / "drivers" / "draw.py"), name, *given]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode == 3:
@@ -156,39 +159,190 @@ def drawn(name: str, scene: Words, python: str = "") -> Array:
         return np.asarray(np.load(out))
 
 
-def judged(name: str, said: Words, pictures: Array) -> Case:
-    scene = Scene.parse(json.dumps(said))
+def rays(samples: int = 1, down: float = 0.0) -> Array:
+    """(height, width, samples squared, 3): through pixels of a view that is moved."""
+    half = np.tan(np.radians(FOV / 2.0))
+    at = (np.arange(samples) + 0.5) / samples
+    x = half * ((np.arange(WIDTH)[:, None] + at) * 2.0 / WIDTH - 1.0)
+    y = half * (HEIGHT - 2.0 * (np.arange(HEIGHT)[:, None] + at - down)) / WIDTH
+    x, y = np.broadcast_arrays(x[None, :, None, :], y[:, None, :, None])
+    d = np.stack([x, y, -np.ones_like(x)], axis=-1).reshape(HEIGHT, WIDTH, -1, 3)
+    return np.asarray(d / np.linalg.norm(d, axis=-1, keepdims=True))
+
+
+def on_ball(d: Array) -> tuple[Array, Array, Array]:
+    """Whether rays meet the ball, its normals, and half vectors of the eye and the sun."""
+    c, r = np.array(BALL["center"]), BALL["radius"]
+    along = d @ c
+    root = along**2 - c @ c + r**2
+    n = ((along - np.sqrt(np.maximum(root, 0.0)))[..., None] * d - c) / r
+    h = -d - np.array(SUN)
+    return root > 0.0, n, h / np.linalg.norm(h, axis=-1, keepdims=True)
+
+
+SUNLIGHT = np.array(PARALLEL[0]["irradiance"])
+
+
+def lamp_vectors() -> tuple[Array, Array]:
+    """On the wall of the area lamp: the integral of the direction to the lamp over its solid angle,
+    an edge at a time (Lambert 1760), and the wall's normal."""
+    lamp, wall = (np.array(shape["transform"][0]["matrix"]) for shape in SCENES["area lamp"]["shapes"])
+    n = wall[:, 2] / np.linalg.norm(wall[:, 2])
+    d = rays()[:, :, 0]
+    points = d * (wall[:, 3] @ n / (d @ n))[..., None]
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) @ lamp[:, :2].T + lamp[:, 3]
+    v = corners - points[..., None, :]
+    w = np.roll(v, -1, axis=-2)
+    cross = np.cross(v, w)
+    length = np.linalg.norm(cross, axis=-1, keepdims=True)
+    angle = np.arctan2(length, (v * w).sum(axis=-1, keepdims=True))
+    total = (angle / length * cross).sum(axis=-2) / 2.0
+    return total * np.sign(total @ n)[..., None], n
+
+
+AREA = np.array(MATTE["reflectance"]) * np.array(SCENES["area lamp"]["materials"]["it"]["radiance"])
+
+
+def lit_by_area() -> Array:
+    """The closed form of the area lamp's wall."""
+    vectors, n = lamp_vectors()
+    return np.asarray((vectors @ n)[..., None] * AREA / np.pi)
+
+
+def overlaid(known: Scene) -> Array:
+    """three's Reflector lays its colour, grey of code 127, over what it mirrors."""
+    shown, grey = render(known).colour, ((127.0 / 255.0 + 0.055) / 1.055) ** 2.4
+    over = np.where(shown < 0.5, 2.0 * shown * grey, 1.0 - 2.0 * (1.0 - shown) * (1.0 - grey))
+    o, d, *_ = known.camera_rays()
+    return np.where((known.intersect(o, d).shape == 1)[..., None], over, shown)
+
+
+def blinn_of_three(known: Scene) -> Array:
+    """Blinn's highlight times (n + 2) / (8 pi), Schlick's Fresnel term and the cosine."""
+    hit, n, h = on_ball(rays()[:, :, 0])
+    cosine, shine = np.maximum(-n @ np.array(SUN), 0.0), (n * h).sum(axis=-1)
+    kd, ks, p = np.array(PHONG["diffuse"]), np.pi * PHONG["specular"], PHONG["exponent"]
+    # The half vector is as far from the eye as from the sun.
+    fresnel = ks + (1.0 - ks) * (1.0 + h @ np.array(SUN)) ** 5
+    lobe = fresnel * (p + 2.0) / (8.0 * np.pi) * np.maximum(shine, 0.0) ** p
+    return np.asarray((hit * cosine)[..., None] * (kd + lobe[..., None]) * SUNLIGHT)
+
+
+def area_of_three(known: Scene) -> Array:
+    """The vector's length l and its share z along the normal give (l^2 + z) / (l + 1), a form
+    factor, in place of z."""
+    vectors, n = lamp_vectors()
+    z, l = vectors @ n / np.pi, np.linalg.norm(vectors, axis=-1) / np.pi
+    return np.asarray(((l**2 + z) / (l + 1.0))[..., None] * AREA)
+
+
+def area_of_radiance(known: Scene) -> Array:
+    """The lamp as the centres of its 64 parts, the most that Radiance has."""
+    lamp, wall = (np.array(s["transform"][0]["matrix"]) for s in SCENES["area lamp"]["shapes"])
+    n, across = (v / np.linalg.norm(v) for v in (wall[:, 2], lamp[:, 2]))
+    d = rays()[:, :, 0]
+    points, value = d * (wall[:, 3] @ n / (d @ n))[..., None], 0.0
+    for u, v in np.ndindex(8, 8):
+        to = lamp[:, :2] @ ((2.0 * np.array([u, v]) + 1.0) / 8.0 - 1.0) + lamp[:, 3] - points
+        r2 = (to**2).sum(axis=-1)
+        value = value + np.abs((to @ n) * (to @ across)) / r2**2 / 64.0
+    size = 4.0 * np.prod(np.linalg.norm(lamp[:, :2], axis=0))
+    return np.asarray(value[..., None] * size * AREA / np.pi)
+
+
+def metal(masked: Callable[[Array, Array, float], Array], down: float) -> Array:
+    """GGX microfacets by how much of them both directions see, over their cosines."""
+    hit, n, h = on_ball(d := rays(16, down))
+    cosine, to_eye = np.maximum(-n @ np.array(SUN), 1e-9), np.maximum(-(n * d).sum(axis=-1), 1e-9)
+    a2 = METAL["alpha"] ** 2
+    spread = a2 / np.pi / ((n * h).sum(axis=-1) ** 2 * (a2 - 1.0) + 1.0) ** 2
+    value = hit * (cosine > 1e-9) * spread * masked(cosine, to_eye, a2) / 4.0 / to_eye
+    return np.asarray(value.mean(axis=-1)[..., None] * SUNLIGHT)
+
+
+def metal_of_luxcore(known: Scene) -> Array:
+    """Each direction is masked by Schlick's c / (c (1 - alpha^2) + alpha^2)."""
+    return metal(
+        lambda i, o, a2: i * o / (i * (1.0 - a2) + a2) / (o * (1.0 - a2) + a2),
+        RENDERERS["luxcore"].changes.down,
+    )
+
+
+def metal_of_cycles(known: Scene) -> Array:
+    """Both are masked together: 1 / (1 + L(i) + L(o)), Smith's functions, by height."""
+
+    def smith(c: Array, a2: float) -> Array:
+        return np.asarray((np.sqrt(1.0 + a2 * (1.0 / c**2 - 1.0)) - 1.0) / 2.0)
+
+    return metal(lambda i, o, a2: 1.0 / (1.0 + smith(i, a2) + smith(o, a2)), 0.0)
+
+
+FORMULAS: dict[tuple[str, str], Callable[[Scene], Array]] = {
+    ("three", "mirror"): overlaid,
+    ("three", "Phong"): blinn_of_three,
+    ("three", "area lamp"): area_of_three,
+    ("luxcore", "Phong"): metal_of_luxcore,
+    ("cycles", "Phong"): metal_of_cycles,
+    ("radiance", "area lamp"): area_of_radiance,
+}
+"""What is drawn where that is not ours."""
+
+
+def judged(name: str, scene: str, said: Words, pictures: Array) -> tuple[Case, str]:
+    """The verdict, and by how much the picture's mean is off, in percent."""
+    known = Scene.parse(json.dumps(said))
     kinds = {light["type"] for light in said.get("lights", [])}
     numbers = RENDERERS[name].changes.seen(kinds).lights
-    reading = Reading.of(f"{name}:{NUMBERS}" if numbers else name, scene, of_files=False)
-    known = reading.scene(scene)
-    assert known is not None
+    reading = Reading.of(f"{name}:{NUMBERS}" if numbers else name, known, of_files=False)
+    known = reading.scene(known) or known
+    read = reading.read([Picture(one) for one in pictures])
     if name not in BY_CENTRES:
         request = Request(known, limit=0.01)
-    elif said["sampler"]["type"] == "grid":
-        # Files of 16 bits: a code, of the darkest value that is judged by itself.
-        code = 2.0**-16 / (DARK * float(render(known).colour.mean(axis=(0, 1)).min()))
-        request = Request(known, noise_free=True, tolerance=max(TOLERANCE, code))
-    else:
         fine = known.changed(sampler=known.resolved_sampler.model_copy(update={"spp": 4096}))
-        request = Request(references=(Picture(render(fine).colour),), noise_free=True)
-    return reading.told(gated(request, reading.read([Picture(one) for one in pictures])))
+        reference = render(fine).colour
+    elif scene == "area lamp":
+        reference = lit_by_area()
+        request = Request(references=(Picture(reference),), noise_free=True)
+    else:
+        reference = render(known).colour
+        # A code of the darkest value that is judged by itself.
+        code = CODES.get(name, 0.0) / (DARK * float(reference.mean(axis=(0, 1)).min()))
+        request = Request(known, noise_free=True, tolerance=max(TOLERANCE, code))
+    means = np.array([one.radiance.mean(axis=(0, 1)) for one in read]) / reference.mean(axis=(0, 1))
+    worst = np.abs(means.mean(axis=0) - 1.0).argmax()
+    off = f"{100.0 * (means.mean(axis=0)[worst] - 1.0):+.2f}"
+    if len(read) > 1:
+        off += f" ± {100.0 * means[:, worst].std(ddof=1) / len(read) ** 0.5:.2f}"
+    return reading.told(gated(request, read)), off
+
+
+def explained(name: str, scene: str, said: Words, pictures: Array) -> str:
+    """What is left beyond the formula: the root mean square, of that of the picture."""
+    formula = FORMULAS[name, scene](Scene.parse(json.dumps(said)))
+    shown = pictures.mean(axis=0)
+    left = float(np.sqrt(((shown - formula) ** 2).mean() / (shown**2).mean()))
+    ours = float(np.sqrt(((pictures - shown) ** 2).mean() / (shown**2).mean()))
+    noise = f", noise of one picture {100.0 * ours:.2f} %" if len(pictures) > 1 else ""
+    return f"{FORMULAS[name, scene].__name__}: {100.0 * left:.3f} % left{noise}"
 
 
 def main(*names: str) -> None:
     for one in names:
         name, _, python = one.partition("=")
-        for scene in SCENES:
+        for scene in (set(SCENES) & set(os.environ.get("ONLY", "").split(","))) or SCENES:
             said = described(name, scene)
             try:
                 pictures = drawn(name, said, python)
             except HasNoneError as error:
-                print(f"{name} | {scene} | none: {error}", flush=True)
+                print(json.dumps([name, scene, "none", str(error)]), flush=True)
                 continue
-            np.save(f"/tmp/rnd/{name}_{scene.replace(' ', '_')}.npy", pictures)
-            case = judged(name, said, pictures)
-            cause = "" if case.cause is None else case.cause.name
-            print(f"{name} | {scene} | {case.verdict} | {case.reason} | {cause}", flush=True)
+            if "KEEP" in os.environ:
+                np.save(f"/tmp/rnd/{name}_{scene.replace(' ', '_')}.npy", pictures)
+            case, off = judged(name, scene, said, pictures)
+            said_so = case.reason if case.verdict != "agree" else ""
+            if (name, scene) in FORMULAS:
+                said_so = f"{explained(name, scene, said, pictures)}; {said_so}"
+            print(json.dumps([name, scene, case.verdict, off, said_so]), flush=True)
 
 
 if __name__ == "__main__":

@@ -109,7 +109,20 @@ class Known:
 _QUARTER = 1.0 / (4.0 * math.pi)
 
 RENDERERS = {
-    "babylon": Known("Babylon.js", "9.35.0", None, (), Changes()),
+    "babylon": Known(
+        "Babylon.js",
+        "9.35.0",
+        None,
+        (
+            "pictures that are read back have the bottom row first",
+            "lights of a StandardMaterial do not fade with distance, and its values are shown as "
+            "they are, without an encoding; a PBRMaterial's are radiance, with directional lights "
+            "as ours",
+            "a StandardMaterial's highlights are Blinn's without the cosine",
+            "the angle of view is vertical",
+        ),
+        Changes(mirrored=True, lights={"directional": math.pi}),
+    ),
     "cycles": Known(
         "Cycles",
         "5.0.1",
@@ -180,6 +193,17 @@ RENDERERS = {
             lights={"point": math.pi, "directional": math.pi},
         ),
     ),
-    "three": Known("three.js", "0.187.0", None, (), Changes()),
+    "three": Known(
+        "three.js",
+        "0.187.0",
+        None,
+        (
+            "pictures that are read back have the bottom row first",
+            "highlights of MeshPhongMaterial are Blinn's times (n + 2) / (8π) and the cosine",
+            "a Reflector without a colour shows 0.42 of what it mirrors below 0.5, and "
+            "1.58 times as much less 0.58 above",
+            "the angle of view is vertical",
+        ),
+    ),
 }
 """By the name that `gate --from` takes; measured by `python docs/measure_conventions.py NAME`."""

@@ -5,6 +5,7 @@ with three or babylonjs by npm.  The gate's own browser answers the pages' reque
 """
 
 import json
+import math
 import os
 import shutil
 from collections.abc import Iterator, Sequence
@@ -73,6 +74,8 @@ def _plain(name: str, scene: Words) -> Words:
         if kind not in MATERIALS:
             raise HasNoneError(f"{name} traces no rays, which a {kind} takes")
         colours = {key: rgb(m[key]) for key in m.keys() - {"type", "exponent", "half_vector"}}
+        if kind == "phong":  # without 1/π, and these have matte colours with it
+            colours = {key: (math.pi * np.array(c)).tolist() for key, c in colours.items()}
         one: Words = {"kind": kind, "exponent": m.get("exponent"), **colours}
         one |= {key: shape[key] for key in ("center", "radius") if key in shape}
         if shape["type"] != "sphere":
@@ -133,7 +136,8 @@ for (const one of said.things) {
     shape = new THREE.SphereGeometry(one.radius, 256, 128);
     place.setPosition(vector(one.center));
   }
-  const size = { textureWidth: width, textureHeight: height, multisample: 0 };
+  // Finer than the picture: what it interpolates are parts of pixels.
+  const size = { textureWidth: 16 * width, textureHeight: 16 * height, multisample: 0 };
   const mesh = one.kind === "mirror" ? new Reflector(shape, size) : new THREE.Mesh(shape, looks[one.kind](one));
   mesh.applyMatrix4(place);
   mesh.castShadow = mesh.receiveShadow = true;
@@ -175,7 +179,7 @@ const camera = new B.TargetCamera("c", B.Vector3.Zero(), scene);
 camera.setTarget(new B.Vector3(0, 0, -1));
 camera.fov = said.fov * Math.PI / 180; camera.minZ = 0.1; camera.maxZ = 100;
 scene.clearColor = new B.Color4(0, 0, 0, 1);
-scene.imageProcessingConfiguration.applyByPostProcess = true; // radiance, and no curve
+
 const meshes = [], mirrors = [], blockers = [];
 for (const one of said.things) {
   // Lights fade with the square of the distance on this kind of material alone.
@@ -186,6 +190,8 @@ for (const one of said.things) {
     look.metallic = 0; look.roughness = 1; look.metallicF0Factor = 0; look.albedoColor = linear(one.reflectance);
     look.brdf.baseDiffuseModel = B.Constants.MATERIAL_DIFFUSE_MODEL_LAMBERT;
   }
+  // PBR's output is encoded for displays otherwise; the other's has no encoding, and would be decoded.
+  scene.imageProcessingConfiguration.applyByPostProcess = fades;
   look.diffuseColor = linear(one.diffuse ?? one.reflectance ?? [0, 0, 0]);
   look.specularColor = linear(one.specular ?? [0, 0, 0]);
   look.specularPower = one.exponent ?? 64;
@@ -199,7 +205,7 @@ for (const one of said.things) {
     data.normals = [n, n, n, n].flatMap((v) => [v.x, v.y, v.z]);
     data.applyToMesh(mesh);
     if (one.kind === "mirror") {
-      const mirror = new B.MirrorTexture("t", { width, height }, scene, false, B.Constants.TEXTURETYPE_FLOAT);
+      const mirror = new B.MirrorTexture("t", { width: 16 * width, height: 16 * height }, scene, false, B.Constants.TEXTURETYPE_FLOAT);
       mirror.mirrorPlane = B.Plane.FromPositionAndNormal(a, n.scale(-1));
       look.diffuseColor = B.Color3.Black();
       look.reflectionTexture = mirror;

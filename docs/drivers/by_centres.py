@@ -153,12 +153,11 @@ def radiance(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Iter
         f"{text(math.pi * np.array(rgb(m['diffuse'])) / (1.0 - rgb(m['specular'])[0]))} "
         f"{rgb(m['specular'])[0]} {m['exponent']}",
     }
-    # The function is multiplied by its share, which diffuse light lacks, and the cosine over π.
+    # The function is multiplied by its share, which diffuse light lacks, and the cosine.
     (folder / "phong.cal").write_text(
-        "phong(x,y,z) = if(N(x,y,z), 3.14159265358979*max(R(x,y,z), 0)^A5/N(x,y,z), 0);\n"
-        "N(x,y,z) = x*Nx + y*Ny + z*Nz;\n"
-        "R(x,y,z) = 2*N(x,y,z)*(-(Dx*Nx + Dy*Ny + Dz*Nz)) + x*Dx + y*Dy + z*Dz;\n"
-        "max(a,b) = if(a-b, a, b);\n",
+        "phong(x,y,z) = lobe(x*Nx + y*Ny + z*Nz, x*Dx + y*Dy + z*Dz);\n"
+        "lobe(c,d) = if(c, positive(d - 2*c*(Dx*Nx + Dy*Ny + Dz*Nz))^A5/c, 0);\n"
+        "positive(v) = if(v, v, 0);\n",
         encoding="utf-8",
     )
     said = ""

@@ -220,7 +220,7 @@ def raysect(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Itera
         UniformSurfaceEmitter,
     )
     from raysect.optical.observer import PinholeCamera, PowerPipeline2D
-    from raysect.primitive import Box, Mesh, Sphere
+    from raysect.primitive import Box, Sphere
 
     width, height, _, _ = size(scene)
 
@@ -244,7 +244,7 @@ def raysect(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Itera
             ConstantSF(m["eta"]), ConstantSF(m["k"]), m["alpha"]
         ),
     }
-    far = 1e3
+    far = 1e5
     disc = math.sin(math.radians(SUN / 2.0))
 
     def shown(channel: int) -> Array:
@@ -260,11 +260,9 @@ def raysect(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Itera
                 place = AffineMatrix3D(placed(shape).tolist())
                 one = Point3D(-1, -1, -1), Point3D(1, 1, 1)
                 kept.append(Box(*one, world, place, material))
-            else:
-                corners, faces, _ = mesh(shape)
-                kept.append(
-                    Mesh(corners, faces, smoothing=False, closed=False, parent=world, material=material)
-                )
+            else:  # thin, since meshes of float32 lose light by meeting themselves
+                place = AffineMatrix3D(placed(shape).tolist())
+                kept.append(Box(Point3D(-1, -1, -SMALL**2), Point3D(1, 1, 0), world, place, material))
         lamps: dict[str, Callable[[Words], Any]] = {
             "point": lambda l: Sphere(
                 SMALL,

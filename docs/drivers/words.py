@@ -15,7 +15,7 @@ Driver = Callable[[Words, Path, Sequence[int], int], Iterator[Array]]
 """From a scene, a folder, seeds and samples of a pixel to a picture (height, width, 3) for each
 seed, or one if there are no random numbers.  Raises HasNoneError."""
 
-SMALL, SUN = 1e-3, 0.05
+SMALL, SUN = 1e-3, 0.01
 """Radius of the balls that stand for points, and degrees across the disc that stands for parallel
 light, where a renderer has neither."""
 
