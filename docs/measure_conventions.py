@@ -14,6 +14,7 @@ import json
 import math
 import os
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +80,10 @@ def words(material: dict[str, Any], *shapes: dict[str, Any], **more: Any) -> dic
     }
 
 
-SHINING, GLASS = {"type": "emissive", "radiance": 1.0}, {"type": "dielectric", "interior_ior": INDEX}
+SHINING, GLASS = (
+    {"type": "emissive", "radiance": 1.0},
+    {"type": "dielectric", "interior_ior": INDEX},
+)
 MATTE = {"type": "diffuse", "reflectance": ALBEDO}
 BALL = words(SHINING, {"type": "sphere", "center": CENTRE, "radius": RADIUS})
 IN_GLASS = words(
@@ -106,10 +110,8 @@ def measured(name: str) -> dict[str, Any]:
     found["placed"] = placed(picture(name, BALL, 256), 1 if name in BY_CENTRES else 8)
     x = HALF * ((np.arange(N) + 0.5) / N * 2.0 - 1.0)
     cosines = (1.0 + x**2 + x[:, None] ** 2) ** -0.5 if found["placed"]["cosine"] else 1.0
-    try:
+    with suppress(HasNoneError):
         found["glass"] = float((picture(name, IN_GLASS, 256) / cosines).mean()) / DIM
-    except HasNoneError:
-        pass
     for kind, lamp in LAMPS.items():
         wall = words(
             MATTE,

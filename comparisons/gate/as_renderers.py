@@ -15,7 +15,6 @@ from comparisons.gate.conventions import RENDERERS, Changes
 from comparisons.gate.terms import picture_of
 from comparisons.gate.undone import Undo
 from comparisons.results.case import Case, Cause, FloatArray, Images
-from reference_rt.cameras.view_rectangle import CentralCamera
 from reference_rt.materials import Dielectric
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import UsageError
@@ -55,7 +54,8 @@ def as_renderers(
         return None
     left: list[tuple[float, Undo, list[str]]] = []
     kinds = set() if scene is None else {light.type for light in scene.lights}
-    for changes, whose in _all(kinds):
+    tall = scene is not None and scene.film.height > scene.film.width
+    for changes, whose in _all(kinds, tall):
         try:
             undo = Undo(changes, scene, scene is None)
         except UsageError:
@@ -83,9 +83,9 @@ def _squares(images: Images, picture: FloatArray) -> float:
     return float(((images.candidate - picture) ** 2).sum())
 
 
-def _all(kinds: Collection[str]) -> list[tuple[Changes, list[str]]]:
+def _all(kinds: Collection[str], tall: bool) -> list[tuple[Changes, list[str]]]:
     """Each convention, and those of a renderer together, with the renderers that have it, of a
-    scene with these types of lights."""
+    scene with these types of lights;  tall: whether its pictures' longer side is the height."""
     found: list[tuple[Changes, list[str]]] = []
     for renderer in RENDERERS.values():
         own = renderer.changes.seen(kinds)
@@ -93,6 +93,10 @@ def _all(kinds: Collection[str]) -> list[tuple[Changes, list[str]]]:
         every = [*renderer.picture.parts(), *alone, Changes(lights=own.lights), own]
         every += [one for one in renderer.also if one.lights.keys() <= set(kinds)]
         for changes in filter(None, every):
+            if changes.fov == "larger":
+                if not tall:
+                    continue
+                changes = replace(changes, fov="y")
             whose = next((names for other, names in found if other == changes), None)
             if whose is None:
                 found.append((changes, [renderer.whose]))
@@ -114,12 +118,6 @@ def _could_be(undo: Undo, images: Images) -> bool:
     """Whether the numbers of lights, if they are part of it, change the light of this scene by what
     the candidate's mean differs."""
     factors, scene = undo.changes.lights, undo.scene
-    if undo.changes.fov:
-        assert scene is not None and isinstance(scene.camera, CentralCamera)
-        size = scene.film.width, scene.film.height
-        described = undo.described()
-        assert described is not None and isinstance(described.camera, CentralCamera)
-        return described.camera.rectangle(*size) != scene.camera.rectangle(*size)
     if not factors or undo.changes.unfaded:
         return True
     assert scene is not None

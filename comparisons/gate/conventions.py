@@ -88,7 +88,6 @@ def _shared_exponent(p: FloatArray) -> FloatArray:
 
 
 CODES: dict[str, Callable[[FloatArray], FloatArray]] = {
-    "codes of 8 bits, cut off": lambda p: np.floor(255.0 * np.clip(p, 0.0, 1.0)) / 255.0,
     "an exponent for three channels, mantissas cut off": _shared_exponent,
     "mantissas of 8 bits over 255": lambda p: p * (256.0 / 255.0),
 }
@@ -235,7 +234,7 @@ RENDERERS = {
             down=0.5,
             lights={"point": math.pi, "directional": math.pi},
         ),
-        (UNFADED, Changes(codes="codes of 8 bits, cut off")),
+        (UNFADED,),
     ),
     "three": Known(
         "three.js",

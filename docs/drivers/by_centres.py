@@ -47,7 +47,9 @@ BACKGROUND 0 0 0
     for shape in scene["shapes"]:
         kind, m = look(scene, shape)
         ambient, shine, colour = words("tachyon", looks, kind)(m)
-        finish = f"TEXTURE AMBIENT {ambient} OPACITY 1.0 {shine} COLOR {text(rgb(colour))} TEXFUNC 0"
+        finish = (
+            f"TEXTURE AMBIENT {ambient} OPACITY 1.0 {shine} COLOR {text(rgb(colour))} TEXFUNC 0"
+        )
         if shape["type"] == "sphere":
             said += f"SPHERE CENTER {text(shape['center'])} RAD {shape['radius']} {finish}\n"
             continue
@@ -61,7 +63,8 @@ BACKGROUND 0 0 0
             f"LIGHT CENTER {text(l['position'])} RAD 0.0001 {fade} {text(rgb(l['intensity']))}\n"
         ),
         "directional": lambda l: (
-            f"DIRECTIONAL_LIGHT DIRECTION {text(l['direction'])} COLOR {text(rgb(l['irradiance']))}\n"
+            f"DIRECTIONAL_LIGHT DIRECTION {text(l['direction'])} "
+            f"COLOR {text(rgb(l['irradiance']))}\n"
         ),
     }
     if {"emissive", "diffuse"} <= {look(scene, shape)[0] for shape in scene["shapes"]}:
@@ -80,16 +83,24 @@ camera {{ perspective location 0 direction -z right x*{2 * x} up y*{2 * y} }}
 """
     none = "finish { ambient 0 diffuse 0"
     looks = {
-        "diffuse": lambda m: f"pigment {{ rgb {commas(rgb(m['reflectance']))} }} "
-        "finish { ambient 0 diffuse 1 }",
-        "emissive": lambda m: f"pigment {{ rgb {commas(rgb(m['radiance']))} }} {none} emission 1 }}",
-        "mirror": lambda m: f"pigment {{ rgb 0 }} {none} reflection "
-        f"{{ {commas(rgb(m['reflectance']))} }} }}",
-        "dielectric": lambda m: f"pigment {{ rgbt 1 }} {none} reflection {{ 0, 1 fresnel }} "
-        f"conserve_energy }} interior {{ ior {m['interior_ior']} }}",
-        "phong": lambda m: f"pigment {{ rgb {commas(math.pi * np.array(rgb(m['diffuse'])))} }} "
-        f"finish {{ ambient 0 diffuse 1 phong {math.pi * rgb(m['specular'])[0]} "
-        f"phong_size {m['exponent']} }}",
+        "diffuse": lambda m: (
+            f"pigment {{ rgb {commas(rgb(m['reflectance']))} }} finish {{ ambient 0 diffuse 1 }}"
+        ),
+        "emissive": lambda m: (
+            f"pigment {{ rgb {commas(rgb(m['radiance']))} }} {none} emission 1 }}"
+        ),
+        "mirror": lambda m: (
+            f"pigment {{ rgb 0 }} {none} reflection {{ {commas(rgb(m['reflectance']))} }} }}"
+        ),
+        "dielectric": lambda m: (
+            f"pigment {{ rgbt 1 }} {none} reflection {{ 0, 1 fresnel }} "
+            f"conserve_energy }} interior {{ ior {m['interior_ior']} }}"
+        ),
+        "phong": lambda m: (
+            f"pigment {{ rgb {commas(math.pi * np.array(rgb(m['diffuse'])))} }} "
+            f"finish {{ ambient 0 diffuse 1 phong {math.pi * rgb(m['specular'])[0]} "
+            f"phong_size {m['exponent']} }}"
+        ),
     }
     for shape in scene["shapes"]:
         kind, m = look(scene, shape)
@@ -105,10 +116,14 @@ camera {{ perspective location 0 direction -z right x*{2 * x} up y*{2 * y} }}
                 said += f"polygon {{ 5, {at} {finish} }}\n"
     fade = f"fade_distance {NEAR} fade_power 2"
     lamps = {
-        "point": lambda l: f"light_source {{ {commas(l['position'])} rgb "
-        f"{commas(np.array(rgb(l['intensity'])) / (2.0 * NEAR**2))} {fade} }}\n",
-        "directional": lambda l: f"light_source {{ {commas(-100.0 * np.array(l['direction']))} rgb "
-        f"{commas(rgb(l['irradiance']))} parallel point_at 0 }}\n",
+        "point": lambda l: (
+            f"light_source {{ {commas(l['position'])} rgb "
+            f"{commas(np.array(rgb(l['intensity'])) / (2.0 * NEAR**2))} {fade} }}\n"
+        ),
+        "directional": lambda l: (
+            f"light_source {{ {commas(-100.0 * np.array(l['direction']))} rgb "
+            f"{commas(rgb(l['irradiance']))} parallel point_at 0 }}\n"
+        ),
         "constant": lambda l: f"background {{ rgb {commas(rgb(l['radiance']))} }}\n",
     }
     said += "".join(words("POV-Ray", lamps, kind)(light) for kind, light in lights(scene))
@@ -127,8 +142,8 @@ POINTS = 16
 
 
 def _povray_area(shape: Words, material: Words, fade: str) -> str:
-    """A square lamp as POV-Ray has it: a grid of lights, whose strength for its first kernel of a
-    cosine, a spotlight of tightness 1 all around, is the lamp's intensity along its normal."""
+    """A lamp as POV-Ray has it: a grid of spotlights of tightness 1, a power of the cosine, as wide
+    as half of space, each at the middle of its part of the lamp."""
     a, b, _, d = quads(shape)[0]
     area = float(np.linalg.norm(np.cross(b - a, d - a)))
     normal, middle = np.cross(b - a, d - a) / area, (b + d) / 2.0
@@ -136,7 +151,8 @@ def _povray_area(shape: Words, material: Words, fade: str) -> str:
     sides = (1.0 - 1.0 / POINTS) * (b - a), (1.0 - 1.0 / POINTS) * (d - a)
     grid = f"area_light {commas(sides[0])}, {commas(sides[1])}, {POINTS}, {POINTS}"
     lobe = f"spotlight point_at {commas(middle + normal)} radius 89.99 falloff 90 tightness 1"
-    return f"light_source {{ {commas(middle)} rgb {strength} {fade} {lobe} {grid} area_illumination }}\n"
+    light = f"{commas(middle)} rgb {strength} {fade} {lobe} {grid} area_illumination"
+    return f"light_source {{ {light} }}\n"
 
 
 def radiance(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Iterator[Array]:
@@ -149,9 +165,11 @@ def radiance(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Iter
         "emissive": lambda m: f"light {{}} 0 0 3 {text(rgb(m['radiance']))}",
         "mirror": lambda m: f"metal {{}} 0 0 5 {text(rgb(m['reflectance']))} 1 0",
         "dielectric": lambda m: f"dielectric {{}} 0 0 5 1 1 1 {m['interior_ior']} 0",
-        "phong": lambda m: f"plasfunc {{}} 2 phong phong.cal 0 5 "
-        f"{text(math.pi * np.array(rgb(m['diffuse'])) / (1.0 - rgb(m['specular'])[0]))} "
-        f"{rgb(m['specular'])[0]} {m['exponent']}",
+        "phong": lambda m: (
+            f"plasfunc {{}} 2 phong phong.cal 0 5 "
+            f"{text(math.pi * np.array(rgb(m['diffuse'])) / (1.0 - rgb(m['specular'])[0]))} "
+            f"{rgb(m['specular'])[0]} {m['exponent']}"
+        ),
     }
     # The function is multiplied by its share, which diffuse light lacks, and the cosine.
     (folder / "phong.cal").write_text(
@@ -171,11 +189,17 @@ def radiance(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Iter
             said += f"m{k} polygon s{k}_{j} 0 0 12 {text(corners)}\n"
     disc = math.pi * math.sin(math.radians(SUN / 2.0)) ** 2
     lamps = {
-        "point": lambda l: f"void light l 0 0 3 {text(np.array(rgb(l['intensity'])) / math.pi / SMALL**2)}\n"
-        f"l sphere p 0 0 4 {text(l['position'])} {SMALL}\n",
-        "directional": lambda l: f"void light l 0 0 3 {text(np.array(rgb(l['irradiance'])) / disc)}\n"
-        f"l source p 0 0 4 {text(-np.array(l['direction']))} {SUN}\n",
-        "constant": lambda l: f"void glow k 0 0 4 {text(rgb(l['radiance']))} 0\nk source d 0 0 4 0 0 1 360\n",
+        "point": lambda l: (
+            f"void light l 0 0 3 {text(np.array(rgb(l['intensity'])) / math.pi / SMALL**2)}\n"
+            f"l sphere p 0 0 4 {text(l['position'])} {SMALL}\n"
+        ),
+        "directional": lambda l: (
+            f"void light l 0 0 3 {text(np.array(rgb(l['irradiance'])) / disc)}\n"
+            f"l source p 0 0 4 {text(-np.array(l['direction']))} {SUN}\n"
+        ),
+        "constant": lambda l: (
+            f"void glow k 0 0 4 {text(rgb(l['radiance']))} 0\nk source d 0 0 4 0 0 1 360\n"
+        ),
     }
     said += "".join(words("Radiance", lamps, kind)(light) for kind, light in lights(scene))
     (folder / "s.rad").write_text(said, encoding="utf-8")
@@ -183,6 +207,8 @@ def radiance(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Iter
     view = f"-vtv -vp 0 0 0 -vd 0 0 -1 -vu 0 1 0 -vh {angles[0]} -vv {angles[1]}"
     rays = f"{programs}/vwrays -ff -pa 0 -pj 0 {view} -x {width} -y {height}"
     exact = "-dj 0 -ds 0.02 -dt 0 -ab 0 -lr 100 -lw 1e-9"
-    steps = f"{programs}/oconv s.rad > s.oct; {rays} | {programs}/rtrace -fff -h {exact} s.oct > s.raw"
+    steps = (
+        f"{programs}/oconv s.rad > s.oct; {rays} | {programs}/rtrace -fff -h {exact} s.oct > s.raw"
+    )
     run("sh", "-c", steps, folder=folder)
     yield np.fromfile(folder / "s.raw", np.float32).reshape(height, width, 3).astype(float)

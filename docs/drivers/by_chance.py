@@ -63,7 +63,9 @@ scene.camera.cliphither = 0.001
         fields += [f"normals = {text(normals)}"] if normals is not None else []
         said += "".join(f"scene.shapes.s{k}.{line}\n" for line in fields)
         said += f"scene.objects.s{k}.shape = s{k}\nscene.objects.s{k}.material = m{k}\n"
-        said += "".join(f"scene.materials.m{k}.{line}\n" for line in words("LuxCore", looks, kind)(m))
+        said += "".join(
+            f"scene.materials.m{k}.{line}\n" for line in words("LuxCore", looks, kind)(m)
+        )
         if kind == "dielectric" and inside(scene):
             said += f"scene.volumes.v.type = clear\nscene.volumes.v.ior = {m['interior_ior']}\n"
             said += "scene.camera.volume = v\n"
@@ -87,7 +89,9 @@ scene.camera.cliphither = 0.001
     for k, (kind, light) in enumerate(lights(scene)):
         lines = words("LuxCore", lamps, kind)(light)
         said += "".join(f"scene.lights.l{k}.{line}\n" for line in lines)
-    depths = "".join(f"path.pathdepth.{k} = 30\n" for k in ("total", "diffuse", "specular", "glossy"))
+    depths = "".join(
+        f"path.pathdepth.{k} = 30\n" for k in ("total", "diffuse", "specular", "glossy")
+    )
     for seed in seeds:
         described, given, config = (
             pyluxcore.Scene(),
@@ -99,7 +103,8 @@ scene.camera.cliphither = 0.001
         config.SetFromString(
             f"renderengine.type = PATHCPU\nsampler.type = SOBOL\nrenderengine.seed = {seed}\n"
             f"film.width = {width}\nfilm.height = {height}\nfilm.filter.type = NONE\n"
-            f"path.russianroulette.depth = 1000\nbatch.haltspp = {spp}\npath.clamping.variance.maxvalue = 0\n"
+            f"path.russianroulette.depth = 1000\nbatch.haltspp = {spp}\n"
+            f"path.clamping.variance.maxvalue = 0\n"
             f"film.outputs.1.type = RGB\nfilm.outputs.1.filename = s.exr\n{depths}"
         )
         session = pyluxcore.RenderSession(pyluxcore.RenderConfig(config, described))
@@ -220,7 +225,7 @@ def raysect(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Itera
         UniformSurfaceEmitter,
     )
     from raysect.optical.observer import PinholeCamera, PowerPipeline2D
-    from raysect.primitive import Box, Sphere
+    from raysect.primitive import Box, Mesh, Sphere
 
     width, height, _, _ = size(scene)
 
@@ -253,16 +258,18 @@ def raysect(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Itera
             kind, m = look(scene, shape)
             material = words("raysect", looks, kind)(m, channel)
             if shape["type"] == "sphere":
-                kept.append(
-                    Sphere(shape["radius"], world, translate(*shape["center"]), material)
-                )
+                kept.append(Sphere(shape["radius"], world, translate(*shape["center"]), material))
             elif shape["type"] == "box":
                 place = AffineMatrix3D(placed(shape).tolist())
                 one = Point3D(-1, -1, -1), Point3D(1, 1, 1)
                 kept.append(Box(*one, world, place, material))
-            else:  # thin, since meshes of float32 lose light by meeting themselves
+            elif kind == "emissive":
+                corners, faces, _ = mesh(shape)
+                flat = {"smoothing": False, "closed": False, "parent": world}
+                kept.append(Mesh(corners, faces, material=material, **flat))
+            else:  # a box, since what meshes of float32 scatter meets them again
                 place = AffineMatrix3D(placed(shape).tolist())
-                kept.append(Box(Point3D(-1, -1, -SMALL**2), Point3D(1, 1, 0), world, place, material))
+                kept.append(Box(Point3D(-1, -1, -0.1), Point3D(1, 1, 0), world, place, material))
         lamps: dict[str, Callable[[Words], Any]] = {
             "point": lambda l: Sphere(
                 SMALL,
@@ -276,9 +283,7 @@ def raysect(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Itera
                 translate(*(-far * np.array(l["direction"])).tolist()),
                 emitter(rgb(l["irradiance"])[channel] / math.pi / disc**2),
             ),
-            "constant": lambda l: Sphere(
-                far, world, material=emitter(rgb(l["radiance"])[channel])
-            ),
+            "constant": lambda l: Sphere(far, world, material=emitter(rgb(l["radiance"])[channel])),
         }
         kept += [words("raysect", lamps, kind)(light) for kind, light in lights(scene)]
         pipeline = PowerPipeline2D(display_progress=False, accumulate=False)
@@ -320,7 +325,11 @@ def mitsuba(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Itera
             "material": "none",
             "specular_reflectance": even(m["reflectance"]),
         },
-        "dielectric": lambda m: {"type": "dielectric", "int_ior": m["interior_ior"], "ext_ior": 1.0},
+        "dielectric": lambda m: {
+            "type": "dielectric",
+            "int_ior": m["interior_ior"],
+            "ext_ior": 1.0,
+        },
         "rough_conductor": lambda m: {
             "type": "roughconductor",
             "distribution": "ggx",

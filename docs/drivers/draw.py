@@ -39,7 +39,7 @@ def drawn_by(name: str, scene: Words, seeds: Sequence[int] = (1,), spp: int = 64
 
 if __name__ == "__main__":
     name, scene_file, out, seeds, spp = sys.argv[1:]
-    out = os.path.abspath(out)
+    out = str(Path(out).absolute())
     described = json.loads(Path(scene_file).read_text(encoding="utf-8"))
     try:
         np.save(out, drawn_by(name, described, [int(k) for k in seeds.split(",")], int(spp)))

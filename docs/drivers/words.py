@@ -77,7 +77,7 @@ def mesh(shape: Words, n: int = 128) -> tuple[Array, Array, Array | None]:
     if shape["type"] != "sphere":
         corners = quads(shape)
         first = 4 * np.arange(len(corners))[:, None]
-        both = [first + [0, 1, 2], first + [0, 2, 3]]
+        both = [first + np.array(ends) for ends in ((0, 1, 2), (0, 2, 3))]
         return corners.reshape(-1, 3), np.concatenate(both), None
     theta, phi = np.linspace(0.0, math.pi, n + 1), np.arange(2 * n) * math.pi / n
     t, p = np.meshgrid(theta, phi, indexing="ij")
