@@ -1,7 +1,7 @@
 """three.js and Babylon.js: pages in headless Chromium.
 
-It needs Chromium, Playwright, and a folder of packages with three or babylonjs by npm: NODE_MODULES,
-else examples/three/node_modules.  The gate's own browser answers the pages' requests.
+It needs Chromium, Playwright, and a folder of packages with three or babylonjs by npm:
+NODE_MODULES, else examples/three/node_modules.  The gate's own browser answers the pages' requests.
 """
 
 import json

@@ -190,7 +190,7 @@ def test_pictures_with_noise() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("luxrender", "there is no luxrender; expected one of cycles"),
+        ("luxrender", "there is no luxrender; expected one of babylon"),
         ("luxcore:units", "there is no luxcore:units"),
         ("raysect:numbers", "numbers of these lights mean what ours do"),
     ],

@@ -171,6 +171,7 @@ BY_DIAGNOSIS = {
 }
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("which", BY_DIAGNOSIS)
 def test_those_of_no_renderer_alone_are_named_by_what_they_are(which: str) -> None:
     change, words = BY_DIAGNOSIS[which]
@@ -218,6 +219,7 @@ def test_there_are_thirty() -> None:
     assert len(LEFT_IN) + len(BY_DIAGNOSIS) + 3 >= 30
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("which", LEFT_IN)
 def test_each_is_named(which: str) -> None:
     changes, whose = LEFT_IN[which]
