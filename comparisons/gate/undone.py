@@ -56,7 +56,7 @@ class Undo:
             raise UsageError("--from: the view of this camera cannot be moved by pixels")
         if changes.cosine and not central:
             raise UsageError("--from: the rays of this camera have no cosine to its view")
-        if changes.fov and not (central and camera.fov_axis in (None, "x") and not camera.view):
+        if changes.fov and not (isinstance(camera, CentralCamera) and _is_across(camera)):
             raise UsageError("--from: the view of this camera is not that of an angle across")
         if changes.unfaded and not (self.scene is not None and _one_point(self.scene)):
             raise UsageError("--from: light falls with the distance from more than one point")
@@ -138,6 +138,10 @@ def cosines(scene: Scene, shape: tuple[int, ...]) -> FloatArray:
     x = l + (r - l) * (np.arange(width) + 0.5) / width
     y = t - (t - b) * (np.arange(height) + 0.5) / height
     return np.asarray(1.0 / np.sqrt(1.0 + x**2 + y[:, None] ** 2))
+
+
+def _is_across(camera: CentralCamera) -> bool:
+    return camera.view is None and camera.fov_axis in (None, "x")
 
 
 def squared_distances(scene: Scene) -> FloatArray:
