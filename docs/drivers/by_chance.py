@@ -268,8 +268,11 @@ def raysect(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Itera
                 flat = {"smoothing": False, "closed": False, "parent": world}
                 kept.append(Mesh(corners, faces, material=material, **flat))
             else:  # a box, since what meshes of float32 scatter meets them again
-                place = AffineMatrix3D(placed(shape).tolist())
-                kept.append(Box(Point3D(-1, -1, -0.1), Point3D(1, 1, 0), world, place, material))
+                # Its maps have to keep lengths: cosines are those of directions that they change.
+                matrix = placed(shape)
+                x, y, z = np.linalg.norm(matrix[:3, :3], axis=0)
+                place = AffineMatrix3D((matrix / [x, y, z, 1.0]).tolist())
+                kept.append(Box(Point3D(-x, -y, -0.1), Point3D(x, y, 0), world, place, material))
         lamps: dict[str, Callable[[Words], Any]] = {
             "point": lambda l: Sphere(
                 SMALL,
