@@ -1,4 +1,4 @@
-"""Draws a small scene by another renderer: what the two `measure_` scripts of renderers share.
+"""Draws a small scene by another renderer: what both measurements of renderers share.
 
 `python docs/drivers/draw.py NAME scene.json out.npy SEEDS SPP` writes (seeds, height, width, 3)
 as the renderer gives it, unturned.  The scene is one of ours, of few words: a camera at the origin
