@@ -153,9 +153,9 @@ def gate(
         typer.Option(
             "--from",
             metavar="NAME[:numbers]",
-            help="Read the candidates as this renderer means them, its conventions undone: cycles, "
-            "luxcore, mitsuba, povray, radiance, raysect or tachyon; with :numbers also what its "
-            "numbers of lights mean.",
+            help="Read the candidates as this renderer means them, its conventions undone: "
+            "babylon, cycles, luxcore, mitsuba, povray, radiance, raysect, tachyon or three; with "
+            ":numbers also what its numbers of lights mean.",
         ),
     ] = "",
     witness: Witness = None,

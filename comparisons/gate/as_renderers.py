@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Collection
 from dataclasses import replace
 
+import numpy as np
 from scipy import ndimage
 
 from comparisons.gate.conventions import RENDERERS, Changes
@@ -25,6 +26,11 @@ saves rendering, and the gate judges afterwards. A shift of the picture changes 
 WORTH, RIVAL = 0.7, 2.0
 """Most of the squared difference that predictions leave which are judged, and how many times what
 the best one leaves: where they are interpolated, edges leave some."""
+
+
+SINGLE, TINY, ALIKE = 1e-5, 1e-9, 0.99
+"""Relative difference of a value that is rounded to float32 on the way, and the least share of
+values that have no other: of a hundred, one may be rounded to the next code."""
 
 
 def as_renderers(
@@ -48,7 +54,8 @@ def as_renderers(
         return None
     left: list[tuple[float, Undo, list[str]]] = []
     kinds = set() if scene is None else {light.type for light in scene.lights}
-    for changes, whose in _all(kinds):
+    tall = scene is not None and scene.film.height > scene.film.width
+    for changes, whose in _all(kinds, tall):
         try:
             undo = Undo(changes, scene, scene is None)
         except UsageError:
@@ -58,7 +65,9 @@ def as_renderers(
         left.append((_squares(images, _predicted(undo, images, threads)), undo, whose))
     best = min((squares for squares, _, _ in left), default=total)
     for squares, undo, whose in sorted(left, key=lambda one: one[0]):
-        if squares <= min(WORTH * total, RIVAL * best) and judged(undo).verdict == "agree":
+        if squares > min(WORTH * total, RIVAL * best):
+            continue
+        if _same(images, undo, threads) if _is_final(undo) else judged(undo).verdict == "agree":
             name = f"{', '.join(undo.changes.words())}, as {' and '.join(whose)}"
             numbers = ":numbers" if undo.changes.lights else ""
             option = " or ".join(f"--from {n}{numbers}" for n in _options(undo.changes, kinds))
@@ -74,15 +83,20 @@ def _squares(images: Images, picture: FloatArray) -> float:
     return float(((images.candidate - picture) ** 2).sum())
 
 
-def _all(kinds: Collection[str]) -> list[tuple[Changes, list[str]]]:
+def _all(kinds: Collection[str], tall: bool) -> list[tuple[Changes, list[str]]]:
     """Each convention, and those of a renderer together, with the renderers that have it, of a
-    scene with these types of lights."""
+    scene with these types of lights;  tall: whether its pictures' longer side is the height."""
     found: list[tuple[Changes, list[str]]] = []
     for renderer in RENDERERS.values():
         own = renderer.changes.seen(kinds)
         alone = [Changes(lights={kind: value}) for kind, value in own.lights.items()]
         every = [*renderer.picture.parts(), *alone, Changes(lights=own.lights), own]
+        every += [one for one in renderer.also if one.lights.keys() <= set(kinds)]
         for changes in filter(None, every):
+            if changes.fov == "larger":
+                if not tall:
+                    continue
+                changes = replace(changes, fov="y")
             whose = next((names for other, names in found if other == changes), None)
             if whose is None:
                 found.append((changes, [renderer.whose]))
@@ -103,11 +117,11 @@ def _options(changes: Changes, kinds: Collection[str]) -> list[str]:
 def _could_be(undo: Undo, images: Images) -> bool:
     """Whether the numbers of lights, if they are part of it, change the light of this scene by what
     the candidate's mean differs."""
-    factors = undo.changes.lights
-    if not factors:
+    factors, scene = undo.changes.lights, undo.scene
+    if not factors or undo.changes.unfaded:
         return True
-    assert undo.scene is not None
-    values = [factors.get(light.type, 1.0) for light in undo.scene.lights]
+    assert scene is not None
+    values = [factors.get(light.type, 1.0) for light in scene.lights]
     means = images.reference.mean()
     if not means > 0.0:
         return False
@@ -120,12 +134,25 @@ def _predicted(undo: Undo, images: Images, threads: int | None) -> FloatArray:
     where it is moved."""
     changes = undo.changes
     picture = images.reference
-    if changes.lights:
-        described = replace(undo, changes=Changes(lights=changes.lights)).described()
+    if changes.lights or changes.fov:
+        there = Changes(lights=changes.lights, fov=changes.fov)
+        described = replace(undo, changes=there).described()
         assert described is not None
         picture = picture_of(described, 0, threads)
     by = (changes.down, changes.right, 0.0)
     return undo.applied(ndimage.shift(picture, by, order=1, mode="nearest") if any(by) else picture)
+
+
+def _is_final(undo: Undo) -> bool:
+    """Whether what happened cannot be undone: our picture has to become the candidate."""
+    return bool(undo.changes.codes or undo.changes.unfaded)
+
+
+def _same(images: Images, undo: Undo, threads: int | None) -> bool:
+    """Whether the candidate is what our picture becomes."""
+    predicted = _predicted(undo, images, threads)
+    near = np.abs(images.candidate - predicted) <= SINGLE * np.abs(predicted) + TINY
+    return bool(near.mean() >= ALIKE) and images.error is None
 
 
 def _of_glass(images: Images, scene: Scene, scaled: Callable[[float], Case]) -> Cause | None:

@@ -6,8 +6,13 @@ the numbers were copied as they stand.
 """
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, fields, replace
+from typing import Literal
+
+import numpy as np
+
+from comparisons.results.case import FloatArray
 
 LIGHTS = {
     "point": "intensity",
@@ -25,7 +30,9 @@ class Changes:
     mirrored, upside_down: it was turned so, before anything else is measured;  right, down: pixels
     by which what it shows lies further right and down, once it is turned back;  cosine: its values
     are multiplied by the cosine between the pixel's ray and the direction of view;  lights: by
-    type, how many times as bright as ours with the same number.
+    type, how many times as bright as ours with the same number;  fov: the side that the number of
+    the angle of view spans, if that is not the width;  unfaded: light of a point does not fall with
+    the square of the distance;  codes: one of CODES, "" for none.
     """
 
     mirrored: bool = False
@@ -34,6 +41,9 @@ class Changes:
     down: float = 0.0
     cosine: bool = False
     lights: dict[str, float] = field(default_factory=dict)
+    fov: Literal["", "larger", "y"] = ""
+    unfaded: bool = False
+    codes: str = ""
 
     def __bool__(self) -> bool:
         return self != Changes()
@@ -64,7 +74,24 @@ class Changes:
             f"numbers of {type_} lights {_times(factor)} as bright"
             for type_, factor in sorted(self.lights.items())
         ]
+        sides = {"larger": "longer side", "y": "height"}
+        said += [f"the angle of view spans the {sides[self.fov]}"] if self.fov else []
+        said += ["lights of points do not fade with distance"] if self.unfaded else []
+        said += [self.codes] if self.codes else []
         return tuple(said)
+
+
+def _shared_exponent(p: FloatArray) -> FloatArray:
+    """Mantissas of 8 bits below the exponent of the largest channel, cut off."""
+    step = np.exp2(np.frexp(p.max(axis=-1, keepdims=True))[1] - 8.0)
+    return np.asarray(np.floor(p / step) * step)
+
+
+CODES: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "an exponent for three channels, mantissas cut off": _shared_exponent,
+    "mantissas of 8 bits over 255": lambda p: p * (256.0 / 255.0),
+}
+"""What files, or those who read them, make of values (height, width, 3)."""
 
 
 _NAMED = {0.5: "half a pixel", 0.25: "a quarter of a pixel", 1.0: "one pixel"}
@@ -86,7 +113,8 @@ class Known:
 
     title: its name;  version: which was measured;  glass: whether radiance in glass is divided by
     the square of the index, None: unknown;  said: what a picture has besides that cannot be undone;
-    changes: of its pictures, and of numbers of lights.
+    changes: of its pictures, and of numbers of lights;  also: others, of its defaults, files or
+    memory, which are named where they are left in, and not undone by `--from`.
     """
 
     title: str
@@ -94,6 +122,7 @@ class Known:
     glass: bool | None
     said: tuple[str, ...]
     changes: Changes = Changes()
+    also: tuple[Changes, ...] = ()
 
     @property
     def whose(self) -> str:
@@ -107,8 +136,26 @@ class Known:
 
 
 _QUARTER = 1.0 / (4.0 * math.pi)
+BOTTOM_FIRST = Changes(upside_down=True)
+LONGER, TALL = Changes(fov="larger"), Changes(fov="y")
+UNFADED = Changes(lights={"point": math.pi}, unfaded=True)
 
 RENDERERS = {
+    "babylon": Known(
+        "Babylon.js",
+        "9.35.0",
+        None,
+        (
+            "pictures that are read back have the bottom row first",
+            "lights of a StandardMaterial do not fade with distance, and its values are shown as "
+            "they are, without an encoding; a PBRMaterial's are radiance, with directional lights "
+            "as ours",
+            "a StandardMaterial's highlights are Blinn's without the cosine",
+            "the angle of view is vertical",
+        ),
+        Changes(mirrored=True, lights={"directional": math.pi}),
+        (BOTTOM_FIRST, TALL, UNFADED),
+    ),
     "cycles": Known(
         "Cycles",
         "5.0.1",
@@ -119,13 +166,15 @@ RENDERERS = {
             "the angle of view spans the longer side",
         ),
         Changes(lights={"point": _QUARTER, "spot": _QUARTER}),
+        (LONGER,),
     ),
     "luxcore": Known(
         "LuxCore",
         "2.11.2",
         True,
-        ("the angle of view spans the longer side",),
+        ("the angle of view spans the longer side", "memory has the bottom row first"),
         Changes(down=1.0, lights={"point": _QUARTER}),
+        (BOTTOM_FIRST, LONGER),
     ),
     "mitsuba": Known(
         "Mitsuba",
@@ -142,10 +191,16 @@ RENDERERS = {
         False,
         (
             "its light sources do not fade with distance unless they are told to, and then as "
-            "2 / (1 + (distance / fade_distance)^fade_power)",
+            "2 / (1 + (distance / fade_distance)^fade_power): a point's number is that of a light "
+            "that fades so beyond a small fade_distance, whose square over 2 it is divided by",
             "a camera whose `right` is positive mirrors right-handed scenes",
         ),
-        Changes(lights={"directional": math.pi}),
+        Changes(lights={"point": math.pi, "directional": math.pi}),
+        (
+            UNFADED,
+            Changes(mirrored=True),
+            Changes(codes="an exponent for three channels, mantissas cut off"),
+        ),
     ),
     "radiance": Known(
         "Radiance",
@@ -162,6 +217,7 @@ RENDERERS = {
         False,
         ("frames are indexed by column and row", "the angle of view spans the longer side"),
         Changes(cosine=True),
+        (LONGER,),
     ),
     "tachyon": Known(
         "tachyon",
@@ -172,7 +228,26 @@ RENDERERS = {
             "its point lights are seen as balls, and do not fade with distance without ATTENUATION",
             "highlights are Blinn's, with the exponent of Phong's, without -shade_phong",
         ),
-        Changes(mirrored=True, right=0.5, down=0.5, lights={"directional": math.pi}),
+        Changes(
+            mirrored=True,
+            right=0.5,
+            down=0.5,
+            lights={"point": math.pi, "directional": math.pi},
+        ),
+        (UNFADED,),
+    ),
+    "three": Known(
+        "three.js",
+        "0.187.0",
+        None,
+        (
+            "pictures that are read back have the bottom row first",
+            "highlights of MeshPhongMaterial are Blinn's times (n + 2) / (8π) and the cosine",
+            "a Reflector without a colour shows 0.42 of what it mirrors below 0.5, and "
+            "1.58 times as much less 0.58 above",
+            "the angle of view is vertical",
+        ),
+        also=(BOTTOM_FIRST, TALL, Changes(codes="mantissas of 8 bits over 255")),
     ),
 }
 """By the name that `gate --from` takes; measured by `python docs/measure_conventions.py NAME`."""

@@ -11,13 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.gate.conventions import LIGHTS, RENDERERS, Changes, Known
+from comparisons.gate.conventions import CODES, LIGHTS, RENDERERS, Changes, Known
 from comparisons.gate.pictures_in import Picture
 from comparisons.results.case import Case, FloatArray
 from comparisons.results.headline import UP_TO
 from reference_rt.cameras import Orthographic
 from reference_rt.cameras.view_rectangle import CentralCamera
+from reference_rt.integrators import Direct
+from reference_rt.lights import Point
+from reference_rt.materials import Emissive
 from reference_rt.rendering.scene import Scene
+from reference_rt.sampling import Grid
 from reference_rt.util.errors import UsageError
 
 NUMBERS = "numbers"
@@ -52,6 +56,10 @@ class Undo:
             raise UsageError("--from: the view of this camera cannot be moved by pixels")
         if changes.cosine and not central:
             raise UsageError("--from: the rays of this camera have no cosine to its view")
+        if changes.fov and not (isinstance(camera, CentralCamera) and _is_across(camera)):
+            raise UsageError("--from: the view of this camera is not that of an angle across")
+        if changes.unfaded and not (self.scene is not None and _one_point(self.scene)):
+            raise UsageError("--from: light falls with the distance from more than one point")
 
     def described(self) -> Scene | None:
         """The scene whose right picture is the one that is read."""
@@ -60,6 +68,8 @@ class Undo:
             return None
         if changes.lights:
             scene = scene.changed(lights=[_scaled(light, changes.lights) for light in scene.lights])
+        if changes.fov:
+            scene = scene.changed(camera=scene.camera.model_copy(update={"fov_axis": changes.fov}))
         if self.of_files or not (changes.right or changes.down):
             return scene
         width, height = scene.film.width, scene.film.height
@@ -105,10 +115,16 @@ class Undo:
         return found
 
     def applied(self, picture: FloatArray) -> FloatArray:
-        """What happens to a right picture (height, width, 3) of `described`: the inverse."""
+        """What happens to a right picture (height, width, 3) of `described`: the inverse, where
+        there is one."""
+        if self.changes.unfaded:
+            assert self.scene is not None
+            picture = picture * squared_distances(self.scene)[..., None]
         if self.changes.cosine:
             assert self.scene is not None
             picture = picture * cosines(self.scene, picture.shape[:2])[..., None]
+        if self.changes.codes:
+            picture = CODES[self.changes.codes](picture)
         picture = picture[::-1] if self.changes.upside_down else picture
         return np.asarray(picture[:, ::-1] if self.changes.mirrored else picture)
 
@@ -122,6 +138,32 @@ def cosines(scene: Scene, shape: tuple[int, ...]) -> FloatArray:
     x = l + (r - l) * (np.arange(width) + 0.5) / width
     y = t - (t - b) * (np.arange(height) + 0.5) / height
     return np.asarray(1.0 / np.sqrt(1.0 + x**2 + y[:, None] ** 2))
+
+
+def _is_across(camera: CentralCamera) -> bool:
+    return camera.view is None and camera.fov_axis in (None, "x")
+
+
+def squared_distances(scene: Scene) -> FloatArray:
+    """(height, width): of the point light from what the pixels' centres show, 1 for nothing."""
+    o, d, *_ = scene.camera_rays()
+    hits = scene.intersect(o, d)
+    t = np.where(hits.shape >= 0, hits.t, 0.0)
+    (light,) = scene.lights
+    assert isinstance(light, Point)
+    squares = ((o + t[..., None] * d - np.array(light.position)) ** 2).sum(axis=-1)
+    return np.where(hits.shape >= 0, squares, 1.0)
+
+
+def _one_point(scene: Scene) -> bool:
+    """Whether all light comes from one point to what pixels' centres show, and no further."""
+    one = [light.type for light in scene.lights] == ["point"] and not _shines(scene)
+    centres = isinstance(scene.sampler, Grid) and scene.sampler.spp == 1
+    return one and centres and isinstance(scene.integrator, Direct)
+
+
+def _shines(scene: Scene) -> bool:
+    return any(isinstance(material, Emissive) for material in scene.materials.values())
 
 
 def _of(picture: Picture, change: Callable[[FloatArray], FloatArray]) -> Picture:
