@@ -16,6 +16,7 @@ from comparisons.compare.derivative import derivative_case
 from comparisons.compare.judge import Evidence, Rendered, at_look, check, judge
 from comparisons.compare.path_length import path_lengths
 from comparisons.compare.single_lights import single_lights
+from comparisons.compare.watched import Say
 from comparisons.geometry.flatten import copies_of
 from comparisons.integrators.mistakes import in_place_of
 from comparisons.mitsuba.backend import scalar
@@ -43,9 +44,6 @@ __all__ = ["Evidence", "Say", "Subject", "budgeted", "compare_scene", "gather"]
 _NO_LIGHT = "ray casting shows surfaces, not light"
 
 _MEDIA = "path tracing alone follows light through media, and what is no surface"
-
-Say = Callable[[str], None]
-"""Called with a line of text about each step."""
 
 
 @dataclass(frozen=True)
@@ -333,7 +331,7 @@ def _pictures(
     enough = max(first, budget.most_first or 0)  # to show a difference, and its cause
     most = looks.most_kept(first, numbers)
     of_both = pictures.Replicates(
-        scene, tables, counterpart, budget, threads, enough if decided else most
+        scene, tables, counterpart, budget, threads, enough if decided else most, say
     )
     if budget.seconds is None or decided:
         of_both.grow(enough)

@@ -8,6 +8,7 @@ import numpy as np
 from comparisons.compare.budget import Budget
 from comparisons.compare.judge import Rendered, of_replicates
 from comparisons.compare.looks import Pool, mean_picture
+from comparisons.compare.watched import Say, Watched
 from comparisons.mitsuba import scene as mitsuba_scene
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.referee.sizes import ShapeSizes
@@ -125,9 +126,12 @@ class Replicates:
         budget: Budget,
         threads: int | None,
         most: int,
+        say: Say,
     ) -> None:
         """budget: has Mitsuba's samples and their sampler, which `counterpart` has, too;  threads:
-        ours;  most: see `comparisons.compare.looks.Pool`."""
+        ours;  most: see `comparisons.compare.looks.Pool`;  say: is shown the pictures as they grow
+        if it is `Watched`."""
+        self._watch = say.pictures if isinstance(say, Watched) else None
         self._scene, self._tables, self._counterpart = scene, tables, counterpart
         self._threads, self._sampler = threads, scene.resolved_sampler
         self._reference_spp = budget.reference_spp or self._sampler.spp
@@ -142,13 +146,6 @@ class Replicates:
         ours, theirs = self._sides
         made = len(ours)
         seed = getattr(self._sampler, "seed", 0)
-        for k in range(made, count):
-            seeded = self._scene.changed(
-                sampler=self._sampler.model_copy(update={"seed": seed + k})
-            )
-            picture = render(seeded, tables=self._tables, threads=self._threads)
-            ours.add(picture.colour)
-            self._times.append(picture.seconds)
         for begun in range(made, count, _BATCH):
             rendered = mitsuba_scene.render(
                 self._counterpart.mi_scene,
@@ -160,8 +157,21 @@ class Replicates:
             )
             for other in rendered.pictures:
                 theirs.add(other)
+            self._grown()
             self._mitsuba_times += rendered.seconds.tolist()
             self._taken = rendered.spp
+        for k in range(made, count):
+            seeded = self._scene.changed(
+                sampler=self._sampler.model_copy(update={"seed": seed + k})
+            )
+            picture = render(seeded, tables=self._tables, threads=self._threads)
+            ours.add(picture.colour)
+            self._times.append(picture.seconds)
+            self._grown()
+
+    def _grown(self) -> None:
+        if self._watch is not None:
+            self._watch(*(side.pictures() for side in self._sides))
 
     @property
     def count(self) -> int:

@@ -10,6 +10,7 @@ Each line of its standard input is a JSON object, a request; each line of its st
 is a message about it:
 
     {"say": text}          any number of times, what is being done
+    {"show": text}         any number of times, pictures of it in blocks, for a terminal
     {"done": true}         what was asked for is where it was to be put
     {"failed": text}       it could not be made, and why
     {"invalid": text}      the same, because a scene, or a file that it names, is invalid
@@ -146,7 +147,8 @@ class Children:
 
         module: see `run`; or a command, which begins with the absolute path of a program that
         keeps to the protocol;  folder: where the child starts, if there is such a folder;
-        seconds: its time limit;  say: called with what is being done for it, "" when it begins.
+        seconds: its time limit;  say: called with what is being done for it, "" when it begins;
+        with `Shown` for its pictures so far.
         Raises ReferenceUnavailableError.
         """
         child = self._take(module, folder)
@@ -189,6 +191,10 @@ class Children:
         return child
 
 
+class Shown(str):
+    """What is being done, as pictures in blocks that stand above a terminal's bar."""
+
+
 class _Child:
     """A process that carries out one request at a time."""
 
@@ -226,6 +232,9 @@ class _Child:
             message = self._next(deadline)
             if message is not None and "say" in message:
                 say(str(message["say"]))
+                continue
+            if message is not None and "show" in message:
+                say(Shown(message["show"]))
                 continue
             break
         if message is None:

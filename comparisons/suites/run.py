@@ -37,7 +37,7 @@ from comparisons.results.stored_case import (
 )
 from comparisons.runs import engine
 from comparisons.runs.engine import Count
-from comparisons.runs.processes import Children, Ended
+from comparisons.runs.processes import Children, Ended, Shown
 from comparisons.runs.provenance import provenance
 from comparisons.suites import worker_command
 from comparisons.suites.keys import case_key
@@ -70,7 +70,10 @@ class Display(Count):
         self._running: dict[str, str] = {}
 
     def doing(self, request: Request, step: str) -> None:
-        """A case has begun (step ""), or has reached `step`."""
+        """A case has begun (step ""), or has reached `step`, or has such pictures."""
+        if isinstance(step, Shown):
+            self.show(step)
+            return
         self._running[request.name] = step
         if self._steps and step:
             self.line(f"{request.name}: {step}")
@@ -79,6 +82,7 @@ class Display(Count):
     def done(self, case: Case, remark: str) -> None:
         """A case has ended."""
         self._running.pop(case.scene, None)
+        self.show("")
         for note in case.notes:
             if note.startswith(WARNING):
                 self.line(note)
@@ -327,7 +331,8 @@ def run_cases(
         try:
             requests: list[Request] = []
             for work in plan.work:
-                request, done = _begun(work, options, chosen)
+                is_watched = options.steps and display.is_terminal
+                request, done = _begun(work, options, chosen, is_watched)
                 delete_unfinished(request.folder)
                 if done is None:
                     requests.append(request)
@@ -361,7 +366,9 @@ class _Done(NamedTuple):
     remark: str
 
 
-def _begun(work: Work, options: Options, chosen: Backend) -> tuple[Request, _Done | None]:
+def _begun(
+    work: Work, options: Options, chosen: Backend, is_watched: bool
+) -> tuple[Request, _Done | None]:
     """The request for a case, and the case itself if its scene is invalid or it is stored."""
     request = Request(
         name=work.name,
@@ -371,6 +378,7 @@ def _begun(work: Work, options: Options, chosen: Backend) -> tuple[Request, _Don
         rungs=options.rungs,
         folder=options.out / "cases" / folder_name(work.name),
         again=work.again,
+        is_watched=is_watched,
     )
     try:
         if isinstance(work.scene, SceneError):

@@ -21,6 +21,7 @@ from typing import ClassVar, TextIO
 from pydantic import BaseModel, ConfigDict
 
 from comparisons.compare.budget import Budget
+from comparisons.compare.watched import Say, Watched
 from comparisons.results.case import WARNING, Case, trace_command
 from comparisons.results.stored_case import write_case
 from comparisons.runs.processes import carry_out, private_stdout, send
@@ -40,7 +41,7 @@ class Request(BaseModel):
 
     name: the case's;  scene: the scene's file;  changes: to the scene;  folder: where the case is
     stored;  key: stored with it, see `comparisons.suites.keys`;  again: the command that repeats
-    the case.
+    the case;  is_watched: whether pictures are shown as they grow.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -54,6 +55,7 @@ class Request(BaseModel):
     folder: Path
     key: str = ""
     again: str = ""
+    is_watched: bool = False
 
 
 def main() -> None:
@@ -96,7 +98,7 @@ def answer(request: Request, runner: Runner, threads: int | None, answers: TextI
             case = runner(
                 request.changes.load(request.scene),
                 request.budget,
-                lambda text: send(answers, say=text),
+                _telling(request, answers),
                 threads=threads,
                 rungs=request.rungs,
             )
@@ -110,6 +112,15 @@ def answer(request: Request, runner: Runner, threads: int | None, answers: TextI
         write_case(request.folder, case, request.key, time.perf_counter() - start)
 
     carry_out(run, answers)
+
+
+def _telling(request: Request, answers: TextIO) -> Say:
+    """What reports each step."""
+
+    def say(text: str) -> None:
+        send(answers, say=text)
+
+    return Watched(say, lambda text: send(answers, show=text)) if request.is_watched else say
 
 
 def _traced(request: Request) -> str:
@@ -148,7 +159,7 @@ def _replicates(budget: Budget) -> str:
 def compare(
     scene: Scene,
     budget: Budget,
-    say: Callable[[str], None],
+    say: Say,
     threads: int | None,
     rungs: tuple[str, ...],
 ) -> Case:

@@ -68,7 +68,7 @@ class Case:
 def _rendered(scene: Scene, counterpart: Counterpart) -> Rendered:
     if scene.integrator.deterministic:
         return pictures.whitted(scene, scene.tables, counterpart)
-    both = pictures.Replicates(scene, scene.tables, counterpart, Budget(), 1, 8)
+    both = pictures.Replicates(scene, scene.tables, counterpart, Budget(), 1, 8, print)
     both.grow(8)
     return both.rendered()
 
