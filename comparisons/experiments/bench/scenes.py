@@ -27,14 +27,8 @@ from comparisons.experiments.bench.row import (
     seconds,
     spread,
 )
-from comparisons.experiments.convergence.methods import (
-    METHODS,
-    AbsentError,
-    Taken,
-    candidates,
-    in_turn,
-    with_sampler,
-)
+from comparisons.experiments.convergence.best_sampler import Taken, candidates, in_turn
+from comparisons.experiments.convergence.methods import METHODS, AbsentError, with_sampler
 from comparisons.experiments.convergence.store import weights
 from comparisons.suites.suite import Entry, load_suite
 from reference_rt.cameras.film import BoxFilter, Film

@@ -11,6 +11,7 @@ import numpy as np
 from comparisons.compare import pictures
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import budgeted
+from comparisons.experiments.convergence.best_sampler import SPP, merits
 from comparisons.experiments.convergence.findings import (
     Curves,
     GridPoint,
@@ -23,7 +24,6 @@ from comparisons.experiments.convergence.findings import (
 from comparisons.experiments.convergence.methods import (
     BEST,
     METHODS,
-    SPP,
     AbsentError,
     Climb,
     Cost,
@@ -34,7 +34,6 @@ from comparisons.experiments.convergence.methods import (
     chosen,
     climb,
     estimate,
-    merits,
     remarks,
     rungs,
     why_left_out,

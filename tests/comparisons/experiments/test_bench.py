@@ -24,7 +24,7 @@ from comparisons.experiments.bench.row import (
     within,
 )
 from comparisons.experiments.bench.run import machine
-from comparisons.experiments.convergence.methods import Taken
+from comparisons.experiments.convergence.best_sampler import Taken
 from reference_rt.rendering.render import render
 from reference_rt.sampling import Sobol
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from convergence_fakes import EXACT, TRUE, Fake, climbs
 
-from comparisons.experiments.convergence import methods
+from comparisons.experiments.convergence import best_sampler, methods
 from comparisons.experiments.convergence.methods import Climb, Shot, climb
 from comparisons.experiments.convergence.store import Store, weights
 
@@ -33,8 +33,8 @@ def test_the_variance_of_pictures_is_their_error_without_a_reference(monkeypatch
         def ready(self, method, progress=None):
             return lambda spp, k: order.append((method, k)) or fakes[method](spp, k)
 
-    monkeypatch.setattr(methods, "Stable", Ready)
-    found = methods.in_turn(None, {name: name for name in fakes}, 64, 6)
+    monkeypatch.setattr(best_sampler, "Stable", Ready)
+    found = best_sampler.in_turn(None, {name: name for name in fakes}, 64, 6)
     assert [name for name, _ in order] == [*"abba" * 3]
     for name, fake in fakes.items():
         # 5 degrees of freedom in each of 576 numbers: a standard error of 2.6 %.
