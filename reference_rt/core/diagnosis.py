@@ -174,7 +174,10 @@ def _instead(word: str, known: Iterable[str]) -> str:
 def _wanted(model: type[BaseModel], location: Keys) -> str:
     """What a missing key is for, by the first sentence of its documentation."""
     fields = _models_at(model, location[:-1])[0].model_fields
-    about = (fields[str(location[-1])].description or "").split("\n\n")[0]
+    field = fields.get(str(location[-1]))
+    if field is None:  # an item of a list that is too short
+        return "a value"
+    about = (field.description or "").split("\n\n")[0]
     sentence = " ".join(about.split()).partition(". ")[0].rstrip(".")
     return f"a value: {sentence[:1].lower()}{sentence[1:]}" if sentence else "a value"
 

@@ -25,6 +25,7 @@ from reference_rt.rendering.picture import Picture
 from reference_rt.rendering.plain_python import plain_tile, request, started_with
 from reference_rt.rendering.render import shown_of
 from reference_rt.scene.build import BuiltScene
+from reference_rt.util.processes import tied
 
 PIXELS = 4096
 """At most so many pixels: more take longer than compiling."""
@@ -120,6 +121,7 @@ class FirstLook:
         asked = plain_tile(self._scene), film.width, grid, samples_of(self._scene)
         self._process = subprocess.Popen(
             **started_with(_answer),
+            **tied(),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

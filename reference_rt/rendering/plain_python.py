@@ -15,7 +15,6 @@ from reference_rt.rendering import tiles
 from reference_rt.rendering.accumulation import jobs_of
 from reference_rt.rendering.kernels import plain_arguments
 from reference_rt.scene.build import BuiltScene
-from reference_rt.util.processes import tied
 
 
 class PlainTile(NamedTuple):
@@ -48,7 +47,6 @@ def started_with(answer: Callable[[], None]) -> dict[str, Any]:
     return {
         "args": [sys.executable, "-P", "-c", call],
         "env": os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(sys.path)},
-        **tied(),
     }
 
 

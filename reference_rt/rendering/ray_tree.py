@@ -61,6 +61,7 @@ from reference_rt.rendering import tiles
 from reference_rt.rendering.executor import build_and_check
 from reference_rt.rendering.plain_python import PlainTile, plain_tile, request, started_with
 from reference_rt.scene.build import BuiltScene
+from reference_rt.util.processes import tied
 
 RayRecord = dict[str, Any]
 
@@ -82,6 +83,7 @@ def ray_trees(scene: BuiltScene, places: Sequence[tuple[int, int, int]]) -> list
     asked = [((width * y + x), sample) for x, y, sample in places]
     done = subprocess.run(
         **started_with(_answer),
+        **tied(),
         input=pickle.dumps((plain_tile(scene), asked)),
         stdout=subprocess.PIPE,
         check=True,
