@@ -30,7 +30,7 @@ from reference_rt.util.processes import tied
 PIXELS = 4096
 """At most so many pixels: more take longer than compiling."""
 
-FIRST_STEP = 4
+FIRST_STEP = 8
 """Of the finest grid's pixels, each so-manieth of a column and of a row comes first."""
 
 FEWEST = 8

@@ -10,7 +10,14 @@ from builders import SCENES, every_law, every_light, every_shape
 
 import reference_rt as rt
 from reference_rt.cli.picture_above import first_look, pixels_of
-from reference_rt.rendering.first_look import FEWEST, PIXELS, FirstLook, grid_of, in_order
+from reference_rt.rendering.first_look import (
+    FEWEST,
+    FIRST_STEP,
+    PIXELS,
+    FirstLook,
+    grid_of,
+    in_order,
+)
 
 SMALL = rt.Film(width=9, height=6)
 
@@ -83,7 +90,8 @@ def test_large_pictures_are_seen_by_some_of_their_pixels():
     assert (seen[-1] == pixels_of(rt.render(scene))[::step, ::step]).all()
     # None has pixels that nothing is known of, and they become finer.
     assert len(seen) > 10
-    first = np.kron(seen[0][::4, ::4], np.ones((4, 4, 1)))[:rows, :columns]
+    square = np.ones((FIRST_STEP, FIRST_STEP, 1))
+    first = np.kron(seen[0][::FIRST_STEP, ::FIRST_STEP], square)[:rows, :columns]
     assert (seen[0] != first).any(axis=2).mean() < 0.2
 
 
