@@ -22,7 +22,13 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from mesh_programs import MESH_FORMATS, MESH_PROGRAMS, scalar_mitsuba, told_of_mesh
+from mesh_programs import (
+    MESH_FORMATS,
+    MESH_PROGRAMS,
+    WITH_UV,
+    scalar_mitsuba,
+    told_of_mesh,
+)
 
 Array = npt.NDArray[Any]
 
@@ -68,6 +74,20 @@ def oiio_write(values: Array, path: Path) -> None:
     out = OpenImageIO.ImageOutput.create(str(path))
     if out is None or not out.open(str(path), spec) or not out.write_image(values):
         raise OSError(out.geterror() if out else OpenImageIO.geterror())
+    out.close()
+
+
+def oiio_write_part(values: Array, path: Path) -> None:
+    """As the part of a picture of 11 x 8 pixels that begins at (2, 1): the data window lies within
+    the display window."""
+    import OpenImageIO
+
+    height, width, channels = values.shape
+    spec = OpenImageIO.ImageSpec(width, height, channels, "float")
+    spec.x, spec.y, spec.full_width, spec.full_height = 2, 1, 11, 8
+    out = OpenImageIO.ImageOutput.create(str(path))
+    if not out.open(str(path), spec) or not out.write_image(values):
+        raise OSError(out.geterror())
     out.close()
 
 
@@ -188,6 +208,7 @@ PROGRAMS: dict[str, tuple[str, Callable[[Array, Path], None] | None, Callable[[P
 FORMATS = {
     "exr": (".exr", lambda: picture()),
     "exr with alpha": (".exr", lambda: picture(alpha=True)),
+    "exr of a part of a picture": (".exr", lambda: picture()),
     "hdr": (".hdr", lambda: picture()),
     "pfm": (".pfm", lambda: picture()),
     "png of 16 bits": (".png", codes),
@@ -262,7 +283,7 @@ def one(kind: str, what: str, name: str, path: Path) -> str:
             if what == "read":
                 return told(written, read(path))
             assert write is not None
-            write(written, path)
+            (oiio_write_part if "part" in kind else write)(written, path)
         else:
             _, write_mesh, read_mesh = MESH_PROGRAMS[name]
             if what == "read":
@@ -278,6 +299,8 @@ def one(kind: str, what: str, name: str, path: Path) -> str:
 _ONLY = {
     "tifffile": (".tif",),
     "lib3mf": (".stl", ".3mf"),
+    "usd-core": (".usda",),
+    "Blender": (*(s for s, _ in FORMATS.values()), ".glb", ".usda"),
     "Mitsuba": (*(s for s, _ in FORMATS.values()), ".ply", ".obj"),
 }
 """Formats of programs that know few of them."""
@@ -300,7 +323,9 @@ def table(kind: str, suffix: str, programs: dict[str, Any]) -> list[str]:
         for writer in there:
             if programs[writer][1] is None or (writer == "ours" and suffix != ".exr"):
                 continue
-            path = Path(folder) / f"{writer}{suffix}"
+            if "part" in kind and writer != "OpenImageIO":
+                continue
+            path = Path(folder) / f"{writer}{WITH_UV if 'texture' in kind else ''}{suffix}"
             said = run_one(kind, "write", writer, path)
             print(kind, writer, said, file=sys.stderr, flush=True)
             if said != "written":
@@ -325,9 +350,9 @@ def main() -> None:
     for kind, (suffix, _) in FORMATS.items():
         if given.only in kind:
             lines += table(kind, suffix, PROGRAMS)
-    for suffix in MESH_FORMATS:
-        if given.only in suffix:
-            lines += table(suffix, suffix, MESH_PROGRAMS)
+    for kind, suffix in MESH_FORMATS.items():
+        if given.only in kind:
+            lines += table(kind, suffix, MESH_PROGRAMS)
     text = "\n".join(lines)
     print(text)
     if given.markdown:

@@ -23,6 +23,10 @@ UV = np.array([[0.1, 0.2], [0.3, 0.4], [0.55, 0.65], [0.8, 0.95]])
 COLOURS = np.array([[0.1, 0.2, 0.3], [0.9, 0.8, 0.7], [0.5, 0.05, 0.6], [1.0, 0.0, 0.35]])
 NORMALS = np.array([[0.6, 0.8, 0.0], [0.0, 0.6, -0.8], [-0.8, 0.0, 0.6], [0.0, 0.0, 1.0]])
 
+WITH_UV = "_uv"
+"""End of the names of files that have texture coordinates in place of colours, where a writer has
+one or the other."""
+
 Mesh = dict[str, Any]
 """Of a mesh: positions, faces; normals, uv, colours (n, 3), from 0 to 1, where they are kept."""
 
@@ -31,6 +35,10 @@ def trimesh_write(path: Path) -> None:
     import trimesh
 
     mesh = trimesh.Trimesh(CORNERS, FACES, vertex_normals=NORMALS, process=False)
+    if path.stem.endswith(WITH_UV):
+        mesh.visual = trimesh.visual.TextureVisuals(UV)
+        mesh.export(str(path))
+        return
     mesh.visual.vertex_colors = np.round(255.0 * np.c_[COLOURS, np.ones(4)]).astype(np.uint8)
     mesh.export(str(path))
 
@@ -164,6 +172,72 @@ def assimp_read(path: Path) -> Mesh:
     return found
 
 
+def usd_write(path: Path) -> None:
+    from pxr import Sdf, Usd, UsdGeom, Vt
+
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    mesh = UsdGeom.Mesh.Define(stage, "/mesh")
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(CORNERS.astype(np.float32)))
+    mesh.CreateFaceVertexCountsAttr([3] * len(FACES))
+    mesh.CreateFaceVertexIndicesAttr(FACES.ravel().tolist())
+    mesh.CreateSubdivisionSchemeAttr("none")
+    mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(NORMALS.astype(np.float32)))
+    mesh.SetNormalsInterpolation("vertex")
+    primvars = UsdGeom.PrimvarsAPI(mesh)
+    types = Sdf.ValueTypeNames
+    uv = primvars.CreatePrimvar("st", types.TexCoord2fArray, "vertex")
+    uv.Set(Vt.Vec2fArray.FromNumpy(UV.astype(np.float32)))
+    colours = primvars.CreatePrimvar("displayColor", types.Color3fArray, "vertex")
+    colours.Set(Vt.Vec3fArray.FromNumpy(COLOURS.astype(np.float32)))
+    stage.Save()
+
+
+def usd_read(path: Path) -> Mesh:
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.Open(str(path))
+    (mesh,) = (UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh))
+    found: Mesh = {
+        "positions": np.array(mesh.GetPointsAttr().Get()),
+        "faces": np.array(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3),
+    }
+    if (normals := mesh.GetNormalsAttr().Get()) is not None:
+        found["normals"] = np.array(normals)
+    for name, key in (("st", "uv"), ("displayColor", "colours")):
+        if values := UsdGeom.PrimvarsAPI(mesh).GetPrimvar(name).Get():
+            found[key] = np.array(values)
+    return found
+
+
+def blender_mesh_read(path: Path) -> Mesh:
+    import bpy
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    if path.suffix == ".glb":
+        bpy.ops.import_scene.gltf(filepath=str(path), merge_vertices=False)
+    else:
+        bpy.ops.wm.usd_import(filepath=str(path))
+    (thing,) = (one for one in bpy.context.scene.objects if one.type == "MESH")
+    mesh = thing.data
+    world = np.array(thing.matrix_world)
+    positions = np.array([v.co[:] for v in mesh.vertices]) @ world[:3, :3].T + world[:3, 3]
+    found: Mesh = {
+        "positions": positions,
+        "faces": np.array([p.vertices[:] for p in mesh.polygons]),
+    }
+    corners = [k for polygon in mesh.polygons for k in polygon.loop_indices]
+    found["normals"] = np.array([mesh.corner_normals[k].vector[:] for k in corners])
+    if mesh.uv_layers:
+        found["uv"] = np.array([mesh.uv_layers[0].uv[k].vector[:] for k in corners])
+    for layer in mesh.color_attributes[:1]:
+        ends = (
+            corners if layer.domain == "CORNER" else [mesh.loops[k].vertex_index for k in corners]
+        )
+        found["colours"] = np.array([layer.data[k].color[:3] for k in ends])
+    return found
+
+
 def mitsuba_mesh_read(path: Path) -> Mesh:
     mi = scalar_mitsuba()
     mesh = mi.load_dict({"type": path.suffix[1:], "filename": str(path)})
@@ -199,8 +273,19 @@ MESH_PROGRAMS: dict[str, tuple[str, Callable[[Path], None] | None, Callable[[Pat
     "Open3D": ("open3d", open3d_write, open3d_read),
     "lib3mf": ("lib3mf", lib3mf_write, lib3mf_read),
     "assimp": ("assimp_py", None, assimp_read),
+    "usd-core": ("pxr", usd_write, usd_read),
+    "Blender": ("bpy", None, blender_mesh_read),
 }
-MESH_FORMATS = (".ply", ".obj", ".stl", ".glb", ".3mf")
+MESH_FORMATS = {
+    ".ply": ".ply",
+    ".obj": ".obj",
+    ".stl": ".stl",
+    ".glb": ".glb",
+    ".glb with texture coordinates": ".glb",
+    ".3mf": ".3mf",
+    ".usda": ".usda",
+}
+"""Suffixes of tables."""
 
 
 def told_of_mesh(read: Mesh) -> str:
@@ -221,6 +306,12 @@ def _error(found: Array, known: Array, name: str) -> str:
     error = float(np.abs(found - known).max())
     if error == 0.0:
         return f"{name} exact"
+    if name in ("positions", "normals") and error > 1e-3:
+        # Which axes are turned to where, and by what factor.
+        by = np.linalg.lstsq(known.reshape(-1, 3), found.reshape(-1, 3), rcond=None)[0].T
+        # Blender keeps normals with 4 digits.
+        if np.abs(known @ by.T - found).max() < 3e-4:
+            return f"{name} times {(np.round(by, 2) + 0.0).tolist()}"
     if error < 1.5e-7 * max(1.0, float(np.abs(known).max())):
         return f"{name} float32"
     if name == "colours":
