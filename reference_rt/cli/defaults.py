@@ -3,6 +3,7 @@
 import os
 import tomllib
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +27,9 @@ def find(folder: Path) -> Path | None:
     """The file of the project that a folder is in: the nearest with our section."""
     for parent in (folder, *folder.parents):
         path = parent / FILE
-        if path.is_file() and f"tool.{SECTION}".encode() in path.read_bytes():
-            return path
+        with suppress(OSError):  # somebody else's, which may not be read
+            if path.is_file() and f"tool.{SECTION}".encode() in path.read_bytes():
+                return path
     return None
 
 

@@ -7,10 +7,12 @@ then for their next samples.  They are samples of the picture itself, with the s
 """
 
 import itertools
+import os
 import pickle
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from typing import IO, Any, NamedTuple
@@ -38,6 +40,15 @@ FEWEST = 8
 
 _BATCH = 32
 """Pixels that are sent at once."""
+
+_BETWEEN = 0.5
+"""Seconds between two pictures, at least: drawing them takes time from compiling."""
+
+_NICE = 19
+"""The least priority: of the second process once there is a first picture."""
+
+MOST_BYTES = 64 << 20
+"""Of the scene's tables: the second process has them, too, and they are copied twice on the way."""
 
 Show = Callable[[Any], None]
 """Called with a picture (height, width, 3) of bytes."""
@@ -98,6 +109,7 @@ class FirstLook:
         self._show = show
         self._process: subprocess.Popen[bytes] | None = None
         self._reader: threading.Thread | None = None
+        self._ended = threading.Event()
 
     def __enter__(self) -> "FirstLook":
         return self
@@ -113,19 +125,25 @@ class FirstLook:
             self.begin()
 
     def begin(self) -> None:
-        """Start the second process.  The integrator `light` has no pixels of its own to show."""
+        """Start the second process, unless it would take much memory or cannot be started.  The
+        integrator `light` has no pixels of its own to show."""
         if isinstance(self._scene.integrator, Light):
             return
-        film = self._scene.film
+        film, tile = self._scene.film, plain_tile(self._scene)
+        if _bytes_of(tile) > MOST_BYTES:
+            return
         grid = grid_of(film.width, film.height)
-        asked = plain_tile(self._scene), film.width, grid, samples_of(self._scene)
-        self._process = subprocess.Popen(
-            **started_with(_answer),
-            **tied(),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-        )
+        asked = tile, film.width, grid, samples_of(self._scene)
+        with suppress(OSError):  # a render does not fail for want of a first look
+            self._process = subprocess.Popen(
+                **started_with(_answer),
+                **tied(),
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+            )
+        if self._process is None:
+            return
         arguments = self._process, pickle.dumps(asked), grid
         self._reader = threading.Thread(target=self._read, args=arguments, daemon=True)
         self._reader.start()
@@ -134,6 +152,7 @@ class FirstLook:
         """Stop showing anything."""
         if self._process is None or self._reader is None:
             return
+        self._ended.set()
         self._process.kill()
         self._reader.join()
         self._process.wait()
@@ -145,14 +164,18 @@ class FirstLook:
         with suppress(BrokenPipeError), process.stdin:
             process.stdin.write(request)
         sums, count = np.zeros((grid.rows, grid.columns, 0)), np.zeros((grid.rows, grid.columns))
+        due = 0.0
         with process.stdout as source:
             for batch in _batches(source):
                 if sums.shape[2] == 0:
                     sums = np.zeros((grid.rows, grid.columns, len(batch[0][1])))
                 for place, values in batch:
                     put(sums, count, place, values)
-                if count.all():
+                if count.all() and time.monotonic() >= due:
                     self._show(self._pixels(sums, count))
+                    due = time.monotonic() + _BETWEEN
+        if count.all() and not self._ended.is_set():
+            self._show(self._pixels(sums, count))
 
     def _pixels(self, sums: FloatArray, count: FloatArray) -> Any:
         """The picture as it would be written to a .png file."""
@@ -162,6 +185,13 @@ class FirstLook:
         found = layers_of(self._scene, named, count.reshape(-1).astype(np.int64))
         layers = {name: a.reshape(rows, columns, *a.shape[1:]) for name, a in found.items()}
         return eight_bits(display(Picture(layers, shown_of(self._scene))))
+
+
+def _bytes_of(value: Any) -> int:
+    """Of all arrays in a tuple, and in those within it."""
+    if isinstance(value, tuple):
+        return sum(map(_bytes_of, value))
+    return value.nbytes if isinstance(value, np.ndarray) else 0
 
 
 def put(sums: FloatArray, count: FloatArray, place: Place, values: FloatArray) -> None:
@@ -185,9 +215,12 @@ def _batches(source: IO[bytes]) -> Iterator[Batch]:
 def _answer() -> None:
     """The second process: from the arguments of a kernel on standard input to values of pixels."""
     tile, film_width, grid, samples = request()
-    order = in_order(grid, samples)
+    order, is_first = in_order(grid, samples), True
     with np.errstate(all="ignore"):
         while places := [*itertools.islice(order, _BATCH)]:
+            if is_first and places[0].width < FIRST_STEP and hasattr(os, "nice"):
+                os.nice(_NICE)  # there is a picture: kernels come first from now on
+                is_first = False
             batch: Batch = []
             for place in places:
                 pixel = (film_width * place.row + place.column) * grid.step

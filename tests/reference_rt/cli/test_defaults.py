@@ -5,6 +5,8 @@ from pathlib import Path
 import pytest
 from command_line import SCENE, invoke
 
+from reference_rt.cli.defaults import find
+
 
 @pytest.fixture
 def project(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
@@ -72,6 +74,18 @@ def test_paths_stay_within_the_folder(
         assert result.exit_code == 2, path
         assert "expected a path within the file's folder" in result.stderr
     assert not [*elsewhere.iterdir()]
+
+
+def test_a_file_that_may_not_be_read_is_passed_by(
+    project: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write("[tool.reference_rt.check]\nallow-missing = 'x'\n")
+
+    def refused(path: Path) -> bytes:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "read_bytes", refused)
+    assert find(project) is None
 
 
 def test_what_all_commands_have_stands_in_the_section(project: Path) -> None:

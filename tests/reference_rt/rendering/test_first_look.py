@@ -10,14 +10,17 @@ from builders import SCENES, every_law, every_light, every_shape
 
 import reference_rt as rt
 from reference_rt.cli.picture_above import first_look, pixels_of
+from reference_rt.rendering import first_look as first_looks
 from reference_rt.rendering.first_look import (
     FEWEST,
     FIRST_STEP,
     PIXELS,
     FirstLook,
+    _bytes_of,
     grid_of,
     in_order,
 )
+from reference_rt.rendering.plain_python import plain_tile
 
 SMALL = rt.Film(width=9, height=6)
 
@@ -78,13 +81,14 @@ def test_it_becomes_the_picture(scene, tmp_path):
     assert (last == pixels_of(rt.render(scene))).all()
 
 
-def test_large_pictures_are_seen_by_some_of_their_pixels():
+def test_large_pictures_are_seen_by_some_of_their_pixels(monkeypatch):
     """The first sample of each `step`-th pixel of a row and a column."""
     scene = rt.Scene.load(SCENES / "whitted_classic.yaml")
     scene = scene.changed(film=rt.Film(width=150, height=110), sampler=rt.Grid(spp=1))
     step, columns, rows = grid_of(150, 110)
     assert step > 1
     assert columns * rows <= PIXELS
+    monkeypatch.setattr(first_looks, "_BETWEEN", 0.0)
     seen = shown(scene)
     assert seen[-1].shape == (rows, columns, 3)
     assert (seen[-1] == pixels_of(rt.render(scene))[::step, ::step]).all()
@@ -116,6 +120,26 @@ def test_each_sample_comes_once(size):
 def test_the_integrator_light_has_none():
     scene = rt.Scene.load(SCENES / "cornell_box.yaml").changed(integrator=rt.Light(), film=SMALL)
     assert shown(scene) == []
+
+
+def test_it_takes_no_memory_for_large_scenes(monkeypatch):
+    """Of which the second process would hold another copy."""
+    scene = rt.Scene.load(SCENES / "mesh_knot.yaml").changed(film=SMALL, sampler=rt.Sobol(spp=1))
+    data = scene.tables.geometry.bvh
+    assert _bytes_of(plain_tile(scene)) > _bytes_of(data) > 100_000
+    monkeypatch.setattr(first_looks, "MOST_BYTES", _bytes_of(data))
+    assert shown(scene) == []
+
+
+def test_a_render_goes_on_without_it(monkeypatch):
+    def refused(*args, **options):
+        raise BlockingIOError("no more processes")
+
+    monkeypatch.setattr(first_looks.subprocess, "Popen", refused)
+    scene = rt.Scene.load(SCENES / "display_modes.yaml").changed(film=SMALL)
+    with FirstLook(scene, print) as look:
+        look.compiling(0, FEWEST)
+        look.compiling(FEWEST, FEWEST)
 
 
 def test_it_begins_with_many_kernels_and_ends_with_the_last(monkeypatch):
