@@ -9,6 +9,7 @@ import signal
 import sys
 from pathlib import Path
 
+import drjit
 import mitsuba as mi
 import numpy as np
 
@@ -19,6 +20,8 @@ SECONDS = 300
 def main(variant: str, folder: Path, replicates: int, spp: int, names: list[str]) -> None:
     mi.set_variant(variant)
     mi.set_log_level(mi.LogLevel.Error)
+    # With one thread Mitsuba waits for ever for the one that decodes an .exr file.
+    drjit.set_thread_count(max(drjit.thread_count(), 2))
 
     def tell(name: str, problem: str) -> None:
         with (folder / "told.jsonl").open("a", encoding="utf-8") as file:

@@ -197,10 +197,24 @@ def imported() -> Any:
     """
     backend()
     try:
+        import drjit
         import mitsuba as mi
     except (ImportError, RuntimeError, OSError) as error:
         raise ReferenceUnavailableError(f"Mitsuba does not start: {error}") from None
+    use_threads(drjit.thread_count())
     return mi
+
+
+def use_threads(count: int) -> None:
+    """Let Mitsuba have so many threads, but at least two.
+
+    With one, as on a machine or in a container of one core, Mitsuba 3.9.1 waits for ever for the
+    thread that decodes an .exr file.
+    """
+    import drjit
+
+    if (count := max(count, 2)) != drjit.thread_count():
+        drjit.set_thread_count(count)
 
 
 @functools.cache

@@ -165,14 +165,11 @@ def compare(
 ) -> Case:
     """`comparisons.compare.compare.compare_scene`, Mitsuba too with `threads` threads."""
     from comparisons.compare.compare import Subject, compare_scene
-    from comparisons.mitsuba.backend import mitsuba
+    from comparisons.mitsuba.backend import mitsuba, use_threads
 
     mitsuba()
     if threads is not None:
-        import drjit
-
-        # Not 1: Mitsuba 3.9.1 then waits for ever for the thread that decodes an .exr file.
-        drjit.set_thread_count(max(threads, 2))
+        use_threads(threads)
     return compare_scene(Subject(scene), budget, say, threads, rungs)
 
 
