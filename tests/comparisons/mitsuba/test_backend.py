@@ -219,8 +219,9 @@ def test_dr_jit_has_the_proven_llvm_whatever_comes_first(first: str, tmp_path: P
 
 
 def test_only_the_backend_imports_mitsuba() -> None:
-    """For the same reason; `render_xml.py` runs in environments of other Mitsubas.  Dr.Jit is imported in functions, which are called after that; a test
-    file that imports it would change the library of all tests, since all files are read first."""
+    """For the same reason; `render_xml.py` runs in environments of other Mitsubas.  Dr.Jit is
+    imported in functions, which are called after that; a test file that imports it would change the
+    library of all tests, since all files are read first."""
     package = Path(backend.__file__).parents[1]
     allowed = {Path(backend.__file__)}
     others = {package / "experiments/render_xml.py"}
