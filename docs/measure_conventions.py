@@ -7,7 +7,7 @@ Three pictures of 64 x 64 pixels, 40 degrees wide, from the origin along -z, y u
 - an even sky seen from inside glass of index 1.5: 2.25 times its radiance where radiance is divided
   by the square of the index, else 1;
 - a matte wall of albedo 0.5, 5 from each lamp: its light, as a multiple of what a lamp of as many
-  W/sr (point, spot) or W/m2 (directional) makes of it.
+  W/sr (point, spot), W/m2 (directional) or W/sr/m2 (an even sky) makes of it.
 """
 
 import json
@@ -96,6 +96,7 @@ LAMPS: dict[str, dict[str, Any]] = {
     "point": {"position": (0.0, 0.0, 1.0), "intensity": 10.0},
     "spot": {"origin": (0.0, 0.0, 1.0), "target": (0.0, 0.0, 0.0), "intensity": 10.0},
     "directional": {"direction": (0.0, 0.0, -1.0), "irradiance": 1.0},
+    "constant": {"radiance": DIM},
 }
 
 
@@ -119,8 +120,9 @@ def measured(name: str) -> dict[str, Any]:
             {"type": "rectangle", "transform": [{"matrix": FAR}]},
             lights=[{"type": kind, **lamp}],
         )
-        number = lamp.get("intensity", lamp.get("irradiance"))
-        unit = number * ALBEDO / math.pi / (1.0 if kind == "directional" else DISTANCE**2)
+        (number,) = (lamp[key] for key in ("intensity", "irradiance", "radiance") if key in lamp)
+        by = {"directional": 1.0, "constant": math.pi}.get(kind, DISTANCE**-2.0)
+        unit = number * by * ALBEDO / math.pi
         try:
             shown = float(np.median((picture(name, wall, 64) / cosines)[31:33, 31:33]))
         except HasNoneError:

@@ -194,8 +194,9 @@ RENDERERS = {
             "2 / (1 + (distance / fade_distance)^fade_power): a point's number is that of a light "
             "that fades so beyond a small fade_distance, whose square over 2 it is divided by",
             "a camera whose `right` is positive mirrors right-handed scenes",
+            "a background lights nothing without `radiosity`",
         ),
-        Changes(lights={"point": math.pi, "directional": math.pi}),
+        Changes(lights={"point": math.pi, "spot": math.pi, "directional": math.pi}),
         (
             UNFADED,
             Changes(mirrored=True),
@@ -209,6 +210,8 @@ RENDERERS = {
         (
             "its samples are moved at random within pixels by -pj, and left out by -ps",
             "its lamps are spheres, rings and discs, and are seen",
+            "a spotlight's direction is as long as the point lies behind the lamp from which its "
+            "light spreads",
         ),
     ),
     "raysect": Known(
@@ -232,7 +235,7 @@ RENDERERS = {
             mirrored=True,
             right=0.5,
             down=0.5,
-            lights={"point": math.pi, "directional": math.pi},
+            lights={"point": math.pi, "spot": math.pi, "directional": math.pi},
         ),
         (UNFADED,),
     ),

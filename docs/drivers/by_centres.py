@@ -12,6 +12,7 @@ from words import (
     Array,
     HasNoneError,
     Words,
+    axis,
     commas,
     lights,
     look,
@@ -66,12 +67,22 @@ BACKGROUND 0 0 0
             f"DIRECTIONAL_LIGHT DIRECTION {text(l['direction'])} "
             f"COLOR {text(rgb(l['irradiance']))}\n"
         ),
+        "spot": lambda l: (
+            f"SPOTLIGHT CENTER {text(l['origin'])} RAD 0.0001 DIRECTION {text(axis(l))} "
+            f"FALLOFF_START 25.0 FALLOFF_END 30.0 {fade} {text(rgb(l['intensity']))}\n"
+        ),
+        "constant": lambda l: "",  # the option -add_skylight
     }
     if {"emissive", "diffuse"} <= {look(scene, shape)[0] for shape in scene["shapes"]}:
         raise HasNoneError("tachyon has no lamps that are surfaces")
     said += "".join(words("tachyon", lamps, kind)(light) for kind, light in lights(scene))
     (folder / "s.dat").write_text(f"{said}END_SCENE\n", encoding="utf-8")
-    run("tachyon", "s.dat", "-shade_phong", "-format", "PPM48", "-o", "s.ppm", folder=folder)
+    options = ["-shade_phong", "-format", "PPM48", "-o", "s.ppm"]
+    for kind, light in lights(scene):
+        if kind == "constant":  # of one brightness for all channels
+            brightness, *_ = rgb(light["radiance"])
+            options += ["-add_skylight", str(brightness), "-skylight_samples", "1024"]
+    run("tachyon", "s.dat", *options, folder=folder)
     yield ppm16(folder / "s.ppm", width, height)
 
 
@@ -115,6 +126,8 @@ camera {{ perspective location 0 direction -z right x*{2 * x} up y*{2 * y} }}
                 at = ", ".join(commas(c) for c in (*corners, corners[0]))
                 said += f"polygon {{ 5, {at} {finish} }}\n"
     fade = f"fade_distance {NEAR} fade_power 2"
+    # Without it a background is seen, and lights nothing.
+    skylight = "global_settings { radiosity { count 1600 recursion_limit 1 brightness 1 } }\n"
     lamps = {
         "point": lambda l: (
             f"light_source {{ {commas(l['position'])} rgb "
@@ -124,7 +137,12 @@ camera {{ perspective location 0 direction -z right x*{2 * x} up y*{2 * y} }}
             f"light_source {{ {commas(-100.0 * np.array(l['direction']))} rgb "
             f"{commas(rgb(l['irradiance']))} parallel point_at 0 }}\n"
         ),
-        "constant": lambda l: f"background {{ rgb {commas(rgb(l['radiance']))} }}\n",
+        "spot": lambda l: (
+            f"light_source {{ {commas(l['origin'])} rgb "
+            f"{commas(np.array(rgb(l['intensity'])) / (2.0 * NEAR**2))} {fade} spotlight "
+            f"point_at {commas(l['target'])} radius 25 falloff 30 tightness 0 }}\n"
+        ),
+        "constant": lambda l: f"background {{ rgb {commas(rgb(l['radiance']))} }}\n{skylight}",
     }
     said += "".join(words("POV-Ray", lamps, kind)(light) for kind, light in lights(scene))
     if any(look(scene, shape)[0] in ("diffuse", "phong") for shape in scene["shapes"]):
@@ -197,6 +215,11 @@ def radiance(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Iter
             f"void light l 0 0 3 {text(np.array(rgb(l['irradiance'])) / disc)}\n"
             f"l source p 0 0 4 {text(-np.array(l['direction']))} {SUN}\n"
         ),
+        # The direction is as long as the point lies behind the lamp from which its light spreads.
+        "spot": lambda l: (
+            f"void spotlight l 0 0 7 {text(np.array(rgb(l['intensity'])) / math.pi / SMALL**2)} "
+            f"60 {text(SMALL * axis(l))}\nl sphere p 0 0 4 {text(l['origin'])} {SMALL}\n"
+        ),
         "constant": lambda l: (
             f"void glow k 0 0 4 {text(rgb(l['radiance']))} 0\nk source d 0 0 4 0 0 1 360\n"
         ),
@@ -206,7 +229,8 @@ def radiance(scene: Words, folder: Path, seeds: Sequence[int], spp: int) -> Iter
     angles = [2.0 * math.degrees(math.atan(half)) for half in (x, y)]
     view = f"-vtv -vp 0 0 0 -vd 0 0 -1 -vu 0 1 0 -vh {angles[0]} -vv {angles[1]}"
     rays = f"{programs}/vwrays -ff -pa 0 -pj 0 {view} -x {width} -y {height}"
-    exact = "-dj 0 -ds 0.02 -dt 0 -ab 0 -lr 100 -lw 1e-9"
+    sky = any(kind == "constant" for kind, _ in lights(scene))
+    exact = f"-dj 0 -ds 0.02 -dt 0 -ab {int(sky)} -aa 0 -ad 1024 -lr 100 -lw 1e-9"
     steps = (
         f"{programs}/oconv s.rad > s.oct; {rays} | {programs}/rtrace -fff -h {exact} s.oct > s.raw"
     )

@@ -105,6 +105,12 @@ def lights(scene: Words) -> list[tuple[str, Words]]:
     return [(str(light["type"]), light) for light in scene.get("lights", [])]
 
 
+def axis(light: Words) -> Array:
+    """The unit direction of a spot."""
+    along = np.subtract(light["target"], light["origin"])
+    return np.asarray(along / np.linalg.norm(along))
+
+
 def words(name: str, table: dict[str, Any], what: str) -> Any:
     if what not in table:
         raise HasNoneError(f"{name} has no {what}")

@@ -1,7 +1,7 @@
 """`explain --units`: what other renderers' lamps are given for the same light.
 
 Each row was measured by rendering a wall or the lamp itself (docs/conventions.md), unless it says
-that it is a specification's.
+that it is a specification's: pbrt's, which no package brings, and one of USD's.
 """
 
 from collections.abc import Iterator
@@ -28,6 +28,9 @@ class Row:
 
 _CYCLES, _LUX, _MITSUBA = "5.0.1", "2.11.2", "3.9.1"
 _POVRAY, _RADIANCE, _TACHYON = "3.7.0.10", "6.0a", "0.99b6"
+_PAGES = "three.js 0.187.0 and Babylon.js 9.28.0"
+_BLENDER = "Blender 5.0.1"
+"""Readers of files that were rendered."""
 
 UNITS = {
     "point": ("intensity", "I", "W/sr"),
@@ -38,6 +41,15 @@ UNITS = {
 }
 """By type of lamp: our field, its letter in `ROWS`, and its unit."""
 
+
+def _gltf(lamp: str, letter: str) -> tuple[Row, Row]:
+    """Its units are candela and lux: browsers keep them, Blender divides them by 683 lm/W."""
+    return (
+        Row("glTF", lamp, f"intensity {letter}", 1.0, _PAGES),
+        Row("glTF", lamp, f"intensity 683 {letter}", 683.0, _BLENDER),
+    )
+
+
 ROWS: dict[str, tuple[Row, ...]] = {
     "point": (
         Row("Cycles", "point", "power 4π I, W", 4.0 * pi, _CYCLES),
@@ -46,15 +58,19 @@ ROWS: dict[str, tuple[Row, ...]] = {
         Row("POV-Ray", "fade_power 2, fade_distance d", "rgb I / (2π d²), d small", None, _POVRAY),
         Row("Radiance", "sphere of radius r", "light I / (π r²)", None, _RADIANCE),
         Row("tachyon", "ATTENUATION 0 0 1", "COLOR I / π", 1.0 / pi, _TACHYON),
-        Row("glTF", "point", "intensity in cd: lm/W times I, 683 at 555 nm", None, ""),
+        *_gltf("point", "I"),
         Row("pbrt", "point", "I", 1.0, ""),
-        Row("USD", "SphereLight of radius r", "intensity I / (π r²), nit", None, ""),
+        Row("USD", "SphereLight of radius r", "intensity I / (π r²)", None, _BLENDER),
     ),
     "spot": (
         Row("Cycles", "spot", "power 4π I, W, whatever the cone", 4.0 * pi, _CYCLES),
         Row("LuxCore", "spot", "gain I", 1.0, _LUX),
         Row("Mitsuba", "spot", "intensity I", 1.0, _MITSUBA),
-        Row("glTF", "spot", "intensity in cd: lm/W times I", None, ""),
+        Row("POV-Ray", "spotlight, faded as points", "rgb I / (2π d²), d small", None, _POVRAY),
+        Row("Radiance", "spotlight sphere of radius r", "I / (π r²)", None, _RADIANCE),
+        Row("tachyon", "SPOTLIGHT with ATTENUATION 0 0 1", "COLOR I / π", 1.0 / pi, _TACHYON),
+        *_gltf("spot", "I"),
+        Row("USD", "SphereLight with shaping:cone", "intensity I / (π r²)", None, _BLENDER),
         Row("pbrt", "spot", "I", 1.0, ""),
     ),
     "directional": (
@@ -65,16 +81,20 @@ ROWS: dict[str, tuple[Row, ...]] = {
         Row("POV-Ray", "parallel", "rgb E / π", 1.0 / pi, _POVRAY),
         Row("Radiance", "source of angle a", "light E / (π sin² a/2)", None, _RADIANCE),
         Row("tachyon", "DIRECTIONAL_LIGHT", "COLOR E / π", 1.0 / pi, _TACHYON),
-        Row("glTF", "directional", "intensity in lx: lm/W times E", None, ""),
+        *_gltf("directional", "E"),
+        Row("USD", "DistantLight of angle a", "intensity E / (π sin² a/2)", None, ""),
+        Row("USD", "the same", "intensity E / (16π sin² a/2)", None, _BLENDER),
         Row("pbrt", "distant", "L, which is E", 1.0, ""),
     ),
     "constant": (
         Row("Cycles", "Background", "strength L", 1.0, _CYCLES),
         Row("LuxCore", "constantinfinite", "gain L", 1.0, _LUX),
         Row("Mitsuba", "constant", "radiance L", 1.0, _MITSUBA),
+        Row("POV-Ray", "background, with radiosity", "rgb L", 1.0, _POVRAY),
         Row("Radiance", "glow, source of 360 degrees", "L", 1.0, _RADIANCE),
+        Row("tachyon", "-add_skylight, of one colour", "L", 1.0, _TACHYON),
         Row("pbrt", "infinite", "L", 1.0, ""),
-        Row("USD", "DomeLight", "intensity L, nit", 1.0, ""),
+        Row("USD", "DomeLight with a color", "intensity L", 1.0, _BLENDER),
     ),
     "area": (
         Row("Cycles", "Emission", "strength L", 1.0, _CYCLES),
@@ -87,7 +107,8 @@ ROWS: dict[str, tuple[Row, ...]] = {
         Row("raysect", "UniformSurfaceEmitter", "L per nanometre", None, "0.9.1"),
         Row("tachyon", "AMBIENT times COLOR", "L", 1.0, _TACHYON),
         Row("pbrt", "diffuse", "L", 1.0, ""),
-        Row("USD", "RectLight, not normalized", "intensity L, nit", 1.0, ""),
+        Row("glTF", "emissive factor times strength", "L", 1.0, f"{_PAGES}, {_BLENDER}"),
+        Row("USD", "RectLight, DiskLight", "intensity L", 1.0, _BLENDER),
     ),
 }
 """By our types of lamps, what the other renderers' are given."""
