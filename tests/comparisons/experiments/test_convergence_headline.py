@@ -128,11 +128,11 @@ def test_one_that_cannot_be_made_ready_does_not_either():
 # ---- outputs ------------------------------------------------------------------------------------
 
 
-def curves_of(scene, *, absent=None, **noises):
+def curves_of(scene, *, absent=None, targets=(MEASURED, BEYOND), **noises):
     """Curves of fakes, whose noise decides when they reach an error."""
     some = climbs(**{name: Fake(noise) for name, noise in noises.items()})
     climb(some, EXACT, 8, Store(None, ""))
-    found = {n: findings_of(c.rungs, EXACT, (MEASURED, BEYOND), False) for n, c in some.items()}
+    found = {n: findings_of(c.rungs, EXACT, targets, False) for n, c in some.items()}
     methods = {name: BY_NAME[name] for name in (*noises, *(absent or {}))}
     return Curves(scene, (16, 12), methods, found, EXACT, absent=absent or {})
 
@@ -278,7 +278,7 @@ def test_an_invalid_scene_does_not_cost_the_others(tmp_path, monkeypatch):
         _ = scene.tables
         if scene.name == "box":
             raise KeyboardInterrupt
-        return curves_of(scene.name, ours=1.0)
+        return curves_of(scene.name, targets=settings.targets, ours=1.0)
 
     monkeypatch.setattr(run, "converge", fake)
     sphere = "shapes: [{type: sphere}]\n"

@@ -17,7 +17,7 @@ from reference_rt.shapes.shape import Tangents
 from reference_rt.textures.bitmap import table_of
 from reference_rt.textures.checker import Checkers
 from reference_rt.textures.image_file import Texels
-from reference_rt.textures.lookup import At, Textures, lookup, lookup_gradient
+from reference_rt.textures.lookup import NOWHERE, At, Textures, lookup, lookup_gradient
 from reference_rt.textures.parameter import Palette
 from reference_rt.textures.tables import BITMAP, CHECKER, UvSets
 from reference_rt.textures.texture import UvMap
@@ -224,7 +224,7 @@ def test_normal_maps_that_change_nothing():
 
 @entry_kernel
 def _bases(bumps, maps, textures, u, v, tangents, out):
-    at = At(textures, u, v, Vec3(-1.0, -1.0, -1.0))
+    at = At(textures, u, v, Vec3(-1.0, -1.0, -1.0), NOWHERE)
     for k, frame in enumerate(
         (tilted.bump_basis(bumps, 0, at, tangents, UP), tilted.map_basis(maps, 0, at, tangents, UP))
     ):
