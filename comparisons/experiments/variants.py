@@ -109,19 +109,19 @@ def run(
 ) -> list[Case]:
     """The cases of each plugin in each variant, and of each scene and derivative by two."""
     with temporary_folder() as place:
-        told = {name: _measured(name, task, place / name, say) for name in variants}
+        told = {name: measured(name, task, place / name, say) for name in variants}
         cases = [_of_rays(plugin, variants, told) for plugin in task.plugins if task.rays]
         for one, two in combinations(variants[::-1], 2):
             for key in task.parts():
                 kind, _, name = key.partition(" ")
                 is_scalar = kind == "derivative" and SCALAR in (one, two)  # which has none
                 if kind in ("picture", "derivative") and not is_scalar:
-                    cases.append(_of_pictures(kind, name, (one, two), told, limit))
+                    cases.append(of_pictures(kind, name, (one, two), told, limit))
                     say(f"{cases[-1].scene}: {cases[-1].verdict}")
     return cases
 
 
-def _measured(variant: str, task: Task, folder: Path, say: Callable[[str], None]) -> dict[str, Any]:
+def measured(variant: str, task: Task, folder: Path, say: Callable[[str], None]) -> dict[str, Any]:
     """What a process of this variant found, by what it did; arrays are read."""
     folder.mkdir()
     (folder / "task.json").write_text(json.dumps(vars(task)), encoding="utf-8")
@@ -185,7 +185,7 @@ def _of_rays(plugin: str, variants: Sequence[str], told: Mapping[str, Mapping[st
 _GRAVEST: tuple[Status, ...] = ("differ", "not-comparable", "reference-limited")
 
 
-def _of_pictures(
+def of_pictures(
     kind: str,
     name: str,
     pair: tuple[str, str],

@@ -25,7 +25,7 @@ def noisy(seed: int, gain: float = 1.0) -> Any:
 
 def faked(monkeypatch: pytest.MonkeyPatch, **by_variant: dict[str, Any]) -> list[Case]:
     """The cases of what processes of variants would tell."""
-    monkeypatch.setattr(variants, "_measured", lambda name, *more: by_variant[name])
+    monkeypatch.setattr(variants, "measured", lambda name, *more: by_variant[name])
     task = variants.Task((BOX,), plugins=("sphere", "linearcurve"))
     return variants.run(list(by_variant), task, 0.02, lambda line: None)
 
@@ -77,7 +77,7 @@ def test_a_variant_that_does_not_start_differs(
     task = variants.Task((BOX,), plugins=("sphere", "disk"))
     with monkeypatch.context() as patched:
         patched.setattr(variants.sys, "executable", str(program))
-        dead = variants._measured("cuda_ad_rgb", task, tmp_path / "v", lambda line: None)
+        dead = variants.measured("cuda_ad_rgb", task, tmp_path / "v", lambda line: None)
     cases = faked(monkeypatch, scalar_rgb=told(1.0), cuda_ad_rgb=dead)
     found = {case.scene: case for case in cases}
     assert found["rays of sphere"].verdict == "differ"
@@ -102,7 +102,7 @@ def test_a_variant_that_crashes_names_what_it_did(
     )
     program.chmod(0o700)
     monkeypatch.setattr(variants.sys, "executable", str(program))
-    found = variants._measured("llvm_ad_rgb", variants.Task(), tmp_path / "v", lambda line: None)
+    found = variants.measured("llvm_ad_rgb", variants.Task(), tmp_path / "v", lambda line: None)
     assert found["rays disk"]["status"] == "agree"
     assert found["rays sphere"]["status"] == "differ"
     assert "llvm_ad_rgb ends the process with -6" in found["rays sphere"]["reason"]
