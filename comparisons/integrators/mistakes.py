@@ -7,10 +7,12 @@ from typing import Any, NamedTuple
 from comparisons.integrators import translate_integrator, type_of
 from comparisons.integrators.light import as_path
 from comparisons.lights import type_of as type_of_light
+from comparisons.shapes import type_of as type_of_shape
 from reference_rt.integrators import Direct, Light, Path
 from reference_rt.lights import Directional
 from reference_rt.materials import Emissive, Mask, NoSurface, ThinDielectric
 from reference_rt.scene.model import SceneModel
+from reference_rt.shapes import Mesh, Plane, Shape, Solid
 
 
 def in_place_of(scene: SceneModel, has_solids: bool = False) -> dict[str, Any] | None:
@@ -80,12 +82,31 @@ def loses_lamps(scene: SceneModel) -> bool:
 
 def has_wrong_media(scene: SceneModel) -> bool:
     """A medium that is clear in one colour scatters none by `volpathmis`, and is no number by
-    `volpath`; around a camera, a medium without end is lit by what is infinitely far away (Mitsuba
-    3.9.1; findings/)."""
+    `volpath`; a medium without end is lit by what is infinitely far away (Mitsuba 3.9.1;
+    findings/)."""
     clear = any(0.0 in m.sigma_t and any(m.sigma_t) for m in scene.media.values())
     far = any(type_of_light(light).surrounds for light in scene.lights)
     far |= any(isinstance(light, Directional) for light in scene.lights)
-    return clear or (scene.camera.medium is not None and far)
+    return clear or (far and has_endless_media(scene))
+
+
+def has_endless_media(scene: SceneModel) -> bool:
+    """Whether rays may leave the scene in a medium: it is around the camera, or no closed shape has
+    it within.  Meshes with a medium in them are taken for closed ones."""
+    closed: set[str | None] = {None}
+    others: set[str | None] = set()
+    for shape in (*scene.shapes, *(one for group in scene.groups.values() for one in group)):
+        if shape.interior is not None:
+            (closed if _holds(shape) else others).add(shape.interior)
+        others.add(shape.exterior)
+    return scene.camera.medium is not None or not others <= closed
+
+
+def _holds(shape: Shape) -> bool:
+    """Whether a shape is closed, and of finite size."""
+    if isinstance(shape, Plane):
+        return False
+    return isinstance(shape, Mesh | Solid) or type_of_shape(shape).encloses(shape)
 
 
 BLACK: dict[str, Any] = {
@@ -157,7 +178,7 @@ MISTAKES = (
         has_wrong_media,
         lambda scene: (
             "Mitsuba is wrong for media that are clear in one colour, and for those without end "
-            "around a camera; our own integrator, which runs in Mitsuba, takes the place of its own"
+            "under a sun or a sky; our own integrator, which runs in Mitsuba, takes the place of its own"
         ),
     ),
     Mistake(

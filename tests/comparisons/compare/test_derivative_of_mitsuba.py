@@ -83,6 +83,9 @@ def test_shadows_of_lamps_without_extent(is_lit):
     text = (ROOT / "scenes/light_directional.yaml").read_text()
     if not is_lit:
         text = text.replace("irradiance: [3, 2.8, 2.4]", "irradiance: 0")
+    # Of a floor of 8 x 8 the ball sees the outline, which is wrong in Mitsuba: it is turned
+    # (findings/mitsuba-projective-turned-rectangle.sh).
+    text = text.replace("{scale: 4}", "{scale: 400}")
     text = text.replace("width: 128, height: 96", "width: 32, height: 24")
     found = case(
         "shapes[0].center[1]", text, limit=0.02, integrator="direct_projective", guiding="none"

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 import reference_rt as rt
 from comparisons.integrators.mistakes import in_place_of, notes_of_integrator
@@ -113,3 +114,43 @@ def test_a_lamp_behind_boundaries_is_not_lost():
         means.append(mean(scene.changed(camera=camera), 256))
     assert np.allclose(means[1], means[0], rtol=0.02)  # 12,288 samples, of a spread below 1
     assert means[0].min() > 0.01
+
+
+ENDLESS = {
+    "rectangle": "interior: ink, transform: [{scale: 9}]",
+    "disk": "interior: ink, transform: [{scale: 9}]",
+    "plane": "interior: ink",
+    "polygon": "interior: ink, rings: [[[-9, -9], [9, -9], [9, 9], [-9, 9]]]",
+    "cylinder": "interior: ink, capped: false",
+    "sphere": "exterior: ink, radius: 9",
+    "mesh": "exterior: ink, file: ball.obj, transform: [{scale: 9}]",
+}
+CLOSED = {
+    "sphere": "interior: ink, radius: 9",
+    "box": "interior: ink",
+    "cylinder": "interior: ink",
+    "torus": "interior: ink",
+    "mesh": "interior: ink, file: ball.obj",
+}
+
+
+@pytest.mark.parametrize(
+    ("shape", "endless"),
+    [(shape, True) for shape in ENDLESS.items()] + [(shape, False) for shape in CLOSED.items()],
+    ids=lambda value: value[0] if isinstance(value, tuple) else str(value),
+)
+def test_a_medium_without_end_is_not_lit_by_a_sky(shape: tuple[str, str], endless: bool, tmp_path):
+    """Mitsuba lights it as if it ended at the edge of the scene, so that our integrator follows the
+    light: none is left on an endless way."""
+    kind, fields = shape
+    trimesh.creation.icosphere(1).export(tmp_path / "ball.obj")
+    head = HEAD.replace("DEPTH", "20").replace("width: 0.2", "width: 0.02")
+    text = f"{head}  - {{type: {kind}, material: none, {fields}}}\n"
+    (tmp_path / "scene.yaml").write_text(text)
+    scene = Scene.load(tmp_path / "scene.yaml")
+    scene = scene.changed(materials={"none": scene.materials["none"]})
+    assert (in_place_of(scene) is not None) == endless
+    if endless and kind != "cylinder":  # whose open ends the view does not meet
+        assert np.all(mean(scene, 4) == 0.0)
+    dark = scene.changed(lights=(rt.Point(position=(0, 0, 3), intensity=1.0),))
+    assert in_place_of(dark) is None  # its light comes from within a finite distance

@@ -87,7 +87,7 @@ def test_errors_come_back_through_links():
 # Two types whose tables have one class, as glass and thin glass have.
 _TWINS = """
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 import numpy as np
 from reference_rt.core.arrays import FloatArray
 from reference_rt.jit.by_code import ByCode
@@ -97,10 +97,6 @@ from reference_rt.jit.links import Linker
 class Table(NamedTuple):
     numbers: FloatArray
 
-class Tables(NamedTuple):
-    adders: Table | None
-    scalers: Table | None
-
 @kernel
 def add(table: Table, x: float) -> float:
     return table.numbers[0] + x
@@ -109,9 +105,11 @@ def add(table: Table, x: float) -> float:
 def scale(table: Table, x: float) -> float:
     return table.numbers[0] * x
 
-by_code = ByCode(
-    [(0, "adders", SimpleNamespace(value=add)), (1, "scalers", SimpleNamespace(value=scale))]
-)
+class Tables(NamedTuple):
+    adders: Annotated[Table | None, SimpleNamespace(value=add)]
+    scalers: Annotated[Table | None, SimpleNamespace(value=scale)]
+
+by_code = ByCode(Tables)
 
 @by_code("value")
 def value(tables: Tables, kind: int, x: float) -> float:
@@ -123,7 +121,8 @@ def run(link, kind, x, out):
 
 def main(*codes):
     linker, table, out = Linker(), Table(np.array([3.0])), np.zeros(1)
-    link = linker.link(by_code.operations, ["value"], {code: table for code in codes})
+    tables = Tables(*(table if code in codes else None for code in range(2)))
+    link = linker.link(by_code, ["value"], tables)
     before = [is_compiled(*call) for call in linker.calls]
     for call in linker.calls:
         precompile(*call)
