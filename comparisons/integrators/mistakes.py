@@ -178,7 +178,8 @@ MISTAKES = (
         has_wrong_media,
         lambda scene: (
             "Mitsuba is wrong for media that are clear in one colour, and for those without end "
-            "under a sun or a sky; our own integrator, which runs in Mitsuba, takes the place of its own"
+            "under a sun or a sky; our own integrator, which runs in Mitsuba, takes the place of "
+            "its own"
         ),
     ),
     Mistake(

@@ -18,7 +18,7 @@ FLOORS = {
     ),
     "comparisons": (
         *("results", "geometry", "statistics", "renderers", "mitsuba", "textures", "materials"),
-        *("media", "cameras", "lights", "integrators", "shapes", "referee", "translator"),
+        *("media", "cameras", "lights", "shapes", "integrators", "referee", "translator"),
         *("pbrt", "gltf"),
         *("runs", "raysect", "cycles", "povray", "rungs", "report", "compare", "gate", "truth"),
         *("suites", "experiments", "commands"),
