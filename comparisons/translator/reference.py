@@ -212,9 +212,6 @@ def _wrap(state: Any, index: int, plugin: str, values: dict[str, Any]) -> None:
 # ---- the scene of a user's file ------------------------------------------------------------------
 
 
-WINDOW = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y")
-
-
 def own_scene(scene: Scene, sampler: ReferenceSampler = "independent") -> Any:
     """Mitsuba's scene of the file that `scene` was read from, for pictures of the size that `scene`
     has, with a box filter and this sampler.
