@@ -167,7 +167,8 @@ def test_what_is_beyond_the_far_plane_is_not_seen_through_a_boundary(kind: str):
     text = text.replace(
         "{type: orthographic, eye: [0, 0, 5], target: [0, 0, 0], width: 0.2}", camera
     )
-    sheet = "  - {type: rectangle, material: none, interior: ink, transform: [{translate: [0, 0, 2]}]}\n"
+    place = "transform: [{translate: [0, 0, 2]}]"
+    sheet = f"  - {{type: rectangle, material: none, interior: ink, {place}}}\n"
     lamp = "  - {type: disk, material: lamp}\n"
     scene = Scene.parse(text + sheet + lamp)
     # 1 of ink, from z = 2 to the far plane at z = 1, and the sky behind it.
