@@ -31,7 +31,10 @@ def first_difference(case: Case) -> str:
 def _differ(case: Case) -> str:
     rung = _first(case, "differ")
     what = "the pictures differ" if rung is None else _what(rung, case)
-    if alone := next((r.numbers.get("alone") for r in case.rungs if r.name == "witness"), None):
+    witness = next((rung.numbers for rung in case.rungs if rung.name == "witness"), {})
+    if said := witness.get("disagree"):
+        what = f"{what}; {said}"
+    elif alone := witness.get("alone"):
         what = f"{what}; {alone} stands alone"
     if case.cause is None:
         return f"{what}; no single cause explains it"
