@@ -17,9 +17,9 @@ from reference_rt.util.console import Bar, ProgressLine
 
 class Standing(RenderHook):
     """Lets pixels above a bar stand where a refresh of the bar would erase them and send them
-    again: a hook of a console that comes after that of rich's `Live`.
+    again: a hook of a console that comes after that of rich's live displays.
 
-    `Live` begins each output by moving up over all that it has printed, and by erasing it.
+    These begin each output by moving up over all that they have printed, and by erasing it.
     """
 
     def __init__(self) -> None:

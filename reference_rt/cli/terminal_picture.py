@@ -13,6 +13,7 @@ import os
 import shutil
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 
 import numpy as np
 import numpy.typing as npt
@@ -147,15 +148,14 @@ def room() -> tuple[int, int]:
 
 def cell() -> tuple[int, int]:
     """Width and height of a cell in pixels."""
-    try:
-        import fcntl
-        import struct
-        import termios
+    for shown in (sys.stderr, sys.stdout):
+        with suppress(ImportError, OSError, ValueError):
+            import fcntl
+            import struct
+            import termios
 
-        answer = fcntl.ioctl(sys.stdout.fileno(), termios.TIOCGWINSZ, bytes(8))
-        lines, columns, width, height = struct.unpack("HHHH", answer)
-    except (ImportError, OSError, ValueError):
-        return CELL
-    if not (lines and columns and width and height):
-        return CELL
-    return max(1, width // columns), max(1, height // lines)
+            answer = fcntl.ioctl(shown.fileno(), termios.TIOCGWINSZ, bytes(8))
+            lines, columns, width, height = struct.unpack("HHHH", answer)
+            if lines and columns and width and height:
+                return max(1, width // columns), max(1, height // lines)
+    return CELL

@@ -20,7 +20,7 @@ import time
 import numpy as np
 from PIL import Image
 
-CELL = (8, 16)
+CELL = (10, 22)
 """Width and height of a cell in pixels."""
 
 LETTER, EMPTY = 128, -1

@@ -17,6 +17,9 @@ DRAWS = {
     "blocks": {},
 }
 
+TIMES = 13
+"""Pictures are made as many times as large: 20 rows of pixels in 12 of cells, 264 pixels."""
+
 PROGRAM = """
 import os, sys, time
 import numpy as np
@@ -73,14 +76,14 @@ def test_the_picture_arrives_and_the_bar_is_below(terminal, protocol):
         found = found[:: CELL[1] // 2, :: CELL[0]]
         assert (found == picture(1)).all()
     else:
-        expected = larger(picture(1), 9)  # there is room for 12 rows of 16 pixels
+        expected = larger(picture(1), TIMES)
         assert found.shape == expected.shape
         assert np.abs(found - expected).max() <= {"kitty": 0, "sixel": 2}[protocol]
     assert set(seen.drawn) == {protocol} - {"blocks"}
     words = [line for line in seen.lines() if line.strip(" ▀")]
     assert len(words) == 1
     assert words[0].startswith("rendering")
-    rows = -(-20 * 9 // CELL[1]) if protocol != "blocks" else 10
+    rows = -(-20 * TIMES // CELL[1]) if protocol != "blocks" else 10
     assert seen.lines().index(words[0]) == rows
 
 
@@ -93,7 +96,7 @@ def test_a_new_picture_takes_the_place_of_the_old(terminal, protocol, at_the_end
     does += ["bar._bar.refresh()"] * 5
     does += ['bar.show_pictures([("", picture(2))])', *["bar._bar.refresh()"] * 5]
     seen = shown(does, terminal(**DRAWS[protocol]))
-    assert np.abs(seen.picture() - larger(picture(2), 9)).max() <= 2
+    assert np.abs(seen.picture() - larger(picture(2), TIMES)).max() <= 2
     assert seen.drawn == [protocol, protocol]
     assert len(seen.placed) == (protocol == "kitty")
     assert sum(line.startswith("rendering") for line in seen.lines()) == 1
@@ -104,10 +107,9 @@ def test_lines_go_above_the_picture(terminal, protocol):
     does = ['bar.show_pictures([("ours", picture(1)), ("theirs", picture(2))])']
     does += ["bar._bar.refresh()", 'bar.line("a line")', "bar._bar.refresh()"]
     seen = shown(does, terminal(**DRAWS[protocol]))
-    assert seen.lines()[:2] == ["a line", "ours" + " " * 23 + "  theirs"]
+    assert seen.lines()[:2] == ["a line", "ours" + " " * 23 + "  theirs"]  # of 28 cells each
     both = seen.picture()
-    # 28 cells for each: 224 pixels for 30, of which seven times as many are in 27 cells.
-    one, two = larger(picture(1), 7), larger(picture(2), 7)
+    one, two = larger(picture(1), 9), larger(picture(2), 9)
     width = one.shape[1]
     assert np.abs(both[:, :width] - one).max() <= 2
     assert np.abs(both[:, -width:] - two).max() <= 2
@@ -131,9 +133,9 @@ def test_what_is_printed_remains(terminal, protocol):
     seen = terminal(**DRAWS[protocol])
     line = '    bar._console.print(bar.row([("ours", picture(1))], 20, 8))\n'
     assert seen.run(PROGRAM + line + 'print("after")\n') == 0
-    assert np.abs(seen.picture() - larger(picture(1), 5)).max() <= 2
+    assert np.abs(seen.picture() - larger(picture(1), 6)).max() <= 2
     assert [line for line in seen.lines() if line] == ["ours", "after"]
-    assert seen.lines().index("after") == 1 + -(-20 * 5 // CELL[1])
+    assert seen.lines().index("after") == 1 + -(-20 * 6 // CELL[1])
 
 
 @pytest.mark.parametrize(

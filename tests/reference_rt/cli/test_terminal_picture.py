@@ -76,7 +76,8 @@ def test_sixels_are_the_pixels(rows, columns):
 def test_large_pictures_fit_as_sixels():
     width, height = cell()
     found = of_sixels(sixels(picture(300, 300), 80 // width, 80 // height))
-    assert found.shape[:2] == (80, 80)
+    side = min(80 // width * width, 80 // height * height)
+    assert found.shape[:2] == (side, side)
     assert (found >= 0).all()
 
 
