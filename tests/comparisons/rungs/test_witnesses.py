@@ -13,7 +13,7 @@ from comparisons.compare.budget import Budget, usual
 from comparisons.compare.compare import Subject, compare_scene
 from comparisons.cycles.backend import PYTHON
 from comparisons.results.case import Case, RungResult, decide
-from comparisons.results.headline import headline
+from comparisons.results.headline import headline, in_short
 from comparisons.rungs import witness as witnesses
 from comparisons.rungs.witness import together, vote
 from comparisons.suites.suite import Changes
@@ -112,14 +112,15 @@ def test_one_witness_is_as_it_was():
 
 @pytest.fixture
 def two(monkeypatch):
-    """two(factors) -> witnesses whose pictures are the mean of both sides, times these."""
+    """two(factors, said) -> witnesses whose pictures are the mean of both sides, times these, and
+    what else their rungs have."""
 
-    def make(factors):
+    def make(factors, **said):
         def witness_of(name, scene, limit, threads, say, seen):
             def hear(replicates, sides):
                 whose, third = f"{name}'s", factors[name] * sum(replicates) / 2.0
                 rung = vote((*replicates, third), (*sides, whose), limit)
-                rung.numbers["whose"] = whose
+                rung.numbers.update({"whose": whose} | said.get(name, {}))
                 return rung, {whose: third.mean(axis=0)}
 
             return hear
@@ -156,6 +157,15 @@ def test_a_verdict_says_that_they_disagree(two):
     assert case.verdict == "differ"
     assert "the witnesses disagree" in case.reason
     assert "the witnesses disagree" in headline(case)
+
+
+def test_an_agreement_says_so_too(two):
+    two({"cycles": 1.0, "povray": 1.0}, povray={"alone": "Mitsuba's"})
+    case = compared()
+    assert case.verdict == "agree"
+    for told in (case.reason, headline(case), in_short(case)[0]):
+        assert "the witnesses disagree: Cycles says that both sides are right" in told
+        assert told.count("disagree") == 1
 
 
 @pytest.mark.parametrize(

@@ -103,6 +103,25 @@ def test_a_new_picture_takes_the_place_of_the_old(terminal, protocol, at_the_end
 
 
 @pytest.mark.parametrize("protocol", ["kitty", "sixel"])
+@pytest.mark.parametrize("counts", [(1, 2), (2, 1)], ids=str)
+def test_pictures_of_other_sizes_take_the_place_of_the_old(terminal, protocol, counts):
+    """As in a comparison, where Mitsuba's is there first."""
+    does = []
+    for count in counts:
+        listed = ", ".join(f'("", picture({k}))' for k in range(count))
+        does += [f"bar.show_pictures([{listed}])", "bar._bar.refresh()"]
+    seen = shown(does, terminal(**DRAWS[protocol]))
+    found = seen.picture()
+    last = larger(picture(0), TIMES if counts[-1] == 1 else 9)
+    height, width = last.shape[:2]
+    assert found.shape[0] == height
+    assert np.abs(found[:, :width] - last).max() <= 2
+    assert (found.shape[1] == width) == (counts[-1] == 1)
+    assert len(seen.placed) == counts[-1] * (protocol == "kitty")
+    assert sum(line.startswith("rendering") for line in seen.lines()) == 1
+
+
+@pytest.mark.parametrize("protocol", ["kitty", "sixel"])
 def test_lines_go_above_the_picture(terminal, protocol):
     does = ['bar.show_pictures([("ours", picture(1)), ("theirs", picture(2))])']
     does += ["bar._bar.refresh()", 'bar.line("a line")', "bar._bar.refresh()"]
@@ -272,7 +291,8 @@ except KeyboardInterrupt:
     assert seen.left_in_input() == (b"", True)
 
 
-def test_preview_draws_as_the_terminal_can(terminal):
+@pytest.mark.parametrize("protocol", DRAWS)
+def test_preview_draws_as_the_terminal_can(terminal, protocol):
     """`preview --to terminal`, without a scene."""
     program = (
         PROGRAM.partition("with")[0]
@@ -284,11 +304,10 @@ for seed in (1, 2):
     view.show(picture(seed))
 """
     )
-    for protocol, draws in DRAWS.items():
-        seen = terminal(**draws)
-        assert seen.run(program) == 0
-        found = seen.picture()
-        found = found[:: CELL[1] // 2, :: CELL[0]] if protocol == "blocks" else found
-        assert np.abs(found - picture(2)).max() <= 2
-        assert [line for line in seen.lines() if line.strip("▀")] == ["words"]
-        assert seen.left_in_input() == (b"", True)
+    seen = terminal(**DRAWS[protocol])
+    assert seen.run(program) == 0
+    found = seen.picture()
+    found = found[:: CELL[1] // 2, :: CELL[0]] if protocol == "blocks" else found
+    assert np.abs(found - picture(2)).max() <= 2
+    assert [line for line in seen.lines() if line.strip("▀")] == ["words"]
+    assert seen.left_in_input() == (b"", True)
