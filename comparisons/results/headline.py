@@ -15,7 +15,7 @@ UP_TO = "up to "
 def headline(case: Case) -> str:
     """One sentence without a full stop, such as "likeliest cause: half-pixel shift in x; 25 of 64
     tiles differ, the worst by +12 %"."""
-    return _SENTENCES[case.verdict](case) + _disagreement(case)
+    return _with_disagreement(_SENTENCES[case.verdict](case), case)
 
 
 def first_difference(case: Case) -> str:
@@ -31,8 +31,9 @@ def first_difference(case: Case) -> str:
 def _differ(case: Case) -> str:
     rung = _first(case, "differ")
     what = "the pictures differ" if rung is None else _what(rung, case)
-    if alone := _of_witness(case, "alone"):
-        what = f"{what}; {alone} stands alone"
+    alone = _of_witness(case, "alone")
+    if alone and not what.endswith(said := f"{alone} stands alone"):
+        what = f"{what}; {said}"
     if case.cause is None:
         return f"{what}; no single cause explains it"
     return f"likeliest cause: {case.cause.name}; {what}"
@@ -42,7 +43,7 @@ def in_short(case: Case) -> tuple[str, str]:
     """The headline, and apart from it the smallest bias of the image mean that would have been
     seen; "" if it is unknown."""
     seen = detectable(next((rung for rung in case.rungs if rung.name == "statistics"), None))
-    sentence = _none(case) + _disagreement(case) if case.verdict == "agree" else headline(case)
+    sentence = _with_disagreement(_none(case), case) if case.verdict == "agree" else headline(case)
     return sentence, "" if seen is None else percent(seen)
 
 
@@ -52,10 +53,10 @@ def _of_witness(case: Case, name: str) -> str:
     return next((str(rung.numbers[name]) for rung in rungs if name in rung.numbers), "")
 
 
-def _disagreement(case: Case) -> str:
-    """That witnesses disagree, to be added to a sentence."""
+def _with_disagreement(sentence: str, case: Case) -> str:
+    """A sentence that says, too, if witnesses disagree."""
     said = _of_witness(case, "disagree")
-    return f"; {said}" if said else ""
+    return sentence if said in sentence else f"{sentence}; {said}"
 
 
 def _none(case: Case) -> str:

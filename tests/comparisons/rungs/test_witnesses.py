@@ -130,7 +130,7 @@ def two(monkeypatch):
     return make
 
 
-def compared() -> Case:
+def compared(witness=("cycles", "povray")) -> Case:
     scene = rt.Scene(
         film=rt.Film(width=24, height=16),
         integrator=rt.Path(max_depth=2),
@@ -138,7 +138,7 @@ def compared() -> Case:
         shapes=(rt.Sphere(center=(0, 0, -4), material="grey"),),
         lights=(rt.Constant(radiance=1.0),),
     )
-    budget = Budget(spp=16, limit=0.05, pixels=64, witness=["cycles", "povray"])
+    budget = Budget(spp=16, limit=0.05, pixels=64, witness=witness)
     only = ("statistics", "images")
     return compare_scene(Subject(scene), budget, lambda line: None, 1, only)
 
@@ -155,8 +155,15 @@ def test_a_verdict_says_that_they_disagree(two):
     two({"cycles": 1.0, "povray": 1.3})
     case = compared()
     assert case.verdict == "differ"
-    assert "the witnesses disagree" in case.reason
-    assert "the witnesses disagree" in headline(case)
+    assert case.reason.count("the witnesses disagree") == 1
+    assert headline(case).count("the witnesses disagree") == 1
+
+
+def test_who_stands_alone_is_said_once(two):
+    two({"cycles": 1.3})
+    case = compared("cycles")
+    assert case.verdict == "differ"
+    assert headline(case).count("cycles's stands alone") == 1
 
 
 def test_an_agreement_says_so_too(two):
