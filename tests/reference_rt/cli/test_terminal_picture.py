@@ -73,6 +73,22 @@ def test_sixels_are_the_pixels(rows, columns):
     assert np.abs(found * 2.55 - pixels).max() <= 1.3
 
 
+def test_pixels_have_the_nearest_colour_of_the_palette():
+    """Of a picture of many colours, whose palette is made of a part of its pixels."""
+    rng = np.random.default_rng(5)
+    y, x = np.mgrid[:60, :200]
+    mean = np.stack([x * 1.2, y * 4.0, (x + y) * 0.9], axis=-1)
+    pixels = np.clip(mean + rng.normal(0.0, 10.0, mean.shape), 0, 255).astype(np.uint8)
+    shown = of_sixels(sixels(pixels, 400, 200)) * 2.55
+    palette = np.unique(shown.reshape(-1, 3), axis=0)
+    assert 128 <= len(palette) <= 256
+    distances = np.linalg.norm(pixels.reshape(-1, 1, 3) - palette, axis=-1)
+    off = np.linalg.norm(shown - pixels, axis=-1).ravel() - distances.min(axis=1)
+    # Pillow finds the colour nearest to a box of 4 x 4 x 4 around the pixel; and see above.
+    assert off.max() <= np.sqrt(3.0) * (4.0 + 2.0 * 1.3)
+    assert np.sqrt(np.mean(distances.min(axis=1) ** 2)) <= 10.0 * np.sqrt(3.0)  # the noise's
+
+
 def test_large_pictures_fit_as_sixels():
     width, height = cell()
     found = of_sixels(sixels(picture(300, 300), 80 // width, 80 // height))
