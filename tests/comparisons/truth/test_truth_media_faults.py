@@ -56,23 +56,31 @@ FAULTS = (
     ),
     Fault(
         "distance of a shadow ray without its length", PATH,
+        "return Way(True, _further(media, medium, passed, ray.t_max * unit))",
+        "return Way(True, _further(media, medium, passed, ray.t_max))",
+        ("floor_in_smoke", "point_in_fog"),
+    ),
+    Fault(
+        "the same beside boundaries without a surface", PATH,
         "passed = _further(media, medium, passed, hit.t * unit)",
-        "passed = _further(media, medium, passed, hit.t)", ("floor_in_smoke", "point_in_fog"),
+        "passed = _further(media, medium, passed, hit.t)", ("point_by_ball",),
     ),
     Fault(
         "fog ends behind the scene", PATH,
-        "passed = _further(media, medium, passed, hit.t * unit)",
-        "passed = _further(media, medium, passed, min(hit.t * unit, 3.0))", ("endless_fog",),
+        "return Way(True, _further(media, medium, passed, ray.t_max * unit))",
+        "return Way(True, _further(media, medium, passed, min(ray.t_max * unit, 3.0)))",
+        ("endless_fog",),
     ),
     Fault(
         "density of the wrong colour", PATH,
-        "inverse = 1.0 / media.sigma_t[medium, hue]", "inverse = 1.0 / media.sigma_t[medium, 0]",
-        ("sun_on_fog", "half_space_sun_4"),
+        "ratio = ratio * row_of(media.sigma_t, medium) * inverse",
+        "ratio = ratio * row_of(media.sigma_t, medium) * (1.0 / media.sigma_t[medium, 0])",
+        ("sun_on_fog",),
     ),
     Fault(
         "weights of colours forget the way", PATH,
         "ratio = ratio * _left(passed.sampled, taken)", "ratio = ratio",
-        ("sun_on_fog", "half_space_sky_1"),
+        ("half_space_sky_1",),  # of light scattered once the mean is right
     ),
     Fault(
         "light of media that only absorb is not taken", PATH,
@@ -145,7 +153,7 @@ FAULTS = (
         "            picked = _light_for(scene, point.p, black", ("sun_on_fog", "point_by_ball"),
     ),
 )  # fmt: skip
-"""The 20th is what Mitsuba 3.9.1's volpathmis does: findings/mitsuba-volpathmis-roulette.sh."""
+"""The 21st is what Mitsuba 3.9.1's volpathmis does: findings/mitsuba-volpathmis-roulette.sh."""
 
 
 def planted(fault):
