@@ -291,8 +291,8 @@ def test_the_public_module():
     from comparisons.testing import check_material as found
 
     assert found is check_material
-    assert {"check_material", "chi_square", "furnace", "reciprocity", "weights"} <= set(dir(testing))
-    assert {"compare", "gate", "gate_derivative", "gate_pair", "testing"} <= set(dir(comparisons))
+    assert {"check_material", "chi_square", "furnace", "reciprocity", "weights"} <= {*dir(testing)}
+    assert {"compare", "gate", "gate_derivative", "gate_pair", "testing"} <= {*dir(comparisons)}
 
 
 def test_the_fixture(material_gate, tmp_path, monkeypatch):
