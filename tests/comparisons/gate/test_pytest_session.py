@@ -142,6 +142,17 @@ def test_a_page_is_written_for_nothing_and_nothing_without_being_asked(
     assert "file is a file; expected a folder" in refused.stderr.str()
 
 
+def test_tests_that_are_only_collected_leave_the_page(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(test_it=MODULE)
+    _, before = run(pytester, "-k", "file or without")
+    text, after = run(pytester, "--collect-only")  # as editors do
+    assert after == before
+    assert "uses of gates" not in text
+    run(pytester, "-k", "without")
+    # A session without a gate says nothing of any, and takes no place among the last ones.
+    assert len(list((pytester.path / "kept").glob("run-*.json"))) == 1
+
+
 @pytest.mark.slow
 def test_a_verdict_that_changes_is_named(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
