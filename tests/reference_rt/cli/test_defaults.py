@@ -76,6 +76,21 @@ def test_paths_stay_within_the_folder(
     assert not [*elsewhere.iterdir()]
 
 
+def test_the_file_of_a_named_picture_is_a_path_too(
+    project: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`--beside NAME=FILE`."""
+    inside = project / "a"
+    inside.mkdir()
+    monkeypatch.chdir(inside)
+    file = project / "pyproject.toml"
+    file.write_text("[tool.reference_rt.gate]\nbeside = ['Cycles=none.exr']\n")
+    words = ("gate", "none.npy", "--reference", "none.npy")
+    assert f"{Path('..', 'none.exr')}: there is no such file" in invoke(*words).stderr
+    file.write_text("[tool.reference_rt.gate]\nbeside = ['Cycles=/elsewhere/c.exr']\n")
+    assert "expected a path within the file's folder" in invoke(*words).stderr
+
+
 def test_a_file_that_may_not_be_read_is_passed_by(
     project: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
