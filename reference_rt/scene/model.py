@@ -134,10 +134,7 @@ class SceneModel(Description):
             ),
             *(partial(self._check_texture, name) for name in self.textures),
             *(partial(self._check_parts, *item) for item in self.materials.items()),
-            *(
-                partial(self._check_textures, light, "lights", i)
-                for i, light in enumerate(self.lights)
-            ),
+            *(partial(self._check_textures, one, "lights", i) for i, one in enumerate(self.lights)),
             partial(self._check_medium, self.camera.medium, "camera", "medium"),
             self._check_follows_media,
             self._check_environments,
