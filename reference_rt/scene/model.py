@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -122,24 +123,19 @@ class SceneModel(Description):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        parts: list[Callable[[], None]] = [
-            *(
-                partial(self._check_shape, shape, "shapes", i)
-                for i, shape in enumerate(self.shapes)
-            ),
-            *(
+        parts: Iterable[Callable[[], None]] = chain(
+            (partial(self._check_shape, shape, "shapes", i) for i, shape in enumerate(self.shapes)),
+            (
                 partial(self._check_shape, shape, "groups", name, k)
                 for name, shapes in self.groups.items()
                 for k, shape in enumerate(shapes)
             ),
-            *(partial(self._check_texture, name) for name in self.textures),
-            *(partial(self._check_parts, *item) for item in self.materials.items()),
-            *(partial(self._check_textures, one, "lights", i) for i, one in enumerate(self.lights)),
-            partial(self._check_medium, self.camera.medium, "camera", "medium"),
-            self._check_follows_media,
-            self._check_environments,
-            self._check_on_grid,
-        ]
+            (partial(self._check_texture, name) for name in self.textures),
+            (partial(self._check_parts, *item) for item in self.materials.items()),
+            (partial(self._check_textures, one, "lights", i) for i, one in enumerate(self.lights)),
+            [partial(self._check_medium, self.camera.medium, "camera", "medium")],
+            [self._check_follows_media, self._check_environments, self._check_on_grid],
+        )
         wrong = []
         for check in parts:
             try:
