@@ -20,8 +20,6 @@ from reference_rt.cameras.film import (
 )
 from reference_rt.core.model import Description
 
-THIRD = 1.0 / 3.0
-
 F = TypeVar("F", bound=Description)
 
 

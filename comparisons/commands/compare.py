@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -113,7 +113,7 @@ def compare(
     """
     if fixed and time_limit is not None:
         raise UsageError("got --fixed and --time-limit; expected one of them")
-    if derivative is not None and witness is not None:
+    if derivative is not None and witness:
         raise UsageError("got --derivative and --witness, which judges pictures; expected one")
     if derivative is None and (differentiator or guiding or step):
         raise UsageError("got an option of a derivative; expected --derivative PARAMETER, too")
@@ -131,6 +131,7 @@ def compare(
         with compare_extra():
             from comparisons.compare.budget import Asked, usual
             from comparisons.compare.looks import SECONDS
+            from comparisons.renderers import several
             from comparisons.results.case import exit_code
             from comparisons.suites.run import Options, Run, run_cases, summarise
             from comparisons.suites.suite import Changes, plan_of_files
@@ -139,7 +140,7 @@ def compare(
             spp=spp, size=size, seed=seed, defaults=by_name(define), allow_missing=allow_missing
         )
         seconds = SECONDS if limit is None else limit
-        budget = usual(spp, replicates, seconds, fixed=fixed, witness=witness)
+        budget = usual(spp, replicates, seconds, fixed=fixed, witness=several(witness))
         if derivative is not None:
             asked = Asked(
                 parameter=derivative,
@@ -178,7 +179,7 @@ def compare(
     raise typer.Exit(exit_code(run.cases, run.missing))
 
 
-def _command(path: Path, changes: "Changes", given: Mapping[str, float | str | bool | None]) -> str:
+def _command(path: Path, changes: "Changes", given: Mapping[str, Any]) -> str:
     """The command that repeats one case alone;  given: other options."""
     import shlex
 
@@ -190,7 +191,8 @@ def _command(path: Path, changes: "Changes", given: Mapping[str, float | str | b
         else f"--{name} {value:g}"
         if isinstance(value, float)
         else f"--{name} {shlex.quote(str(value))}"
-        for name, value in options.items()
+        for name, values in options.items()
+        for value in (values if isinstance(values, list) else [values])
         if value is not None
     ]
     words += [f"-D {shlex.quote(f'{k}={v}')}" for k, v in changes.defaults.items()]
@@ -243,6 +245,7 @@ def suite(
     Finished cases are kept in the output folder and not run again.
     """
     with compare_extra():
+        from comparisons.renderers import several
         from comparisons.report.ci import Formats
         from comparisons.results.case import exit_code
         from comparisons.suites.run import Options, Run, run_suite, summarise
@@ -255,8 +258,8 @@ def suite(
     source = load_suite(name)
     changes = Changes(defaults=by_name(define))
     planned = plan(source, scenes, tuple(only or ()), rungs, changes)
-    if witness is not None:
-        asked = {"witness": witness}
+    if witness:
+        asked = {"witness": several(witness)}
         work = (w._replace(budget=w.budget.model_copy(update=asked)) for w in planned.work)
         planned = planned._replace(work=tuple(work))
     folder = out or Path("out") / source.name

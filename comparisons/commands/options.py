@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import typer
 
@@ -65,8 +65,11 @@ NumberOfWorkers = Annotated[
 ]
 
 Witness = Annotated[
-    Literal["cycles", "povray"] | None,
-    typer.Option(help="A third renderer, whose pictures say who stands alone: cycles or povray."),
+    list[str] | None,
+    typer.Option(
+        metavar="NAME",
+        help="A third renderer, whose pictures say who stands alone: cycles or povray; repeatable.",
+    ),
 ]
 
 TimeLimit = Annotated[

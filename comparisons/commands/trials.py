@@ -33,7 +33,7 @@ from reference_rt.util.errors import UsageError
 from reference_rt.util.workers import Workers
 
 if TYPE_CHECKING:
-    from comparisons.renderers import WitnessName
+    from comparisons.renderers import Witnesses
 
 
 @guarded
@@ -80,7 +80,7 @@ def selftest(
     if mirrored:
         _mirror(patterns, scenes / "truth", witness, out, opened)
         return
-    if witness is not None:
+    if witness:
         raise UsageError("--witness: expected --mirrored with it")
     from comparisons.commands.outputs import Outputs
     from comparisons.experiments.selftest import FAULTS
@@ -130,7 +130,7 @@ def _mutate(count: int, seed: int, scenes: Path, out: Path, opened: Callable[[],
 def _mirror(
     patterns: list[str],
     scenes: Path,
-    witness: "WitnessName | None",
+    witness: "Witnesses",
     out: Path,
     opened: Callable[[], Workers],
 ) -> None:

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field
 
 from comparisons.compare.looks import FIRST, PARTS, PATIENCE, SECONDS
-from comparisons.renderers import ReferenceSampler, WitnessName
+from comparisons.renderers import ReferenceSampler, WitnessName, several
 from comparisons.results.differentiators import DifferentiatorName, Guiding
 from reference_rt.cli.quantities import seconds_in
 from reference_rt.core.model import Description
@@ -91,8 +91,8 @@ class Budget(Description):
     `reference-limited`."""
     limit: Annotated[float, Field(gt=0)] = 0.005
     """The smallest relative bias of the image mean that must be detectable."""
-    witness: WitnessName | None = None
-    """A third renderer whose pictures say who stands alone (`comparisons.rungs.witness`)."""
+    witness: Annotated[tuple[WitnessName, ...], BeforeValidator(several)] = ()
+    """Other renderers whose pictures say who stands alone (`comparisons.rungs.witness`)."""
     derivative: Asked | None = None
     """Compare a derivative of the picture in place of the picture."""
     control: bool = False

@@ -25,7 +25,7 @@ from comparisons.mitsuba.parse import file_of
 from comparisons.results.case import Case, RungResult
 from comparisons.rungs.layers.rung import applies
 from comparisons.rungs.limited import Rest
-from comparisons.rungs.witness import witness_of
+from comparisons.rungs.witness import witnesses_of
 from comparisons.translator import MOST_INSTANCES, UntranslatableError, load
 from comparisons.translator.moved import with_float32_vertices
 from comparisons.translator.notes import notes_of
@@ -72,10 +72,10 @@ def compare_scene(
     if budget.derivative is not None:
         return derivative_case(budgeted(subject.scene, budget), budget, say, threads)
     witness = None
-    if budget.witness is not None:
+    if budget.witness:
         scene = budgeted(subject.witness or subject.scene, budget)
         seen = budgeted(subject.scene, budget)
-        witness = witness_of(budget.witness, scene, budget.limit, threads, say, seen)
+        witness = witnesses_of(budget.witness, scene, budget.limit, threads, say, seen)
     evidence = gather(subject, budget, say, threads, rungs)
     return judge(replace(evidence, witness=witness), budget.limit)
 

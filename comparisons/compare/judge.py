@@ -155,11 +155,9 @@ def judge(evidence: Evidence, limit: float) -> Case:
             if rendered.replicates is None:
                 pair = images.candidate[np.newaxis], images.reference[np.newaxis]
             if evidence.witness is not None and pair is not None:
-                heard, picture = evidence.witness(pair, evidence.sides)
+                heard, others = evidence.witness(pair, evidence.sides)
                 rungs.append(heard)
-                if picture is not None:
-                    whose = heard.numbers.get("whose", "the witness's")
-                    images = replace(images, others={whose: picture})
+                images = replace(images, others=others)
     rest_of = None
     if rendered is not None and evidence.rest_of is not None:
         rest_of = partial(evidence.rest_of, rendered)
@@ -190,9 +188,10 @@ def judge(evidence: Evidence, limit: float) -> Case:
 
 def _with_vote(verdict: Status, reason: str, rungs: Sequence[RungResult]) -> str:
     """The reason of a verdict, with who of three renderers stands alone: a difference of two says
-    that one is wrong, the third says which."""
-    said = next((rung.reason for rung in rungs if "alone" in rung.numbers), "")
-    return reason if verdict == "agree" or said in reason else f"{reason}; {said}"
+    that one is wrong, the third says which; and, whatever the verdict, that witnesses disagree."""
+    told = ("disagree",) if verdict == "agree" else ("alone", "disagree")
+    said = next((r.reason for r in rungs if any(name in r.numbers for name in told)), "")
+    return reason if said in reason else f"{reason}; {said}"
 
 
 def picture_rungs(rendered: Rendered, limit: float, looks: Looks | None = None) -> list[RungResult]:

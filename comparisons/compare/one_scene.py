@@ -9,7 +9,7 @@ from comparisons.compare.compare import Subject, compare_scene
 from comparisons.compare.looks import SECONDS
 from comparisons.compare.notebook import NotebookCase
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.renderers import WitnessName
+from comparisons.renderers import Witnesses
 from reference_rt.rendering.render import with_settings
 from reference_rt.rendering.scene import Scene
 
@@ -26,7 +26,7 @@ def compare_one(
     time_limit: float | None = SECONDS,
     limit: float = Budget().limit,
     threads: int | None = None,
-    witness: WitnessName | None = None,
+    witness: Witnesses = None,
     say: Callable[[str], None] | None = None,
 ) -> NotebookCase:
     """Render a scene, or a scene file, by reference_rt and by Mitsuba, and judge the difference.
@@ -35,8 +35,8 @@ def compare_one(
     the scene's own.  replicates: independent pictures by each renderer at the first look, None for
     as many as the noise asks for; others are added until the question is decided or `time_limit`
     seconds have passed; None: one look.  limit: the smallest relative bias of the image mean that
-    must be detectable.  threads: ours, None for all cores.  witness: a third renderer, whose
-    pictures say who stands alone.  say: called with a line about each step;
+    must be detectable.  threads: ours, None for all cores.  witness: another renderer, or
+    several, whose pictures say who stands alone.  say: called with a line about each step;
     by default these go to the logger of this module, as information.
 
     Mitsuba runs in this process.  Raises SceneError, ReferenceUnavailableError.

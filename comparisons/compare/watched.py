@@ -15,7 +15,7 @@ _BETWEEN = 0.5
 
 
 class Watched:
-    """A `Say` whose pictures are shown, too.  show: called with them, in blocks."""
+    """A `Say` whose pictures are shown, too.  show: called with what `so_far` makes of them."""
 
     def __init__(self, say: Say, show: Callable[[str], None]) -> None:
         self._say, self._show = say, show

@@ -290,24 +290,24 @@ def _third(asked: Asked, rendered: Rendered) -> Witness:
 
     def hear(
         given: tuple[FloatArray, FloatArray], sides: tuple[str, str]
-    ) -> tuple[RungResult, FloatArray | None]:
+    ) -> tuple[RungResult, dict[str, FloatArray]]:
         assert asked.scene is not None
         ours = reference.of_scene(asked.scene, asked.limit, threads=asked.threads)
         pictures = _without_rim(ours.pictures, asked.rim)
+        shown = {OURS: pictures.mean(axis=0)}
         if (
             rendered.replicates is None
             or ours.noise_free
             or pictures.shape[1:] != given[0].shape[1:]
         ):
             reason = "our pictures do not vote on pictures without noise, or of another size"
-            return RungResult("witness", "not-applicable", reason), pictures.mean(axis=0)
+            return RungResult("witness", "not-applicable", reason), shown
         one, two = rendered.replicates
         assert isinstance(two, np.ndarray)
         known = None
         if rendered.paired:
             known = at_look(replace(rendered, checked=None), asked.limit, 1.0)
         rung = vote((one, two, pictures), (*sides, OURS), asked.limit, known)
-        rung.numbers["whose"] = OURS
-        return rung, pictures.mean(axis=0)
+        return rung, shown
 
     return hear

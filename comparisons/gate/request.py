@@ -28,13 +28,13 @@ from comparisons.gate.shown_curve import estimated
 from comparisons.gate.terms import missing_terms
 from comparisons.gate.tone_curves import ESTIMATE, ToneCurve, curve_of
 from comparisons.gate.undone import Reading, Undo
-from comparisons.renderers import WitnessName
+from comparisons.renderers import Witnesses, several
 from comparisons.results.case import Case, Cause, FloatArray, RungResult
 from comparisons.results.headline import UP_TO
 from comparisons.rungs.edges import DARK, TOLERANCE, Edges
 from comparisons.rungs.footprints import look_at
 from comparisons.rungs.own_samples import other_trees, samples_of, uncut
-from comparisons.rungs.witness import Witness, witness_of
+from comparisons.rungs.witness import Witness, witnesses_of
 from comparisons.statistics import Margins
 from reference_rt.rendering.render import Progress
 from reference_rt.rendering.scene import Scene
@@ -68,7 +68,7 @@ class Request:
     threads: int | None = None
     rim: int = 0
     name: str = "candidate"
-    witness: WitnessName | None = None
+    witness: Witnesses = None
 
     def __post_init__(self) -> None:
         if self.references and self.baseline:
@@ -77,9 +77,9 @@ class Request:
             raise UsageError("nothing to compare with; expected a scene, reference or baseline")
         if self.variance is not None and not self.references:
             raise UsageError("got a variance without a reference; expected both")
-        if self.witness is not None and self.scene is None:
+        if several(self.witness) and self.scene is None:
             raise UsageError("got a witness without a scene; expected both")
-        if self.witness is not None and self.rim:
+        if self.witness and self.rim:
             raise UsageError("got a witness and a rim; expected one of them")
         permitted = Margins().image
         if not permitted < self.limit < 1.0:
@@ -315,12 +315,11 @@ class Judge:
         return hypotheses
 
     def _witness(self) -> Witness | None:
-        if self.request.witness is None or self.request.scene is None:
+        if not self.request.witness or self.request.scene is None:
             return None
         limit, threads = self.request.limit, self.request.threads
-        return witness_of(
-            self.request.witness, self.request.scene, limit, threads, lambda line: None
-        )
+        names = several(self.request.witness)
+        return witnesses_of(names, self.request.scene, limit, threads, lambda line: None)
 
 
 def prepared(

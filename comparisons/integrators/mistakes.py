@@ -23,6 +23,7 @@ def in_place_of(scene: SceneModel, has_solids: bool = False) -> dict[str, Any] |
     of_solids = of_type.media_of_solids if scene.has_media else of_type.of_solids
     wrong = has_solids or squares_opacity(scene) or misplaces(scene)
     wrong = wrong or passes_panes(scene) or loses_lamps(scene) or has_wrong_media(scene)
+    wrong = wrong or forgets_far(scene)
     return of_solids(integrator) if of_solids is not None and wrong else None
 
 
@@ -78,6 +79,13 @@ def loses_lamps(scene: SceneModel) -> bool:
     missing (Mitsuba 3.9.1; findings/)."""
     kinds = {type(material) for material in scene.materials.values()}
     return isinstance(scene.integrator, Path) and {NoSurface, Emissive} <= kinds
+
+
+def forgets_far(scene: SceneModel) -> bool:
+    """Camera rays of Mitsuba's `volpath` and `volpathmis` forget the far clipping plane behind what
+    is no surface (Mitsuba 3.9.1; findings/)."""
+    no_surface = any(isinstance(m, NoSurface) for m in scene.materials.values())
+    return isinstance(scene.integrator, Path) and scene.camera.far is not None and no_surface
 
 
 def has_wrong_media(scene: SceneModel) -> bool:
@@ -180,6 +188,13 @@ MISTAKES = (
             "Mitsuba is wrong for media that are clear in one colour, and for those without end "
             "under a sun or a sky; our own integrator, which runs in Mitsuba, takes the place of "
             "its own"
+        ),
+    ),
+    Mistake(
+        forgets_far,
+        lambda scene: (
+            "Mitsuba's camera rays forget the far clipping plane behind boundaries without a "
+            "surface; our own integrator, which runs in Mitsuba, takes the place of its own"
         ),
     ),
     Mistake(

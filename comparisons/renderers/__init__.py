@@ -7,16 +7,16 @@ name in `WitnessName` and `comparisons.commands.options.Witness` if it may vote.
 """
 
 import importlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from typing import Literal, NamedTuple, Protocol, cast, runtime_checkable
+from typing import Literal, NamedTuple, Protocol, cast, get_args, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.scene import Scene
-from reference_rt.util.errors import ReferenceRtError
+from reference_rt.util.errors import ReferenceRtError, UsageError
 
 BoolArray = npt.NDArray[np.bool_]
 
@@ -131,7 +131,20 @@ def other(name: str) -> Renderer:
     return cast(Renderer, importlib.import_module(PLACES[name]).RENDERER)
 
 
-def witness_facts(name: WitnessName | None) -> dict[str, str]:
-    """The witness's version and variant, for provenance; {} without a witness.  Raises
-    ReferenceUnavailableError if it is not installed."""
-    return {} if name is None else {name: other(name).version()}
+Witnesses = str | Sequence[str] | None
+"""One `WitnessName`, several or none."""
+
+
+def several(given: Witnesses) -> tuple[WitnessName, ...]:
+    """The witnesses, once each.  Raises UsageError for a name that is none of theirs."""
+    names = dict.fromkeys([given] if isinstance(given, str) else given or ())
+    if unknown := [name for name in names if name not in get_args(WitnessName)]:
+        expected = " or ".join(get_args(WitnessName))
+        raise UsageError(f"witness: expected {expected}, got '{unknown[0]}'")
+    return cast(tuple[WitnessName, ...], tuple(names))
+
+
+def witness_facts(given: Witnesses) -> dict[str, str]:
+    """The witnesses' versions and variants, for provenance.  Raises ReferenceUnavailableError if
+    one is not installed."""
+    return {name: other(name).version() for name in several(given)}

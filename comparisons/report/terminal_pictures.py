@@ -1,47 +1,35 @@
-"""The pictures of a case on a terminal: both, and their difference, side by side in blocks."""
+"""The pictures of a case on a terminal: both, and their difference, side by side."""
 
-from collections.abc import Sequence
-from itertools import zip_longest
-
-from rich.text import Text
-
-from comparisons.report.thumbnails import Thumbnail, thumbnails
+from comparisons.report.thumbnails import LONGEST, decoded, thumbnails
 from comparisons.results.case import Case, FloatArray, Images
-from reference_rt.cli.terminal_picture import half_blocks
+from reference_rt.cli.picture_row import Titled
 
-_MOST_COLUMNS, _MOST_ROWS = 32, 16
-"""Of one picture, in cells."""
+COLUMNS, ROWS = 102, 16
+"""Of the terminal's cells at most: of three pictures, and of each."""
 
-_GAP = "  "
+_LONGEST = 4 * LONGEST
+"""Pixels of a picture's longer side, at most: for terminals that draw as many."""
 
 
-def side_by_side(case: Case, columns: int) -> Text:
-    """Titles above the pictures of a case that has some;  columns: of the terminal."""
+def pictures_of(case: Case) -> list[Titled]:
+    """Of a case that has some."""
     assert case.images is not None
-    made = thumbnails(case.images, case.is_signed)
+    made = thumbnails(case.images, case.is_signed, _LONGEST)
     shown = [(made.candidate, case.sides[0]), (made.reference, case.sides[1])]
     if made.difference is not None:
         shown.append((made.difference, f"difference, ±{made.span:.2g}"))
-    return Text.from_ansi(_in_blocks(shown, columns), no_wrap=True)
+    return [(title, decoded(picture.url)) for picture, title in shown]
 
 
 def so_far(ours: FloatArray | None, theirs: FloatArray) -> str:
-    """The two pictures of a case that is being rendered; ours may be still to come."""
+    """The two pictures of a case that is being rendered, a line each: the data: URL of a PNG, and
+    its title; ours may be still to come."""
     made = thumbnails(Images(theirs if ours is None else ours, theirs))
-    shown = [(made.reference, "Mitsuba's")]
-    if ours is not None:
-        shown = [(made.candidate, "ours"), *shown]
-    return _in_blocks(shown, len(shown) * (_MOST_COLUMNS + len(_GAP)))
+    mine = [] if ours is None else [f"{made.candidate.url} ours"]
+    return "\n".join([*mine, f"{made.reference.url} Mitsuba's"])
 
 
-def _in_blocks(shown: Sequence[tuple[Thumbnail, str]], columns: int) -> str:
-    """Pictures side by side, each with its title above it."""
-    each = max(1, min(_MOST_COLUMNS, columns // len(shown) - len(_GAP)))
-    blocks = [half_blocks(picture.pixels, each, _MOST_ROWS).splitlines() for picture, _ in shown]
-    widths = [lines[0].count("▀") for lines in blocks]
-    titles = [title[:width].ljust(width) for (_, title), width in zip(shown, widths, strict=True)]
-    rows = [
-        [part or " " * width for part, width in zip(parts, widths, strict=True)]
-        for parts in zip_longest(*blocks)
-    ]
-    return "\n".join(map(_GAP.join, [titles, *rows]))
+def pictures_in(text: str) -> list[Titled]:
+    """What `so_far` has written."""
+    lines = (line.partition(" ") for line in text.splitlines())
+    return [(title, decoded(url)) for url, _, title in lines]

@@ -40,12 +40,6 @@ class Thumbnail:
     nonfinite: int
     """pixels of the full picture that are not finite"""
 
-    @property
-    def pixels(self) -> npt.NDArray[np.uint8]:
-        """What the PNG shows (height, width, 3)."""
-        data = base64.b64decode(self.url.partition(",")[2])
-        return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
-
 
 @dataclass(frozen=True)
 class Thumbnails:
@@ -59,17 +53,17 @@ class Thumbnails:
     """Radiance difference shown as full red or blue; 0 if the pictures are equal."""
 
 
-def thumbnails(images: Images, is_signed: bool = False) -> Thumbnails:
+def thumbnails(images: Images, is_signed: bool = False, longest: int = LONGEST) -> Thumbnails:
     """is_signed: of values of both signs, whose sizes the white level is of: they are shown from
-    blue to red."""
+    blue to red;  longest: pixels of the longer side, at most."""
     white = white_level(np.abs(images.reference) if is_signed else images.reference)
     shown = _signed if is_signed else _exposed
     span, difference = 0.0, None
     if images.candidate.shape == images.reference.shape:
-        span, difference = _difference(images)
+        span, difference = _difference(images, longest)
     return Thumbnails(
-        candidate=shown(images.candidate, white),
-        reference=shown(images.reference, white),
+        candidate=shown(images.candidate, white, longest),
+        reference=shown(images.reference, white, longest),
         difference=difference,
         white=white,
         span=span,
@@ -97,14 +91,14 @@ def of_others(images: Images, sides: tuple[str, str]) -> list[tuple[Thumbnail, s
     return found
 
 
-def _exposed(image: FloatArray, white: float) -> Thumbnail:
-    small = _shrunk(image)
+def _exposed(image: FloatArray, white: float, longest: int = LONGEST) -> Thumbnail:
+    small = _shrunk(image, longest)
     bad = nonfinite_pixels(small)
     pixels = 255.0 * encode(np.where(bad[..., None], 0.0, small), white)
     return _thumbnail(pixels, bad, image.shape, count_nonfinite(image))
 
 
-def _difference(images: Images) -> tuple[float, Thumbnail]:
+def _difference(images: Images, longest: int = LONGEST) -> tuple[float, Thumbnail]:
     """Candidate minus reference in the channel that differs most, so that no two cancel."""
     with np.errstate(invalid="ignore", over="ignore"):
         difference = images.candidate - images.reference
@@ -113,12 +107,12 @@ def _difference(images: Images) -> tuple[float, Thumbnail]:
     # If fewer than 0.5 % of the pixels differ at all, the percentile is 0: take the largest.
     span = float(np.percentile(sizes, DIFFERENCE_PERCENTILE) or sizes.max()) if sizes.size else 0.0
     nonfinite = count_nonfinite(images.candidate, images.reference)
-    return span, replace(_signed(difference, span), nonfinite=nonfinite)
+    return span, replace(_signed(difference, span, longest), nonfinite=nonfinite)
 
 
-def _signed(image: FloatArray, span: float) -> Thumbnail:
+def _signed(image: FloatArray, span: float, longest: int) -> Thumbnail:
     """From blue at -span over white to red at span, of the channel farthest from zero."""
-    small = _shrunk(image)
+    small = _shrunk(image, longest)
     bad = nonfinite_pixels(small)
     amount = np.clip(_largest(np.where(bad[..., None], 0.0, small)), -span, span) / (span or 1.0)
     end = np.where(amount > 0.0, RED, BLUE)
@@ -132,8 +126,8 @@ def _largest(difference: FloatArray) -> FloatArray:
     return np.take_along_axis(difference, most, axis=-1)
 
 
-def _shrunk(image: FloatArray) -> FloatArray:
-    return reduced(image, -(-max(image.shape) // LONGEST))
+def _shrunk(image: FloatArray, longest: int) -> FloatArray:
+    return reduced(image, -(-max(image.shape) // longest))
 
 
 def _thumbnail(
@@ -149,6 +143,12 @@ def png_url(pixels: FloatArray) -> str:
     buffer = io.BytesIO()
     Image.fromarray(np.rint(pixels).astype(np.uint8)).save(buffer, "PNG", optimize=True)
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+
+
+def decoded(url: str) -> npt.NDArray[np.uint8]:
+    """What a PNG of such a URL shows (height, width, 3)."""
+    data = base64.b64decode(url.partition(",")[2])
+    return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
 
 
 def shrunk_url(path: Path, longest: int = 4 * LONGEST) -> str:

@@ -3,11 +3,17 @@
 /** Pixels of the screen within which a drag of a zoomed picture moves the slider. */
 const NEAR_SLIDER = 24;
 
+/** Smaller values have a power of ten and four digits: more are wider than a column. */
+const SMALL = 1e-3;
+
 /** A value with as many digits as were kept of it. */
 function reading(value, digits) {
   if (Number.isNaN(value)) return "NaN";
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
-  return String(Number(value.toPrecision(digits))).replaceAll("-", "−");
+  const rounded = Number(value.toPrecision(digits));
+  const isSmall = rounded && Math.abs(rounded) < SMALL;
+  const text = isSmall ? Number(value.toPrecision(Math.min(digits, 4))).toExponential() : rounded;
+  return String(text).replaceAll("-", "−");
 }
 
 function clamp(value, low, high) {
@@ -125,7 +131,7 @@ class CaseView {
     for (const figure of drawn) {
       paintKind(figure.canvas, figure.kind, this.pictures[figure.kind], own);
       figure.image.replaceWith(figure.canvas);
-      const end = reading(this.span / 2 ** look.stops, 4);
+      const end = reading(this.span / 2 ** look.stops, 3);
       if (figure.high) [figure.low.textContent, figure.high.textContent] = [`−${end}`, `+${end}`];
     }
     this.box.querySelector(".exposed").textContent = this.exposed(look);
@@ -159,7 +165,7 @@ class CaseView {
     const white = this.white / 2 ** stops;
     if (this.layer === "normal") return "Normals: red, green and blue are x, y and z; grey is 0";
     if (this.kindOfValues()) {
-      return `Red is ${reading(white, 4)}, blue is −${reading(white, 4)} in both pictures`;
+      return `Red is ${reading(white, 4)}, blue is −${reading(white, 4)} in every picture`;
     }
     if (this.layer) return `White is a ${this.layer} of ${reading(white, 4)}`;
     if (colours === "linear") return `Luminance: yellow is ${reading(white, 4)}, purple is 0`;
@@ -167,7 +173,7 @@ class CaseView {
     if (colours === "reinhard") return `Reinhard's curve: radiance ${reading(4 * white, 4)} is white`;
     if (colours === "filmic") return `A curve of film: radiance ${reading(white, 4)} is bright`;
     if (colours === "log") return `Luminance: yellow is ${reading(white, 4)}, purple is ${dark}`;
-    return `White is radiance ${reading(white, 4)} W·sr⁻¹·m⁻² in both pictures`;
+    return `White is radiance ${reading(white, 4)} W·sr⁻¹·m⁻² in every picture`;
   }
 
   listen() {

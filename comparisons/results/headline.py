@@ -15,7 +15,7 @@ UP_TO = "up to "
 def headline(case: Case) -> str:
     """One sentence without a full stop, such as "likeliest cause: half-pixel shift in x; 25 of 64
     tiles differ, the worst by +12 %"."""
-    return _SENTENCES[case.verdict](case)
+    return _with_disagreement(_SENTENCES[case.verdict](case), case)
 
 
 def first_difference(case: Case) -> str:
@@ -31,8 +31,9 @@ def first_difference(case: Case) -> str:
 def _differ(case: Case) -> str:
     rung = _first(case, "differ")
     what = "the pictures differ" if rung is None else _what(rung, case)
-    if alone := next((r.numbers.get("alone") for r in case.rungs if r.name == "witness"), None):
-        what = f"{what}; {alone} stands alone"
+    alone = _of_witness(case, "alone")
+    if alone and not what.endswith(said := f"{alone} stands alone"):
+        what = f"{what}; {said}"
     if case.cause is None:
         return f"{what}; no single cause explains it"
     return f"likeliest cause: {case.cause.name}; {what}"
@@ -42,8 +43,20 @@ def in_short(case: Case) -> tuple[str, str]:
     """The headline, and apart from it the smallest bias of the image mean that would have been
     seen; "" if it is unknown."""
     seen = detectable(next((rung for rung in case.rungs if rung.name == "statistics"), None))
-    sentence = _none(case) if case.verdict == "agree" else headline(case)
+    sentence = _with_disagreement(_none(case), case) if case.verdict == "agree" else headline(case)
     return sentence, "" if seen is None else percent(seen)
+
+
+def _of_witness(case: Case, name: str) -> str:
+    """What the rung `witness` says under a name; "" if nothing."""
+    rungs = (rung for rung in case.rungs if rung.name == "witness")
+    return next((str(rung.numbers[name]) for rung in rungs if name in rung.numbers), "")
+
+
+def _with_disagreement(sentence: str, case: Case) -> str:
+    """A sentence that says, too, if witnesses disagree."""
+    said = _of_witness(case, "disagree")
+    return sentence if said in sentence else f"{sentence}; {said}"
 
 
 def _none(case: Case) -> str:
@@ -52,7 +65,7 @@ def _none(case: Case) -> str:
 
 
 def _agree(case: Case) -> str:
-    none, seen = in_short(case)
+    none, (_, seen) = _none(case), in_short(case)
     if not seen:
         return none
     return f"{none}, and a bias of the image mean of {seen} would have been seen"

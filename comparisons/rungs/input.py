@@ -14,7 +14,13 @@ from comparisons.results.case import FloatArray, RungResult, Status
 from comparisons.statistics.metrics import nonfinite_pixels, white_level
 from comparisons.statistics.odd_replicate import odd_replicate
 from comparisons.statistics.order import successive
-from comparisons.statistics.repeated import Rounding, may_be_flat, may_be_the_same, same_pairs
+from comparisons.statistics.repeated import (
+    Rounding,
+    may_all_be_the_same,
+    may_be_flat,
+    may_be_the_same,
+    same_pairs,
+)
 from comparisons.statistics.shared_noise import common_noise, correlated_pair
 
 DIM = 1e-3
@@ -207,7 +213,9 @@ def _repeated(a: FloatArray, b: FloatArray) -> str | None:
     """Replicates that are identical, although the other side's differ: there is noise."""
     same = {"candidate": same_pairs(a), "reference": same_pairs(b)}
     if same["candidate"] and len(b) > 1 and same["reference"]:
-        return None  # there is no noise, or so little that both repeat themselves
+        is_fixed = len(same["candidate"]) == math.comb(len(a), 2)
+        if not is_fixed or may_all_be_the_same(len(a), b):
+            return None  # there is no noise, or so little that both repeat themselves
     for name, x, other in (("candidate", a, b), ("reference", b, a)):
         if name == "reference" and len(a) == 1:
             continue

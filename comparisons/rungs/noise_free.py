@@ -288,7 +288,7 @@ def _beyond(a: FloatArray, b: FloatArray, floor: FloatArray) -> int:
 
 def noise_free_witness(
     witness: NoiseFree, scene: Scene, seen: Scene, threads: int | None, say: Callable[[str], None]
-) -> Callable[[Pair, tuple[str, str]], tuple[RungResult, FloatArray | None]]:
+) -> Callable[[Pair, tuple[str, str]], tuple[RungResult, dict[str, FloatArray]]]:
     """A `comparisons.rungs.witness.Witness`.  scene: what it renders;  seen: what we do.  Raises
     ReferenceUnavailableError where it is not installed."""
     version, whose = witness.version(), f"{witness.title}'s"
@@ -303,12 +303,12 @@ def noise_free_witness(
         pictures = (pair[0].mean(axis=0), pair[1].mean(axis=0), shown)
         return vote_of_picture(pictures, (*sides, whose), seen, threads), shown
 
-    def hear(pair: Pair, sides: tuple[str, str]) -> tuple[RungResult, FloatArray | None]:
-        start, votes, silent, shown = time.perf_counter(), {}, {}, None
+    def hear(pair: Pair, sides: tuple[str, str]) -> tuple[RungResult, dict[str, FloatArray]]:
+        start, votes, silent, shown = time.perf_counter(), {}, {}, {}
         with ThreadPoolExecutor(1) as beside:  # POV-Ray waits for most of a small picture's time
             coming = beside.submit(witness.first_hits, scene, threads)
             try:
-                votes["picture"], shown = picture_of(pair, sides)
+                votes["picture"], shown[whose] = picture_of(pair, sides)
             except (NoCounterpartError, ReferenceUnavailableError) as error:
                 silent["picture"] = error
             try:

@@ -1,7 +1,8 @@
 """The rung `witness`: a third renderer's pictures turn a difference of two into one of three, and
-say who stands alone."""
+say who stands alone; several of them are one rung."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -16,10 +17,73 @@ from reference_rt.util.errors import ReferenceUnavailableError
 PAIRS = ((0, 1), (0, 2), (1, 2))
 
 Witness = Callable[
-    [tuple[FloatArray, FloatArray], tuple[str, str]], tuple[RungResult, FloatArray | None]
+    [tuple[FloatArray, FloatArray], tuple[str, str]], tuple[RungResult, dict[str, FloatArray]]
 ]
 """Takes the replicates of both sides, or their pictures without noise, and whose they are; returns
-the rung, and the witness's mean picture."""
+the rung, and the witnesses' mean pictures by whose they are."""
+
+
+def witnesses_of(
+    names: Sequence[WitnessName],
+    scene: Scene,
+    limit: float,
+    threads: int | None,
+    say: Callable[[str], None],
+    seen: Scene | None = None,
+) -> Witness:
+    """Several witnesses, see `witness_of`, as one.  Each is heard as if it were the only one."""
+    some = scene, limit, threads, say, seen
+    heard = {other(name).title: witness_of(name, *some) for name in names}
+
+    def hear(
+        replicates: tuple[FloatArray, FloatArray], sides: tuple[str, str]
+    ) -> tuple[RungResult, dict[str, FloatArray]]:
+        found = {title: witness(replicates, sides) for title, witness in heard.items()}
+        shown = {whose: picture for _, some in found.values() for whose, picture in some.items()}
+        return together({title: rung for title, (rung, _) in found.items()}), shown
+
+    return hear
+
+
+def together(rungs: Mapping[str, RungResult]) -> RungResult:
+    """The rung of several witnesses by their titles: the gravest of theirs, so that none makes a
+    verdict better than another leaves it.
+
+    Witnesses disagree if one finds a difference, and another says that both sides are right, or
+    that somebody else stands alone.  Right first hits are no answer to a wrong picture.
+    """
+    if len(rungs) == 1:
+        return next(iter(rungs.values()))
+    statuses = {rung.status for rung in rungs.values()}
+    status = next(status for status in _GRAVEST if status in statuses)
+    numbers: dict[str, Any] = {"witnesses": {title: r.numbers for title, r in rungs.items()}}
+    reason = "; ".join(f"{title}: {rung.reason}" for title, rung in rungs.items())
+    said = {title: text for title, rung in rungs.items() if (text := _said(rung))}
+    blamed = {text for text in said.values() if text not in (_NOBODY, _SOMEBODY)}
+    if len(blamed) > 1 or (_NOBODY in said.values() and len(set(said.values())) > 1):
+        each = ", ".join(f"{title} says that {text}" for title, text in said.items())
+        numbers["disagree"] = f"the witnesses disagree: {each}"
+        reason = f"{numbers['disagree']}; {reason}"
+    elif len({rung.numbers.get("alone") for rung in rungs.values()} - {None}) == 1:
+        numbers["alone"] = next(r.numbers["alone"] for r in rungs.values() if "alone" in r.numbers)
+    return RungResult("witness", status, reason, numbers)
+
+
+_GRAVEST: tuple[Status, ...] = ("differ", "not-comparable", "agree", "not-applicable")
+
+_NOBODY, _SOMEBODY = "both sides are right", "one side is wrong"
+
+
+def _said(rung: RungResult) -> str:
+    """What a witness says of the sides; "" if nothing, or of their first hits alone that they are
+    right."""
+    if alone := rung.numbers.get("alone"):
+        both = alone == rung.numbers.get("whose")
+        return "both sides are wrong, or it is itself" if both else f"{alone} stands alone"
+    if rung.status == "differ":
+        return _SOMEBODY
+    is_of_pictures = "pairs" in rung.numbers or "picture" in rung.numbers
+    return _NOBODY if rung.status == "agree" and is_of_pictures else ""
 
 
 def witness_of(
@@ -41,24 +105,24 @@ def witness_of(
 
     def hear(
         replicates: tuple[FloatArray, FloatArray], sides: tuple[str, str]
-    ) -> tuple[RungResult, FloatArray | None]:
+    ) -> tuple[RungResult, dict[str, FloatArray]]:
         if min(map(len, replicates)) < 2:
             reason = f"{witness.title} has noise: it does not vote on pictures without"
-            return RungResult("witness", "not-applicable", reason), None
+            return RungResult("witness", "not-applicable", reason), {}
         count = max(2, *(len(side) for side in replicates))
         try:
             with witness.load(scene, threads) as loaded:
                 rendered = loaded.render(count, scene.resolved_sampler.spp)
         except NoCounterpartError as error:
             reason = f"{error}: it does not vote"
-            return RungResult("witness", "not-applicable", reason), None
+            return RungResult("witness", "not-applicable", reason), {}
         except ReferenceUnavailableError as error:  # of this scene: others of a suite go on
-            return RungResult("witness", "not-comparable", str(error)), None
+            return RungResult("witness", "not-comparable", str(error)), {}
         say(f"witness: {count} pictures by {witness.title} ({rendered.seconds.sum():.1f} s)")
         rung = vote((*replicates, rendered.pictures), (*sides, whose), limit)
         rung.numbers.update(version=version, whose=whose)
         rung.numbers["seconds"] = float(np.median(rendered.seconds))
-        return rung, rendered.pictures.mean(axis=0)
+        return rung, {whose: rendered.pictures.mean(axis=0)}
 
     return hear
 

@@ -10,7 +10,7 @@ Each line of its standard input is a JSON object, a request; each line of its st
 is a message about it:
 
     {"say": text}          any number of times, what is being done
-    {"show": text}         any number of times, pictures of it in blocks, for a terminal
+    {"show": text}         any number of times, pictures of it as `so_far` writes them
     {"done": true}         what was asked for is where it was to be put
     {"failed": text}       it could not be made, and why
     {"invalid": text}      the same, because a scene, or a file that it names, is invalid
@@ -192,7 +192,7 @@ class Children:
 
 
 class Shown(str):
-    """What is being done, as pictures in blocks that stand above a terminal's bar."""
+    """What is being done, as pictures that stand above a terminal's bar."""
 
 
 class _Child:

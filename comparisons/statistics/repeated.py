@@ -101,6 +101,18 @@ def may_be_the_same(x: FloatArray, other: FloatArray) -> bool:
     return _is_chance(len(repeated), _differing(x), _differing(other) if len(other) > 1 else [])
 
 
+def may_all_be_the_same(n: int, other: FloatArray) -> bool:
+    """Whether all of n replicates may be identical by chance, where some of the other side's are.
+
+    Independent pictures of which the fraction q of all pairs is identical have no picture more
+    often than the square root of q, so that n are identical with a chance of at most that to the
+    power n - 1.
+    """
+    pairs = math.comb(len(other), 2)
+    share = (1 + len(same_pairs(other))) / (1 + pairs)
+    return 0.5 * (n - 1) * math.log(share) > math.log(CHANCE)
+
+
 def may_be_flat(x: FloatArray, other: FloatArray, deviating: Callable[[FloatArray], int]) -> bool:
     """Whether pictures of x without a deviating pixel may be chance;  deviating: the number of
     pixels of one picture (h, w, 3)."""

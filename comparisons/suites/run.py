@@ -43,6 +43,7 @@ from comparisons.suites import worker_command
 from comparisons.suites.keys import case_key
 from comparisons.suites.suite import Plan, Source, Work, folder_name
 from comparisons.suites.worker import Request
+from reference_rt.cli.pictured import Pictured
 from reference_rt.util.errors import ImageError, SceneError
 from reference_rt.util.files import check_writable, delete_unfinished, discard, read_text, replacing
 from reference_rt.util.workers import Threads, Workers
@@ -60,7 +61,7 @@ _STYLES = {
 _SLOWEST = 3
 
 
-class Display(Count):
+class Display(Count, Pictured):
     """Shows the progress of cases.  steps: print every step and every reason, for runs of few
     cases."""
 
@@ -72,7 +73,9 @@ class Display(Count):
     def doing(self, request: Request, step: str) -> None:
         """A case has begun (step ""), or has reached `step`, or has such pictures."""
         if isinstance(step, Shown):
-            self.show(step)
+            from comparisons.report.terminal_pictures import pictures_in
+
+            self.show_pictures(pictures_in(step))
             return
         self._running[request.name] = step
         if self._steps and step:
@@ -82,7 +85,7 @@ class Display(Count):
     def done(self, case: Case, remark: str) -> None:
         """A case has ended."""
         self._running.pop(case.scene, None)
-        self.show("")
+        self.show_pictures(())
         for note in case.notes:
             if note.startswith(WARNING):
                 self.line(note)
@@ -91,10 +94,11 @@ class Display(Count):
         told = self._steps or case.verdict not in PASSING
         if told:
             line.append(named(f": {headline(case)}", case.sides))
-        if self._steps and self.is_terminal and case.images is not None:
-            from comparisons.report.terminal_pictures import side_by_side
+        if self._steps and self.draws and case.images is not None:
+            from comparisons.report.terminal_pictures import COLUMNS, ROWS, pictures_of
 
-            self._console.print(side_by_side(case, self._console.width), soft_wrap=True)
+            columns = min(self._console.width, COLUMNS)
+            self._console.print(self.row(pictures_of(case), columns, ROWS), soft_wrap=True)
         self._console.print(line, soft_wrap=True)
         if told:
             tell(self._console, case)
@@ -331,7 +335,7 @@ def run_cases(
         try:
             requests: list[Request] = []
             for work in plan.work:
-                is_watched = options.steps and display.is_terminal
+                is_watched = options.steps and display.draws
                 request, done = _begun(work, options, chosen, is_watched)
                 delete_unfinished(request.folder)
                 if done is None:

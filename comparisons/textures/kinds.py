@@ -6,9 +6,3 @@ from comparisons.textures.translate import colour, number
 
 COLOUR_OR_TEXTURE = Kind(colour, colour_or_texture)
 NUMBER_OR_TEXTURE = Kind(number, number_or_texture, "a number or a texture")
-EMISSION_OR_TEXTURE = Kind(
-    colour,
-    lambda reading, node, name, default: colour_or_texture(
-        reading, node, name, default, "emission"
-    ),
-)

@@ -4,6 +4,7 @@ the film's size and filter, the samples, what makes Mitsuba's own picture wrong
 checked, too."""
 
 import warnings
+from collections.abc import Callable
 from typing import Any
 
 from comparisons.integrators import translate_integrator
@@ -16,6 +17,7 @@ from comparisons.integrators.mistakes import (
     in_place_of,
     notes_of_integrator,
 )
+from comparisons.materials import type_of
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.colours import index_of_refraction
 from comparisons.mitsuba.context import TranslationContext, UntranslatableError
@@ -26,14 +28,6 @@ from comparisons.renderers import ReferenceSampler
 from comparisons.textures.texture import matrix_of
 from comparisons.translator.notes import note_of
 from comparisons.translator.reading import read_supported
-from reference_rt.materials import (
-    Blend,
-    Bump,
-    Plastic,
-    RoughConductor,
-    RoughDielectric,
-    RoughPlastic,
-)
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceUnavailableError
 
@@ -44,22 +38,12 @@ from reference_rt.util.errors import ReferenceUnavailableError
 # errors; `comparisons.translator.notes` describes it.
 
 
-PLUGINS: dict[type, str] = {
-    Blend: "blendbsdf",
-    Bump: "bumpmap",
-    Plastic: "plastic",
-    RoughPlastic: "roughplastic",
-    RoughConductor: "roughconductor",
-    RoughDielectric: "roughdielectric",
-}
-"""Mitsuba's plugins by our material."""
-
-
 def inexact(scene: Scene) -> list[tuple[str, str]]:
     """Mitsuba's plugin, and the note on its error, of each material that Mitsuba has wrong."""
     context = TranslationContext.of(scene)
-    materials = [m for m in scene.materials.values() if type(m) in PLUGINS]
-    notes = [(PLUGINS[type(m)], note_of(m, context)) for m in materials]
+    tables = [(type_of(m).table, m) for m in scene.materials.values()]
+    replaced = [(table.plugin, m) for table, m in tables if table and table.plugin in EXACT]
+    notes = [(plugin, note_of(m, context)) for plugin, m in replaced]
     return [(plugin, note) for plugin, note in notes if note]
 
 
@@ -68,20 +52,8 @@ def make_exact(parsed: Parsed, scene: Scene) -> None:
     plugins = {plugin for plugin, _ in inexact(scene)}
     for index in range(len(parsed.state.nodes) if plugins else 0):
         node = Node(parsed, index)
-        if node.kind != "BSDF" or node.plugin not in plugins:
-            continue
-        props = parsed.state.nodes[index].props
-        if node.plugin == "blendbsdf":
-            props.set_plugin_name("mixture_blend")
-        elif node.plugin in ("plastic", "roughplastic"):
-            attributes = _attributes(parsed, props)
-            _wrap(parsed.state, index, "exact_coat", _coat(node, props, attributes))
-            for name in attributes:
-                parsed.state.nodes[-1].props[name] = SUBSTITUTE
-        elif node.plugin == "bumpmap":
-            _bump(parsed.state, index, node)
-        elif _distribution(props) == "beckmann":
-            _wrap(parsed.state, index, "exact_beckmann", _alphas(props))
+        if node.kind == "BSDF" and node.plugin in plugins:
+            EXACT[node.plugin](parsed, index, node)
 
 
 def sample_visible(parsed: Parsed) -> list[str]:
@@ -129,10 +101,29 @@ def exact_lamps(parsed: Parsed) -> list[str]:
     ]
 
 
-def _bump(state: Any, index: int, node: Node) -> None:
+def _blend(parsed: Parsed, index: int, node: Node) -> None:
+    parsed.state.nodes[index].props.set_plugin_name("mixture_blend")
+
+
+def _coated(parsed: Parsed, index: int, node: Node) -> None:
+    state, props = parsed.state, parsed.state.nodes[index].props
+    attributes = _attributes(parsed, props)
+    _wrap(state, index, "exact_coat", _coat(node, props, attributes))
+    for name in attributes:
+        state.nodes[-1].props[name] = SUBSTITUTE
+
+
+def _beckmann(parsed: Parsed, index: int, node: Node) -> None:
+    props = parsed.state.nodes[index].props
+    if _distribution(props) == "beckmann":
+        _wrap(parsed.state, index, "exact_beckmann", _alphas(props))
+
+
+def _bump(parsed: Parsed, index: int, node: Node) -> None:
     """Replace a bump map.  Its image is looked up in its own coordinates: a copy of it without
     `to_uv`, which the plugin applies itself, and to the slopes rightly."""
-    mi, props = mitsuba(), state.nodes[index].props
+    mi, state = mitsuba(), parsed.state
+    props = state.nodes[index].props
     ((base, _),) = node.named_children("BSDF")
     ((height, image),) = node.named_children("Texture")
     m = matrix_of(image)
@@ -209,10 +200,18 @@ def _wrap(state: Any, index: int, plugin: str, values: dict[str, Any]) -> None:
     state.nodes[index].props = outer
 
 
+EXACT: dict[str, Callable[[Parsed, int, Node], None]] = {
+    "blendbsdf": _blend,
+    "bumpmap": _bump,
+    "plastic": _coated,
+    "roughplastic": _coated,
+    "roughconductor": _beckmann,
+    "roughdielectric": _beckmann,
+}
+"""What replaces an element, by Mitsuba's plugin."""
+
+
 # ---- the scene of a user's file ------------------------------------------------------------------
-
-
-WINDOW = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y")
 
 
 def own_scene(scene: Scene, sampler: ReferenceSampler = "independent") -> Any:

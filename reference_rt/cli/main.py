@@ -141,7 +141,7 @@ def preview(
         str,
         typer.Option(
             metavar="PLACE",
-            help="window, terminal, sixel, blocks, or a .png file that is rewritten. "
+            help="window, terminal, kitty, sixel, blocks, or a .png file that is rewritten. "
             "(default: a window where there is a display, else SCENE.preview.png)",
         ),
     ] = "",

@@ -4,15 +4,17 @@ import itertools
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from reference_rt.cli.guarded import say
 from reference_rt.cli.picture_above import first_look, pixels_of
+from reference_rt.cli.pictured import PicturedLine
 from reference_rt.cli.quantities import percentage
-from reference_rt.cli.terminal_picture import Pixels, draws_sixels, half_blocks, room, sixels
+from reference_rt.cli.terminal_answer import protocol
+from reference_rt.cli.terminal_picture import Pixels, half_blocks, kitty, room, sixels
 from reference_rt.cli.watching import POLLED, Stamp, stamp
 from reference_rt.rendering.loop import Limits
 from reference_rt.rendering.picture import Picture
@@ -20,11 +22,16 @@ from reference_rt.rendering.render import Session, with_settings
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import BuiltScene
 from reference_rt.scene.model import SceneModel
-from reference_rt.util.console import ProgressLine
 from reference_rt.util.errors import SceneError, UsageError
 from reference_rt.util.files import check_writable
 
-PLACES = ("window", "terminal", "sixel", "blocks")
+_DRAWN: Mapping[str, Callable[[Pixels, int, int], str]] = {
+    "kitty": kitty,
+    "sixel": sixels,
+    "blocks": half_blocks,
+}
+
+PLACES = ("window", "terminal", *_DRAWN)
 """What `--to` may be besides the name of a .png file."""
 
 
@@ -135,7 +142,7 @@ def _show(scene: BuiltScene, view: View, wanted: Wanted, check: Callable[[], Non
     """Render, and show the picture again and again: each second at first, later after a tenth of
     the time so far.  check: called a few times per second."""
     error, threads = wanted.error, wanted.threads
-    with ProgressLine() as progress, first_look(scene, progress) as compiling:
+    with PicturedLine() as progress, first_look(scene, progress) as compiling:
         limits = Limits(error=error) if _is_noisy(scene) else Limits()
         session = Session(scene, threads=threads, compiling=compiling, limits=limits)
     began = due = time.monotonic()
@@ -183,7 +190,7 @@ def view_of(to: str, scene: Scene) -> View:
             raise UsageError("--to window: there is no display; expected 'terminal' or a .png file")
         return window
     if to in PLACES:
-        return Terminal({"sixel": sixels, "blocks": half_blocks}.get(to))
+        return Terminal(_DRAWN.get(to))
     if Path(to).suffix.lower() != ".png":
         known = ", ".join(PLACES)
         raise UsageError(f"--to: expected one of {known} or a .png file, got '{to}'")
@@ -211,12 +218,11 @@ class File:
 class Terminal:
     """The terminal that standard output goes to.
 
-    draw: makes text of pixels, columns and rows; None: sixels if the terminal says that it draws
-    them, else half blocks.
+    draw: makes text of pixels, columns and rows; None: as the terminal says that it can.
     """
 
     def __init__(self, draw: Callable[[Pixels, int, int], str] | None = None) -> None:
-        self._draw = draw or (sixels if draws_sixels() else half_blocks)
+        self._draw = draw or _DRAWN.get(protocol(sys.stdout), half_blocks)
         self._begun = False
 
     def show(self, picture: Picture) -> None:

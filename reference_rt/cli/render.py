@@ -12,6 +12,7 @@ import numpy as np
 
 from reference_rt.cli.options import Where
 from reference_rt.cli.picture_above import Growing, first_look
+from reference_rt.cli.pictured import PicturedLine
 from reference_rt.cli.quantities import bytes_of, duration, percentage, seconds_of, share_of
 from reference_rt.integrators import Light
 from reference_rt.jit.kernel_cache import cache_root
@@ -24,7 +25,6 @@ from reference_rt.rendering.render import Session, Storage
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.build import BuiltScene
 from reference_rt.scene.likely_mistakes import likely_mistakes
-from reference_rt.util.console import ProgressLine
 from reference_rt.util.errors import ImageError, UsageError
 from reference_rt.util.files import check_writable
 from reference_rt.util.processes import exit_code_of
@@ -106,7 +106,7 @@ def render_to_file(
     memory, limits, storage = limited.bytes(), limited.limits(), stored.storage()
     where.check()
     code = 0
-    with ProgressLine() as progress, first_look(scene, progress) as compiling:
+    with PicturedLine() as progress, first_look(scene, progress) as compiling:
         session = Session(
             scene,
             threads=where.threads,
@@ -206,7 +206,7 @@ def _reached(session: Session, limits: Limits) -> str:
 class Watch:
     """Shows the progress of a session, and writes previews of it: called a few times a second."""
 
-    def __init__(self, session: Session, progress: ProgressLine, preview: Path | None) -> None:
+    def __init__(self, session: Session, progress: PicturedLine, preview: Path | None) -> None:
         self._session, self._progress, self._preview = session, progress, preview
         self._began = time.monotonic()
         self._next_line, self._between = self._began + _FIRST_LINE, _FIRST_LINE

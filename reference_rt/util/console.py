@@ -15,7 +15,6 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
-from rich.text import Text
 
 from reference_rt.util.errors import printable
 
@@ -81,11 +80,6 @@ class Bar:
         """Columns and rows for a picture above the bars: small, since it is sent again and again,
         perhaps over a network."""
         return min(self._console.width, _MOST_COLUMNS), min(self._console.height // 2, _MOST_ROWS)
-
-    def show(self, text: str) -> None:
-        """Shows text, such as a picture of blocks, above the bars in place of the text before."""
-        if self.is_terminal:
-            self._bar.top = Text.from_ansi(text, no_wrap=True, end="")
 
     def line(self, text: str) -> None:
         """Prints a line that remains when the bar disappears."""

@@ -25,7 +25,7 @@ from comparisons.experiments.selftest.fault import CAUGHT, PACKAGE, run_worker
 from comparisons.experiments.selftest.kept_kernels import link_kept
 from comparisons.experiments.selftest.of_mirrored import Changes, Mistake
 from comparisons.experiments.selftest.sensitivity import MOST_SECONDS
-from comparisons.renderers import WitnessName
+from comparisons.renderers import Witnesses
 from comparisons.report.table import Column, Table
 from comparisons.results.files import write_json
 from comparisons.rungs.geometry import BY_EXACT_ARITHMETIC
@@ -81,7 +81,7 @@ class Seen:
 
 
 def mirrored(
-    mistakes: Sequence[Mistake], scenes: Path, witness: WitnessName | None, workers: Workers
+    mistakes: Sequence[Mistake], scenes: Path, witness: Witnesses, workers: Workers
 ) -> Iterator[Seen]:
     """What is seen of each mistake, as it is found;  scenes: the folder of truth's scenes."""
     threads = max(1, (os.cpu_count() or 1) // workers.threads)
@@ -89,7 +89,7 @@ def mirrored(
     yield from run_elsewhere(workers, seen, tasks)
 
 
-def seen(mistake: Mistake, scenes: Path, witness: WitnessName | None, threads: int) -> Seen:
+def seen(mistake: Mistake, scenes: Path, witness: Witnesses, threads: int) -> Seen:
     """Raises ReferenceRtError, subprocess.TimeoutExpired."""
     right = ours(load(scenes / f"{mistake.case}.yaml"), 1, threads)[0]
     task = {
@@ -99,7 +99,7 @@ def seen(mistake: Mistake, scenes: Path, witness: WitnessName | None, threads: i
         },
         "case": mistake.case,
         "scenes": str(scenes),
-        "shown": str(LECTURES) if mistake.in_lectures and witness is not None else None,
+        "shown": str(LECTURES) if mistake.in_lectures and witness else None,
         "witness": witness,
         "threads": threads,
     }

@@ -2,7 +2,7 @@
 
 Standard input, a JSON object.  planted: by a module's name, pairs of texts, of which the second
 replaces the first, which occurs once in its source;  case: of truth;  scenes: its folder;  shown:
-the path of another scene, or null;  witness: a third renderer's name, or null;  threads.  Standard
+the path of another scene, or null;  witness: other renderers' names, or null;  threads.  Standard
 output: what `answer` returns.
 
 The sources are changed as they are imported, so nothing of ours is imported before.
@@ -63,6 +63,7 @@ def answer(task: Mapping[str, Any]) -> dict[str, Any]:
     from comparisons import rungs as ladder
     from comparisons.compare.compare import Subject, compare_scene
     from comparisons.experiments.selftest.mirrored import BUDGET
+    from comparisons.renderers import several
     from comparisons.results.rungs import COMPARED
     from comparisons.truth.case import cases
     from comparisons.truth.judge import judge
@@ -71,7 +72,7 @@ def answer(task: Mapping[str, Any]) -> dict[str, Any]:
     scene = load(Path(task["scenes"]) / f"{task['case']}.yaml")
     pictures = ours(scene, threads=task["threads"])
     truth = judge(cases()[task["case"]].compute(), pictures)
-    budget = BUDGET.model_copy(update={"witness": task["witness"]})
+    budget = BUDGET.model_copy(update={"witness": several(task["witness"])})
     # These are asked apart: above a rung that differs the two sides are not compared.
     apart = ("files", "solids")
     rest = tuple(name for name in COMPARED if name not in apart)

@@ -102,7 +102,9 @@ def register(mi: Any) -> None:
             while dr.any(active):
                 si, of_solid = lit.trace(ray, active)
                 hidden = mi.Mask(self.hides) & (depth == 0)
-                flown = self.flight(sampler, ray, si.t, medium, own, active)
+                # A camera ray ends at the far clipping plane, also behind what is no surface.
+                end = dr.minimum(si.t, ray.maxt)
+                flown = self.flight(sampler, ray, end, medium, own, active)
                 mei, is_inside, passed, density = flown
                 throughput *= dr.select(active, passed, 1.0)
                 ratio *= dr.select(active, density, 1.0)
@@ -122,6 +124,7 @@ def register(mi: Any) -> None:
                 passes |= on_surface & hidden & si.shape.is_emitter()
                 medium = beyond(si, ray.d, medium, passes)
                 onward = si.spawn_ray(ray.d)
+                onward.maxt = ray.maxt - si.t
 
                 scatters = active & ~passes
                 depth += dr.select(scatters, mi.UInt32(1), mi.UInt32(0))

@@ -104,10 +104,10 @@ def test_a_cycles_that_breaks_is_reported(fault, monkeypatch, tmp_path):
     monkeypatch.setattr(backend, "SECONDS", 2.0)
     with pytest.raises(ReferenceUnavailableError, match=said), CYCLES.load(SCENE) as loaded:
         loaded.render(1, 1)
-    heard, picture = witness_of("cycles", SCENE, LIMIT, 1, lambda line: None)(
+    heard, pictures = witness_of("cycles", SCENE, LIMIT, 1, lambda line: None)(
         (_pictures(0), _pictures(1)), NAMES[:2]
     )
-    assert (heard.status, picture) == ("not-comparable", None)
+    assert (heard.status, pictures) == ("not-comparable", {})
     assert said in heard.reason
 
 
@@ -132,15 +132,16 @@ def test_the_gate_hears_a_witness(monkeypatch):
 
     heard = []
 
-    def witness_of(name, scene, limit, threads, say):
+    def witness_of(name, scene, limit, threads, say, seen):
         def hear(replicates, sides):
             heard.append(sides)
             third = _pictures(7, count=len(replicates[0]))
-            return vote((*replicates, third), (*sides, "Cycles'"), limit), third.mean(axis=0)
+            rung = vote((*replicates, third), (*sides, "Cycles'"), limit)
+            return rung, {"Cycles'": third.mean(axis=0)}
 
         return hear
 
-    monkeypatch.setattr(gate, "witness_of", witness_of)
+    monkeypatch.setattr("comparisons.rungs.witness.witness_of", witness_of)
     scene = SCENE.changed(film=rt.Film(width=48, height=48))
     dark, right = (
         [Picture(x, name=f"{name} {k}") for k, x in enumerate(_pictures(seed, factor=factor))]

@@ -213,6 +213,31 @@ def test_the_ways_through_media_agree(name: str):
     assert not found.too_many, found.first
 
 
+@pytest.mark.parametrize("turned", [[1, 0, 0], [1, 2, 3]])
+@pytest.mark.parametrize(
+    "shape",
+    [
+        "type: rectangle",
+        "type: disk",
+        "type: polygon, rings: [[[-1, -1], [1, -1], [0, 1]]]",
+        "type: triangle, v0: [-1, -1, 0], v1: [1, -1, 0], v2: [0, 1, 0]",
+    ],
+)
+def test_rays_of_a_flat_scene_do_not_lie_in_it(shape: str, turned: list[int]):
+    """Rounding would decide which medium they are in."""
+    steps = f"[{{rotate: {{axis: {turned}, degrees: -90}}}}, {{translate: [0, 1, 0]}}]"
+    scene = Scene.parse(f"""
+camera: {{type: pinhole, eye: [-2, 2, -4], target: [0, 0, 0]}}
+film: {{width: 4, height: 8}}
+shapes:
+  - {{{shape}, transform: {steps}, interior: v0}}
+media: {{v0: {{type: homogeneous, sigma_t: 1, albedo: 0}}}}
+""")
+    assert wrong_rays(scene, scene).wrong == 0
+    bare = scene.shapes[0].model_copy(update={"interior": None, "exterior": "v0"})
+    assert wrong_rays(scene, scene.changed(shapes=(bare,))).too_many
+
+
 def test_another_medium_inside_is_found():
     scene = Scene.load(SCENES / "nested_media.yaml").changed(**SMALL)
     for k, change in (

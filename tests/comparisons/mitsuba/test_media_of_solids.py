@@ -154,3 +154,26 @@ def test_a_medium_without_end_is_not_lit_by_a_sky(shape: tuple[str, str], endles
         assert np.all(mean(scene, 4) == 0.0)
     dark = scene.changed(lights=(rt.Point(position=(0, 0, 3), intensity=1.0),))
     assert in_place_of(dark) is None  # its light comes from within a finite distance
+
+
+@pytest.mark.parametrize("kind", ["orthographic", "perspective", "pinhole", "thin_lens"])
+def test_what_is_beyond_the_far_plane_is_not_seen_through_a_boundary(kind: str):
+    """Mitsuba's own integrators see it.  Before the far plane ink has its share of the sky."""
+    lens = ", aperture_radius: 0.01, focus_distance: 4" if kind == "thin_lens" else ""
+    sizes = {"orthographic": "width: 0.02", "pinhole": "film_width: 0.02, film_distance: 1"}
+    size = sizes.get(kind, "fov: 2")
+    camera = f"{{type: {kind}, eye: [0, 0, 5], target: [0, 0, 0], {size}, far: 4{lens}}}"
+    text = HEAD.replace("DEPTH", "20")
+    text = text.replace(
+        "{type: orthographic, eye: [0, 0, 5], target: [0, 0, 0], width: 0.2}", camera
+    )
+    place = "transform: [{translate: [0, 0, 2]}]"
+    sheet = f"  - {{type: rectangle, material: none, interior: ink, {place}}}\n"
+    lamp = "  - {type: disk, material: lamp}\n"
+    scene = Scene.parse(text + sheet + lamp)
+    # 1 of ink, from z = 2 to the far plane at z = 1, and the sky behind it.
+    expected = np.exp(-np.array([0.5, 1.0, 2.0]))
+    assert np.allclose(mean(scene, 4), expected, rtol=1e-3)
+    ours = rt.render(scene.changed(sampler=rt.Independent(spp=4))).colour
+    assert np.allclose(ours, expected, rtol=1e-3)
+    assert any("far clipping" in note for note in notes_of_integrator(scene))

@@ -67,5 +67,4 @@ def test_witnesses_are_renderers():
     """The option repeats the names of `WitnessName`, whose module imports NumPy: the command line
     starts without it."""
     assert set(get_args(WitnessName)) < set(PLACES)
-    choices, _ = get_args(get_args(Witness)[0])
-    assert get_args(choices) == get_args(WitnessName)
+    assert " or ".join(get_args(WitnessName)) in Witness.__metadata__[0].help

@@ -177,3 +177,27 @@ def test_other_pictures_are_stored_and_packed(tmp_path):
     assert list(found) == list(IMAGES.others)
     for whose, picture in found.items():
         np.testing.assert_array_equal(picture, IMAGES.others[whose].astype(np.float32))
+
+
+@pytest.mark.parametrize("width", [400, 1400])
+def test_small_differences_have_room(show, width):
+    """Of some 1e-6, of values with seven digits."""
+    beside = CANDIDATE + np.array([-1.3e-6, 1.1e-6, 2.7e-6])
+    images = Images(CANDIDATE, beside, others={"POV-Ray's": beside[::-1]})
+    page = show(case(images), viewport={"width": width, "height": 900})
+    point(page, 3, 2)
+    assert all("e-" in text.replace("−", "-") for text in read(page, "difference"))
+    too_wide = page.evaluate(
+        """() => {
+            const right = (element) => element.getBoundingClientRect().right;
+            const box = document.querySelector("#case-1 .pictures");
+            const shown = [...box.querySelectorAll(".pixel :is(td, th), .scale span")];
+            const scales = [...box.querySelectorAll(".scale")].filter((s) => s.offsetWidth);
+            const ramp = (scale) => scale.querySelector(".ramp, .viridis").offsetWidth;
+            return [
+                ...shown.filter((e) => right(e) > right(box)).map((e) => e.textContent),
+                ...scales.filter((s) => ramp(s) < 40 || s.scrollWidth > s.offsetWidth),
+            ];
+        }"""
+    )
+    assert too_wide == []

@@ -1,16 +1,22 @@
-"""The pictures of a case as blocks on a terminal."""
+"""The pictures of a case on a terminal, as blocks."""
 
 import numpy as np
 import pytest
 from rich.text import Text
 
-from comparisons.report.terminal_pictures import side_by_side
+from comparisons.report.terminal_pictures import COLUMNS, ROWS, pictures_of
 from comparisons.results.case import Case, Images, RungResult
+from reference_rt.cli.picture_row import row_of
 
 
 def case(candidate, reference, *, rung="statistics", sides=("ours", "Mitsuba's")):
     rungs = (RungResult(rung, "agree", ""),)
     return Case("some", "agree", "", rungs, None, {}, Images(candidate, reference), sides=sides)
+
+
+def side_by_side(case, columns):
+    """What is printed on a terminal of so many columns."""
+    return row_of(pictures_of(case), "blocks", min(columns, COLUMNS), ROWS)
 
 
 def grey(height, width, *values):

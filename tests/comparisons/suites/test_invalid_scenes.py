@@ -62,7 +62,7 @@ def folder(tmp_path):
         (folder / f"missing_{what}.yaml").write_text(RAY_CAST + text)
     for what, (text, _) in MALFORMED.items():
         (folder / f"malformed_{what}.yaml").write_text(text)
-    (folder / "binary.yaml").write_bytes(b"\xff\xfe\xfa")
+    (folder / "binary.yaml").write_bytes(b"\xfa\xfb\xfe")
     (folder / "folder.yaml").mkdir()
     (folder / "rubbish.ply").write_bytes(b"ply\nnothing")
     mesh = RAY_CAST + BALL + "  - {type: mesh, file: rubbish.ply}\n"

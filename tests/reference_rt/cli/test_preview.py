@@ -53,21 +53,21 @@ def test_little_noise_ends_it(tmp_path):
     assert 0.0 < float(last[2]) <= 50.0
 
 
-@pytest.mark.parametrize("place", ["terminal", "blocks", "sixel"])
+@pytest.mark.parametrize("place", ["terminal", "blocks", "sixel", "kitty"])
 def test_a_terminal_is_cleared_once(place):
     done = run("--to", place)
     assert done.exit_code == 0
     assert done.stdout.count("\x1b[2J") == 1
     assert done.stdout.count("\x1b[H") == done.stdout.count("per pixel") >= 2
-    drawn = {"sixel": "\x1bPq", "blocks": "▀", "terminal": "▀"}[place]
+    drawn = {"kitty": "\x1b_G", "sixel": "\x1bPq", "blocks": "▀", "terminal": "▀"}[place]
     assert done.stdout.count(drawn) >= 2
 
 
 @pytest.mark.parametrize(
     ("to", "said"),
     [
-        ("a.jpg", "--to: expected one of window, terminal, sixel, blocks or a .png file"),
-        ("screen", "--to: expected one of window, terminal, sixel, blocks or a .png file"),
+        ("a.jpg", "--to: expected one of window, terminal, kitty, sixel, blocks or a .png file"),
+        ("screen", "--to: expected one of window, terminal, kitty, sixel, blocks or a .png file"),
         ("window", "--to window: there is no display"),
     ],
 )

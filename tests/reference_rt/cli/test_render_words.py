@@ -34,7 +34,7 @@ def test_a_preview_that_cannot_be_written_ends_no_render(tmp_path):
     session = SimpleNamespace(
         preview=lambda: picture, loop=SimpleNamespace(error=None, fraction=0.5)
     )
-    progress = SimpleNamespace(note=lambda text: None, is_terminal=True)
+    progress = SimpleNamespace(note=lambda text: None, is_terminal=True, draws=False)
     watch = render.Watch(session, progress, tmp_path / "a.png")
     watch()
     watch()

@@ -4,8 +4,10 @@ import re
 
 import numpy as np
 import pytest
+from fake_terminal import decoded_sixels
 
-from reference_rt.cli.terminal_picture import half_blocks, says_sixels, sixels
+from reference_rt.cli.terminal_answer import says_sixels
+from reference_rt.cli.terminal_picture import cell, half_blocks, sixels
 
 CELL = re.compile(r"\x1b\[38;2;(\d+);(\d+);(\d+);48;2;(\d+);(\d+);(\d+)m▀")
 
@@ -27,32 +29,12 @@ def decoded_blocks(text):
     return np.array(rows, np.uint8)
 
 
-def decoded_sixels(text):
-    """The picture of a sixel string, as a terminal paints it: colours in percent."""
-    body = re.fullmatch(r'\x1bPq"1;1;(\d+);(\d+)(.*)\x1b\\\n', text, re.DOTALL)
-    width, height = int(body[1]), int(body[2])
-    palette, image = {}, np.full((height + 6, width, 3), -1)
-    x = top = colour = 0
-    for token in re.finditer(r"#(\d+);2;(\d+);(\d+);(\d+)|#(\d+)|!(\d+)(.)|(\$)|(-)|(.)", body[3]):
-        if token[1]:
-            palette[int(token[1])] = [int(token[k]) for k in (2, 3, 4)]
-        elif token[5]:
-            colour = int(token[5])
-        elif token[8]:
-            x = 0
-        elif token[9]:
-            x, top = 0, top + 6
-        else:
-            count, character = (int(token[6]), token[7]) if token[6] else (1, token[10])
-            bits = ord(character) - 63
-            assert 0 <= bits < 64
-            for k in range(6):
-                if bits >> k & 1:
-                    image[top + k, x : x + count] = palette[colour]
-            x += count
-            assert x <= width
-    assert (image[height:] == -1).all()
-    return image[:height]
+def of_sixels(text):
+    """The pixels of a sixel string, in percent."""
+    found = re.fullmatch(r"\x1b7\x1bP(.*)\x1b\\\x1b8(\n+)", text, re.DOTALL)
+    pixels = decoded_sixels(found[1])
+    assert len(found[2]) == -(-len(pixels) // cell()[1])  # the next line is below
+    return pixels
 
 
 @pytest.mark.parametrize(("rows", "columns"), [(2, 3), (8, 12), (6, 1)])
@@ -86,15 +68,32 @@ def test_scaling_down_keeps_the_mean():
 @pytest.mark.parametrize(("rows", "columns"), [(1, 1), (6, 8), (13, 20), (31, 7)])
 def test_sixels_are_the_pixels(rows, columns):
     pixels = picture(rows, columns)
-    found = decoded_sixels(sixels(pixels, 80, 24))
+    found = of_sixels(sixels(pixels, 80, 24))
     # The palette is in whole percent: half a percent is 1.3 of 255.
     assert np.abs(found * 2.55 - pixels).max() <= 1.3
 
 
-def test_large_pictures_fit_as_sixels(monkeypatch):
-    monkeypatch.setattr("reference_rt.cli.terminal_picture._cell", lambda: (4, 8))
-    found = decoded_sixels(sixels(picture(300, 300), 10, 5))
-    assert found.shape[:2] == (40, 40)
+def test_pixels_have_the_nearest_colour_of_the_palette():
+    """Of a picture of many colours, whose palette is made of a part of its pixels."""
+    rng = np.random.default_rng(5)
+    y, x = np.mgrid[:60, :200]
+    mean = np.stack([x * 1.2, y * 4.0, (x + y) * 0.9], axis=-1)
+    pixels = np.clip(mean + rng.normal(0.0, 10.0, mean.shape), 0, 255).astype(np.uint8)
+    shown = of_sixels(sixels(pixels, 400, 200)) * 2.55
+    palette = np.unique(shown.reshape(-1, 3), axis=0)
+    assert 128 <= len(palette) <= 256
+    distances = np.linalg.norm(pixels.reshape(-1, 1, 3) - palette, axis=-1)
+    off = np.linalg.norm(shown - pixels, axis=-1).ravel() - distances.min(axis=1)
+    # Pillow finds the colour nearest to a box of 4 x 4 x 4 around the pixel; and see above.
+    assert off.max() <= np.sqrt(3.0) * (4.0 + 2.0 * 1.3)
+    assert np.sqrt(np.mean(distances.min(axis=1) ** 2)) <= 10.0 * np.sqrt(3.0)  # the noise's
+
+
+def test_large_pictures_fit_as_sixels():
+    width, height = cell()
+    found = of_sixels(sixels(picture(300, 300), 80 // width, 80 // height))
+    side = min(80 // width * width, 80 // height * height)
+    assert found.shape[:2] == (side, side)
     assert (found >= 0).all()
 
 
@@ -106,6 +105,7 @@ def test_large_pictures_fit_as_sixels(monkeypatch):
         (b"\x1b[?62;22c", False),
         (b"\x1b[?4c", False),  # the first number is the model: a VT132
         (b"\x1b[?64;14;44c", False),
+        (b"\x1b_Gi=31;OK\x1b\\\x1b[?62;4c", True),
         (b"\x1b[?62;4;22", False),  # cut off
         (b"", False),
     ],

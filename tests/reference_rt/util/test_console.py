@@ -67,24 +67,6 @@ def test_elsewhere_each_step_is_a_line(shown, monkeypatch):
     assert written.getvalue() == "compiling kernels: 2.0 s\n"
 
 
-def test_a_picture_stands_above_the_bar_and_goes_with_it():
-    """Until another takes its place; none where there is no terminal."""
-    for is_terminal in (True, False):
-        written = io.StringIO()
-        console = Console(file=written, force_terminal=is_terminal, width=40, height=20)
-        with Bar(console=console) as bar:
-            bar.show("\x1b[31mred\x1b[0m\nrow")
-            bar._bar.refresh()
-            bar.show("blue")
-            bar._bar.refresh()
-        text = written.getvalue()
-        if not is_terminal:
-            assert text == ""
-            continue
-        assert text.index("red") < text.index("row") < text.index("blue")
-        assert text.endswith("\x1b[1A\x1b[2K")  # the last line is erased
-
-
 def test_room_for_a_picture_is_small():
     """It is sent four times a second."""
     for width, height in ((40, 20), (300, 100)):
