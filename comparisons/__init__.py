@@ -33,11 +33,14 @@ from typing import Any
 
 def __getattr__(name: str) -> Any:
     """Import what is named when it is first used: importing Mitsuba takes a second."""
-    if name == "testing":
-        return importlib.import_module("comparisons.gate.material")
     if name in ("gate_derivative", "gate_pair"):
         module = importlib.import_module(f"comparisons.gate.{name.removeprefix('gate_')}")
         return getattr(module, name)
-    if name not in ("compare", "gate"):
+    if name not in ("compare", "gate", "testing"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return importlib.import_module(f"comparisons.{name}")
+
+
+def __dir__() -> list[str]:
+    """The public names, whether or not they have been used."""
+    return sorted({*globals(), "compare", "gate", "gate_derivative", "gate_pair", "testing"})

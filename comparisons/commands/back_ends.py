@@ -137,16 +137,17 @@ def versions(
 
 
 def _paths(given: Sequence[str], folder: Path) -> list[Path]:
-    """Files, and names of scenes in a folder.  Raises UsageError."""
-    found = []
+    """Files, and names of scenes in a folder, without repeated ones.  Raises UsageError."""
+    found: dict[str, Path] = {}
     for name in given:
         path = Path(name) if Path(name).suffix else folder / f"{name}.yaml"
         if not path.is_file():
             raise UsageError(f"{path}: there is no such file; expected a scene")
-        found.append(path)
+        if path != (other := found.setdefault(path.stem, path)):
+            raise UsageError(f"{other} and {path}: have the same name; expected one of them")
     if not found:
         raise UsageError(f"{folder}: has no scenes")
-    return found
+    return list(found.values())
 
 
 def _budget(size: str, spp: int, replicates: int, limit: float) -> "Budget":

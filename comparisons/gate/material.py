@@ -47,6 +47,9 @@ Views = npt.ArrayLike | None
 DRAWS = 1 << 15
 """Directions that are drawn for each view."""
 
+FEWEST = 1280
+"""Of them: a tenth tells where to look, in cells of 1/128 of them each."""
+
 LEVEL = 1e-6
 """The chance that a check of a right material fails."""
 
@@ -92,13 +95,22 @@ class Check:
 def views_of(views: Views = None, eta: float | None = None) -> FloatArray:
     """Directions wo (n, 3) that are looked from: the caller's, made unit vectors; default: four
     from above, one near to grazing, and two from below with an `eta`.  Raises UsageError."""
+    _check_index(eta)
     if views is None:
         usual = [(c, a) for c, a, _ in of_rung.VIEWS if c > 0.0 or eta is not None]
         return np.array([_towards(c, a) for c, a in usual])
     found = np.atleast_2d(np.asarray(views, float))
-    if found.ndim != 2 or found.shape[1] != 3 or not np.isfinite(found).all():
+    if found.ndim != 2 or found.shape[1] != 3 or not found.size or not np.isfinite(found).all():
         raise UsageError(f"views: got an array {np.shape(views)}; expected directions (n, 3)")
-    return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])
+    lengths = np.linalg.norm(found, axis=1)
+    if not lengths.all():
+        raise UsageError("views: got one of length 0; expected directions (n, 3)")
+    return np.asarray(found / lengths[:, None])
+
+
+def _check_index(eta: float | None) -> None:
+    if eta is not None and not 0.0 < eta < math.inf:
+        raise UsageError(f"eta: got {eta:g}; expected an index of refraction above 0, or None")
 
 
 def check_material(
@@ -144,6 +156,10 @@ def chi_square(
     sample(u) and pdf(points), of directions (n, 3) per unit of solid angle, or of points (n, 2) of
     the unit square per unit of area.  Raises UsageError for arrays of other shapes.
     """
+    if domain not in ("directions", "square"):
+        raise UsageError(f"domain: got '{domain}'; expected 'directions' or 'square'")
+    if draws < FEWEST:
+        raise UsageError(f"draws: got {draws}; expected {FEWEST} or more")
     looked: list[FloatArray | None] = [None] if views is None else [*views_of(views)]
     chart = statistics.SPHERE if domain == "directions" else statistics.UNIT_SQUARE
     level = statistics.sidak(len(looked), LEVEL)
@@ -167,6 +183,9 @@ def chi_square(
                 return Check("chi_square", False, _seen(wo) + told)
             sums.append(0.0)
             continue
+        beyond = 0 if domain == "directions" else int((np.abs(points - 0.5) > 0.5).any(1).sum())
+        if beyond:
+            return Check("chi_square", False, f"{beyond} of {draws} draws are beyond the square")
         places, counts = np.unique(points[~failed], axis=0, return_counts=True)
         if counts.max() > MOST_ALIKE:
             told = f"{counts.max()} of {draws} draws are {places[counts.argmax()].round(4)}"
@@ -282,7 +301,7 @@ def furnace(
         at = hints[rng.integers(0, len(hints), 1024)]
         first = _values(evaluate, _tiled(wo, len(at)), at)
         if not (np.isfinite(first).all() and (first >= 0.0).all()):
-            bad = float(np.where(np.isfinite(first), first, -math.inf).min())
+            bad = first[~(np.isfinite(first) & (first >= 0.0))][0]
             return Check("furnace", False, f"{_seen(wo)}a value is {bad:g}; expected 0 or more")
         row: list[float] = []
         for channel in range(first.shape[1]):
@@ -326,6 +345,7 @@ def reciprocity(
     """Whether f(wo, wi) = f(wi, wo), and for light that passes to another side, with an `eta`,
     f(wo, wi) n(wi)² = f(wi, wo) n(wo)² (Walter et al. 2007), to the rounding of the caller's own
     type, at random pairs of directions, a third of them near to grazing.  Raises UsageError."""
+    _check_index(eta)
     rng = np.random.default_rng((seed, 3))
     a, b = (_random_directions(rng, PAIRS, both=eta is not None) for _ in (0, 1))
     forth, back = _values(evaluate, a, b), _values(evaluate, b, a)
@@ -371,7 +391,12 @@ def _unit(precision: npt.DTypeLike | None, *found: Any) -> float:
     """The unit of rounding of the coarsest type of floats among what functions return, or of the
     type that the caller says that they compute with."""
     kinds = [np.dtype(np.float64), *(np.asarray(one).dtype for one in found)]
-    kinds += [] if precision is None else [np.dtype(precision)]
+    if precision is not None:
+        try:
+            kinds.append(np.finfo(np.dtype(precision)).dtype)
+        except (TypeError, ValueError):
+            told = f"precision: got {precision!r}; expected a type of floats, such as 'float32'"
+            raise UsageError(told) from None
     return max(float(np.finfo(kind).eps) for kind in kinds if kind.kind == "f") / 2.0
 
 

@@ -23,7 +23,7 @@ from comparisons.compare.notebook import NotebookCase
 from comparisons.gate import reference
 from comparisons.gate.driver import Driver
 from comparisons.gate.pair_causes import cause_of
-from comparisons.gate.pair_noise import Streams, notes_of, streams_of
+from comparisons.gate.pair_noise import FEWEST, Streams, notes_of, streams_of
 from comparisons.gate.pictures_in import Picture, pictures_of
 from comparisons.gate.question import LIMIT
 from comparisons.gate.reference import check_sizes, size_of, stacked
@@ -70,25 +70,44 @@ class Asked:
             raise UsageError("our own pictures judge: expected a scene, too")
 
 
-def pair_case(
-    a: Sequence[Picture],
-    b: Sequence[Picture],
+def pair_case(a: Sequence[Picture], b: Sequence[Picture], asked: Asked) -> Case:
+    """The verdict on the pictures of both sides, several being replicates.  Raises ImageError,
+    UsageError, SceneError."""
+    check_sizes([*a, *b], *_size(asked, a[0]))
+    one, two = (_without_rim(stacked(side), asked.rim) for side in (a, b))
+    return _case(one, two, _notes(a[0], b[0]), asked)
+
+
+def _size(asked: Asked, first: Picture) -> tuple[str, str]:
+    """The size that all pictures must have, and whose it is.  first: of A."""
+    if asked.scene is None:
+        return size_of(first.radiance), "as A's first"
+    film = asked.scene.film
+    return f"{film.width} x {film.height}", f"the size of the scene '{asked.scene.name}'"
+
+
+def _notes(a: Picture, b: Picture) -> list[str]:
+    return [picture.note for picture in (a, b) if picture.note]
+
+
+def _case(
+    one: FloatArray,
+    two: FloatArray,
+    notes: list[str],
     asked: Asked,
     looked: Looks | None = None,
     streams: Streams | None = None,
 ) -> Case:
-    """The verdict on the pictures of both sides, several being replicates.
-
-    looked, streams: of an earlier look at a part of them.  Raises ImageError, UsageError,
-    SceneError.
-    """
-    check_sizes([*a, *b], size_of(a[0].radiance), "as A's first")
-    one, two = (_without_rim(stacked(side), asked.rim) for side in (a, b))
-    notes = [note for p in (a[0], b[0]) for note in [p.note] if note]
+    """The verdict on pictures without their rim, which `asked` has only for ours.  looked, streams:
+    of an earlier look at a part of them."""
     if asked.noise_free or (_is_fixed(one) and _is_fixed(two)):
         if not asked.noise_free:
             notes.append("each side's replicates are the same: there is no noise")
         rendered = _still(one[0], two[0])
+    elif not all(np.isfinite(side).all() for side in (one, two)):
+        with np.errstate(invalid="ignore"):  # of infinities
+            rendered = rendered_pair(one, two, paired=False)
+        rendered = replace(rendered, checked=_checked(one, two, asked.sides))
     else:
         if streams is None:
             streams = streams_of(one, two)
@@ -136,16 +155,22 @@ def driven_pair(
     `pair_case` and `Driver.pictures` raise."""
     sides: tuple[list[Picture], list[Picture]] = ([], [])
 
+    expected: tuple[str, str] | None = None
+
     def make(count: int) -> None:
+        nonlocal expected
         seeds = rounds.seeds(len(sides[0]), count)
-        starts = [seeds] if all(d.together for d in drivers) else [[seed] for seed in seeds]
+        together = bool(seeds) and all(driver.together for driver in drivers)
+        starts = [seeds] if together else [[seed] for seed in seeds]
         for start in starts:
             for side, driver in zip(sides, drivers, strict=True):
-                side += driver.pictures(start)
+                new = driver.pictures(start)
+                expected = expected or _size(asked, new[0])
+                check_sizes(new, *expected)
+                side += new
 
     make(1 if asked.noise_free or rounds.replicates == 1 else 2)
     first = [picture.radiance for side in sides for picture in side[:1]]
-    check_sizes([*sides[0], *sides[1]], size_of(first[0]), "as A's first")
     bad = not all(np.isfinite(picture).all() for picture in first)
     if bad or asked.noise_free or all(_is_fixed(stacked(side)) for side in sides):
         return pair_case(*sides, asked)
@@ -160,19 +185,22 @@ def driven_pair(
 
     def grow(count: int) -> None:
         nonlocal pooled, streams
+        told = pooled >= FEWEST and streams is not None
         make(count)
         for pool, side in zip(pools, sides, strict=True):
             for k in range(pooled, count):
                 pool.add(_without_rim(side[k].radiance[None], asked.rim)[0])
                 side[k] = replace(side[k], radiance=_NONE)  # the pool has it
         pooled = count
-        if streams is None:
-            streams = streams_of(*(np.stack(pool.pictures()) for pool in pools))
+        if not told:
+            pictures = [np.stack(pool.pictures()) for pool in pools]
+            if all(np.isfinite(side).all() for side in pictures):
+                streams = streams_of(*pictures)
 
     def judged_at(level: float) -> RungResult:
-        assert streams is not None
         one, two = (np.stack(pool.pictures()) for pool in pools)
-        rendered = rendered_pair(one, two, streams.shared)
+        with np.errstate(invalid="ignore"):  # of infinities, which are told
+            rendered = rendered_pair(one, two, streams is not None and streams.shared)
         if level == looks.level_of(1):
             rendered = replace(rendered, checked=_checked(one, two, asked.sides))
         return at_look(rendered, asked.limit, level)
@@ -180,12 +208,8 @@ def driven_pair(
     found = looks.until_decided(
         grow, judged_at, seconds=rounds.seconds, first=max(2, rounds.replicates), most=most, say=say
     )
-    kept = (
-        [replace(side[0], radiance=picture) for picture in pool.pictures()]
-        for side, pool in zip(sides, pools, strict=True)
-    )
-    one, two = kept
-    return pair_case(one, two, replace(asked, rim=0), found, streams)
+    one, two = (np.stack(pool.pictures()) for pool in pools)
+    return _case(one, two, _notes(sides[0][0], sides[1][0]), asked, found, streams)
 
 
 _NONE = np.zeros((0, 0, 3))

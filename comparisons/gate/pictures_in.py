@@ -151,7 +151,7 @@ def from_array(array: npt.ArrayLike, name: str = "array") -> tuple[Picture, ...]
         raise ImageError(f"{name}: {error}") from None
     pictures = values if values.ndim == 4 else values[None]
     several = len(pictures) > 1
-    return tuple(
+    found = tuple(
         Picture(
             as_float64(picture[..., :3]),
             as_float64(picture[..., 3]) if picture.shape[2] == 4 else None,
@@ -159,6 +159,19 @@ def from_array(array: npt.ArrayLike, name: str = "array") -> tuple[Picture, ...]
         )
         for k, picture in enumerate(pictures)
     )
+    for picture in found if values.dtype.itemsize > 4 else ():
+        beyond = np.isfinite(picture.radiance) & (np.abs(picture.radiance) > LARGEST)
+        if beyond.any():
+            first = picture.radiance[beyond][0]
+            raise ImageError(
+                f"{picture.name}: has the value {first:.3g}; expected radiance within "
+                f"{LARGEST:.3g}, the largest float32, whose fourth powers can be added"
+            )
+    return found
+
+
+LARGEST = float(np.finfo(np.float32).max)
+"""Of the values of an array of float64."""
 
 
 def pictures_of(given: Any) -> tuple[Picture, ...]:

@@ -90,6 +90,7 @@ class Session:
         self._config, self._uses, self._lines = config, list[Use](), list[str]()
         self._report, self._history = folders(config)
         self._begun = time.perf_counter()
+        self._ran = False
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_makereport(self, item: pytest.Item) -> Iterator[None]:
@@ -101,12 +102,14 @@ class Session:
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """In the session's process, for each phase of each test."""
+        self._ran = True
         outcome = {"outcome": report.outcome}
         self._uses += [use | outcome for use in getattr(report, _ON_REPORT, ())]
 
     def pytest_sessionfinish(self) -> None:
-        """Write, unless this is a process of pytest-xdist's."""
-        if hasattr(self._config, "workerinput"):
+        """Write, unless this is a process of pytest-xdist's, or no test ran, as where an editor
+        collects them: the page of the last session stays."""
+        if hasattr(self._config, "workerinput") or not self._ran:
             return
         from reference_rt.util.errors import ReferenceRtError
 
@@ -126,7 +129,7 @@ class Session:
         order = sorted(self._uses, key=lambda use: (use["test"], use["fixture"], use["call"]))
         lines = [session_page.counted(order)]
         past: dict[str, Past] = {}
-        if self._history is not None:
+        if self._history is not None and order:
             past = history.added(self._history, order, self._config.rootpath)
             lines += [f"{name}: {one.words}" for name, one in past.items() if one.changes]
         if self._report is not None:

@@ -23,6 +23,10 @@ NEVER = frozenset({"command", "pair", "browser", "renderer", "scheduler", "clust
 who stands in its folder has not asked for that."""
 
 
+NAMED = frozenset({"beside"})
+"""Options whose values are NAME=FILE."""
+
+
 def find(folder: Path) -> Path | None:
     """The file of the project that a folder is in: the nearest with our section."""
     for parent in (folder, *folder.parents):
@@ -70,7 +74,8 @@ def of_command(
         option = options.get(key.replace("_", "-"))
         if option is None:
             if key in own:
-                raise UsageError(f"{where}.{name}.{key}: is no option{_meant(key, list(options))}")
+                known = [option for option in options if option not in NEVER]
+                raise UsageError(f"{where}.{name}.{key}: is no option{_meant(key, known)}")
             continue
         if NEVER.intersection(opt.removeprefix("--") for opt in option.opts):
             told = "expected on the command line alone, since it may run programs"
@@ -81,18 +86,22 @@ def of_command(
             told = getattr(error, "message", str(error))
             raise UsageError(f"{where}.{name}.{key}: {told}") from None
         try:
-            found[option.name] = _placed(value, cast, path.parent)
+            is_named = any(opt.removeprefix("--") in NAMED for opt in option.opts)
+            found[option.name] = _placed(value, cast, path.parent, is_named)
         except ValueError:
             told = f"expected a path within the file's folder, got '{value}'"
             raise UsageError(f"{where}.{name}.{key}: {told}") from None
     return found
 
 
-def _placed(value: Any, cast: Any, folder: Path) -> Any:
+def _placed(value: Any, cast: Any, folder: Path, is_named: bool = False) -> Any:
     """A value; where it means a path, relative to `folder`, the path as seen from here.  Raises
-    ValueError for one that leaves the folder, by a link too."""
+    ValueError for one that leaves the folder, by a link too.  is_named: it is NAME=FILE."""
     if isinstance(cast, list | tuple):
-        return [_placed(*pair, folder) for pair in zip(value, cast, strict=True)]
+        return [_placed(*pair, folder, is_named) for pair in zip(value, cast, strict=True)]
+    if is_named and "=" in cast:
+        name, _, file = cast.partition("=")
+        return f"{name}={_placed(file, Path(file), folder)}"
     if not isinstance(cast, Path):
         return value
     (folder / cast).resolve().relative_to(folder.resolve())

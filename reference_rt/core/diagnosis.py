@@ -6,7 +6,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from reference_rt.util.errors import SceneError, means, meant, meant_by
+from reference_rt.util.errors import MOST_TOLD, SceneError, means, meant, meant_by
 
 Keys = tuple[str | int, ...]
 
@@ -88,10 +88,6 @@ _ELSEWHERE = {
 other key or type would be possible."""
 
 
-MOST = 20
-"""The most problems that are reported: one wrong default may spoil 100,000 shapes."""
-
-
 def scene_error(model: type[BaseModel], error: ValidationError, data: Any) -> SceneError:
     """What pydantic reports about `data`: an error with all problems, one for each wrong value."""
     found: dict[Keys, str] = {}
@@ -104,7 +100,7 @@ def scene_error(model: type[BaseModel], error: ValidationError, data: Any) -> Sc
         message, keys = _problem(model, first, data)
         # What is inside a value that is wrong itself, or is tried as several types, counts once.
         found.setdefault(keys, message)
-        if len(found) == MOST:
+        if len(found) == MOST_TOLD:
             break
     errors = [SceneError(message, keys) for keys, message in found.items()]
     return SceneError(errors[0].message, errors[0].path, others=errors[1:])

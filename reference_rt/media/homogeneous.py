@@ -1,8 +1,9 @@
 """A medium that is the same everywhere: fog, milk, coloured glass."""
 
-from typing import Annotated, ClassVar, Literal
+import math
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from reference_rt.core.model import Colour, Description, Examples, Reflectance
 from reference_rt.media.phase import AnyPhase, Isotropic
@@ -26,3 +27,9 @@ class Homogeneous(Description):
     """A factor on `sigma_t`, at least 0."""
     phase: AnyPhase = Isotropic()
     """The directions in which light is scattered.  Default: all alike."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if not math.isfinite(max(self.sigma_t) * self.scale):
+            raise ValueError("sigma_t times scale overflows; expected a finite product")
+        return self

@@ -20,6 +20,7 @@ from reference_rt.scene.build_media import Boundary, boundaries
 from reference_rt.scene.build_textures import texture_tables, with_uv_sets
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes.meshes.triangle_table import Triangles, shared, spread
+from reference_rt.util.errors import SceneError, together
 
 
 class BuiltScene(SceneModel):
@@ -57,8 +58,11 @@ _NOT_IN_TABLES = {"camera", "film", "sampler"}
 def build_tables(scene: SceneModel) -> SceneTables:
     """The tables of a scene.  Raises SceneError with file, line and key path."""
     numbers = boundaries(scene)
-    textures, palette = texture_tables(scene)
     with np.errstate(over="ignore", invalid="ignore"):  # checked afterwards: not finite
+        try:
+            textures, palette = texture_tables(scene)
+        except SceneError as error:
+            raise _with_those_of_shapes(error, scene, numbers) from None
         geometry = assemble(scene, numbers)
         if any(isinstance(material, Emissive) for material in scene.materials.values()):
             geometry = _with_triangles(geometry, spread)  # which may be numbered as lights
@@ -69,6 +73,17 @@ def build_tables(scene: SceneModel) -> SceneTables:
         textures = with_uv_sets(scene, textures, geometry.shapes.triangles)
         geometry = _with_triangles(geometry, _as_in_scenes)
         return SceneTables(geometry, materials, lights, textures)
+
+
+def _with_those_of_shapes(
+    error: SceneError, scene: SceneModel, numbers: dict[Boundary, int]
+) -> SceneError:
+    """An error of textures, with those of shapes, so that all files that are missing are told."""
+    try:
+        assemble(scene, numbers)
+    except SceneError as of_shapes:
+        return together((error, of_shapes))
+    return error
 
 
 def _with_triangles(geometry: Geometry, change: Callable[[Triangles], Triangles]) -> Geometry:

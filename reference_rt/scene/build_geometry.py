@@ -21,6 +21,7 @@ from reference_rt.shapes.meshes.topology import describe_boundary
 from reference_rt.shapes.meshes.triangle_table import Triangles, more_sets, shared
 from reference_rt.shapes.shape import TabulationContext, outward
 from reference_rt.textures.tables import largest_uv_set
+from reference_rt.util.errors import MOST_TOLD, SceneError, together
 from reference_rt.util.memory import give_back
 
 _CODES = {table: code for code, _, table, _ in TABLES}
@@ -44,14 +45,24 @@ def assemble(scene: SceneModel, materials: dict[Boundary, int]) -> Geometry:
     work = _Assembly(scene, materials)
     top: list[TableRows] = []
     copies: list[ExpandedInstance] = []
+    wrong: dict[int | str, SceneError] = {}
     for i, shape in enumerate(scene.shapes):
+        group = shape.group if isinstance(shape, Instance) else i
         try:
+            if group in wrong:  # which other instances draw, too
+                continue
             if isinstance(shape, Instance):
                 copies.append(ExpandedInstance(i, *work.copies(shape)))
             else:
                 top.append(work.member(shape, i, None))
         except ValueError as error:
-            raise scene.error(str(error), "shapes", i) from None
+            wrong[group] = scene.error(str(error), "shapes", i)
+        except SceneError as error:
+            wrong[group] = error
+        if len(wrong) == MOST_TOLD:
+            break
+    if wrong:
+        raise together(wrong.values())
     tables: dict[str, Any] = {}
     bounds: dict[int, Bounds] = {}
     for code, field, _, _ in TABLES:

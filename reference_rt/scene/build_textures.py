@@ -11,6 +11,7 @@ from reference_rt.textures import TABLES as TEXTURE_TABLES
 from reference_rt.textures import Palette, Product, Textures, bitmap, product
 from reference_rt.textures.parameter import joined
 from reference_rt.textures.tables import UvSets
+from reference_rt.util.errors import MOST_TOLD, together
 
 
 def texture_tables(scene: SceneModel) -> tuple[Textures | None, Palette]:
@@ -24,6 +25,7 @@ def texture_tables(scene: SceneModel) -> tuple[Textures | None, Palette]:
         raise scene.error(str(error), "textures") from None
     numbers = {name: k for k, name in enumerate(scene.textures)}
     kinds, rows, maps, greatest = [], [], [], []
+    wrong = []
     for name, texture in scene.textures.items():
         code, module = next((c, m) for c, _, d, m in TEXTURE_TABLES if isinstance(texture, d))
         try:
@@ -36,12 +38,17 @@ def texture_tables(scene: SceneModel) -> tuple[Textures | None, Palette]:
             else:
                 table = texture.tabulate(scene.folder)
         except ValueError as error:
-            raise scene.error(str(error), "textures", name) from None
+            wrong.append(scene.error(str(error), "textures", name))
+            if len(wrong) == MOST_TOLD:
+                break
+            continue
         parts.setdefault(code, []).append(table)
         kinds.append(code)
         rows.append(len(parts[code]) - 1)
         maps.append(texture.uv.coefficients())
         greatest.append(module.greatest(table))
+    if wrong:
+        raise together(wrong)
     for name, texture in scene.textures.items():
         if isinstance(texture, Product):
             greatest[numbers[name]] *= math.prod(greatest[numbers[of]] for of in texture.of)

@@ -4,8 +4,10 @@ import hashlib
 import importlib.metadata
 import json
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -44,6 +46,7 @@ from reference_rt.util.errors import (
     meant,
     meant_by,
     printable,
+    together,
 )
 from reference_rt.util.files import not_utf8, read_text
 from reference_rt.util.yaml_text import line_of
@@ -120,33 +123,37 @@ class SceneModel(Description):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        for i, shape in enumerate(self.shapes):
-            self._check_shape(shape, "shapes", i)
-        for name, shapes in self.groups.items():
-            for k, shape in enumerate(shapes):
-                self._check_shape(shape, "groups", name, k)
-        for name, texture in self.textures.items():
-            self._check_textures(texture, "textures", name)
-            for k, of in enumerate(texture.of if isinstance(texture, Product) else ()):
-                if isinstance(self.textures[of], Product):
-                    message = f"'{of}' is a product itself; expected textures of other types"
-                    raise SceneError(message, ("textures", name, "of", k))
+        parts: Iterable[Callable[[], None]] = chain(
+            (partial(self._check_shape, shape, "shapes", i) for i, shape in enumerate(self.shapes)),
+            (
+                partial(self._check_shape, shape, "groups", name, k)
+                for name, shapes in self.groups.items()
+                for k, shape in enumerate(shapes)
+            ),
+            (partial(self._check_texture, name) for name in self.textures),
+            (partial(self._check_parts, *item) for item in self.materials.items()),
+            (partial(self._check_textures, one, "lights", i) for i, one in enumerate(self.lights)),
+            [partial(self._check_medium, self.camera.medium, "camera", "medium")],
+            [self._check_follows_media, self._check_environments, self._check_on_grid],
+        )
+        wrong = []
+        for check in parts:
+            try:
+                check()
+            except SceneError as error:
+                wrong.append(error)
+        if wrong:
+            raise together(wrong)
+        # All that is named is there.
+        for i, light in enumerate(self.lights):
+            self._check_uv_set(light, "lights", i)
         for name, material in self.materials.items():
-            self._check_parts(name, material)
-        for name, material in self.materials.items():
+            self._check_uv_set(material, "materials", name)
             if isinstance(material, Wrapper):
                 try:
                     material_paths(name, self.materials)
                 except ValueError as error:
                     raise SceneError(str(error), ("materials", name)) from None
-        for i, light in enumerate(self.lights):
-            self._check_textures(light, "lights", i)
-        self._check_medium(self.camera.medium, "camera", "medium")
-        self._check_follows_media()
-        if sum(isinstance(light, Constant | EnvironmentMap) for light in self.lights) > 1:
-            raise SceneError("more than one environment; expected at most one", ("lights",))
-        if isinstance(self.sampler, Grid) and not self.integrator.deterministic:
-            self._check_on_grid()
         return self
 
     @property
@@ -164,8 +171,14 @@ class SceneModel(Description):
                 ("integrator", "type"),
             )
 
+    def _check_environments(self) -> None:
+        if sum(isinstance(light, Constant | EnvironmentMap) for light in self.lights) > 1:
+            raise SceneError("more than one environment; expected at most one", ("lights",))
+
     def _check_on_grid(self) -> None:
-        """Check that an integrator that may need random numbers has no use for them."""
+        """Check that an integrator that may need random numbers has no use for them, on a grid."""
+        if not isinstance(self.sampler, Grid) or self.integrator.deterministic:
+            return
         kind = self.integrator.type
         if not isinstance(self.integrator, Direct):
             raise SceneError(
@@ -192,6 +205,15 @@ class SceneModel(Description):
                 path,
             )
 
+    def _check_texture(self, name: str) -> None:
+        """Check that a product's factors exist, and are no products."""
+        texture = self.textures[name]
+        self._check_textures(texture, "textures", name)
+        for k, of in enumerate(texture.of if isinstance(texture, Product) else ()):
+            if isinstance(self.textures[of], Product):
+                message = f"'{of}' is a product itself; expected textures of other types"
+                raise SceneError(message, ("textures", name, "of", k))
+
     def _check_textures(self, part: Description, *path: str | int) -> None:
         """Check that the textures that a material, a light or a texture names exist."""
         for field, texture in texture_names(part).items():
@@ -200,7 +222,11 @@ class SceneModel(Description):
                 instead = "" if only_names else f"numbers{as_linear(texture)}, or "
                 message = no_such("texture", texture, self.textures, instead)
                 raise SceneError(message, (*path, *field))
-            if (why := _OWN_UV.get(type(part))) and largest_uv_set(texture, self.textures):
+
+    def _check_uv_set(self, part: Description, *path: str | int) -> None:
+        why = _OWN_UV.get(type(part))
+        for field, texture in texture_names(part).items() if why else ():
+            if largest_uv_set(texture, self.textures):
                 raise SceneError(f"'{texture}' has another 'uv_set' than 0; {why}", (*path, *field))
 
     def _check_parts(self, name: str, material: Material) -> None:

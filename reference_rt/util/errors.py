@@ -151,6 +151,19 @@ class SceneError(ReferenceRtError):
         return ": ".join(part for part in (where, keys, self.message) if part)
 
 
+MOST_TOLD = 20
+"""The most errors of a scene that are told at once: one wrong default may spoil 100,000 shapes, and
+the line of each takes a walk through the text."""
+
+
+def together(errors: Iterable[SceneError]) -> SceneError:
+    """The first of some errors, of parts that were checked one by one; `others` are the rest, up to
+    MOST_TOLD in all."""
+    first, *rest = (one for error in errors for one in (error, *error.others))
+    first.others = tuple(rest[: MOST_TOLD - 1])
+    return first
+
+
 class SceneWarning(UserWarning, metaclass=Brief):
     """A scene is valid, but probably not what its author meant.
 

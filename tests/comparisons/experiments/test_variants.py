@@ -144,3 +144,14 @@ def test_variants_agree(name: str, tmp_path: Path) -> None:
     verdicts = {case["scene"]: case["verdict"] for case in cases}
     for plugin in variants.PLUGINS:
         assert verdicts[f"rays of {plugin}"] in ("agree", "reference-limited"), plugin
+
+
+def test_scenes_of_one_name_are_refused(tmp_path: Path) -> None:
+    for folder in "ab":
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "ball.yaml").write_text("shapes: [{type: sphere}]\n")
+    a, b = (str(tmp_path / folder / "ball.yaml") for folder in "ab")
+    for words in (["variants", a, b], ["versions", "3.8.0", "3.9.1", "--scene", a, "--scene", b]):
+        result = invoke(*words, "--out", str(tmp_path / "out"))
+        assert result.exit_code == 2, result.output
+        assert "have the same name" in result.stderr

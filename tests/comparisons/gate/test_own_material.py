@@ -11,7 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import comparisons
 from comparisons.gate.material import (
+    FEWEST,
     check_material,
     chi_square,
     furnace,
@@ -246,11 +248,51 @@ def test_pictures_show_what_is_wrong(tmp_path):
         (lambda: weights(floor, lambda wo, u: floor_sample(wo, u)[0], floor_pdf), "wi, weight"),
         (lambda: furnace(floor, views=(0, 1)), "expected directions"),
         (lambda: furnace(floor, views=(0, np.nan, 1)), "expected directions"),
+        (lambda: furnace(floor, views=np.zeros((0, 3))), "expected directions"),
+        (lambda: furnace(floor, views=(0, 0, 0)), "length 0"),
+        (lambda: furnace(floor, eta=-1.5), "eta: got -1.5"),
+        (lambda: reciprocity(floor, eta=math.nan), "eta: got nan"),
+        (lambda: reciprocity(floor, precision="int32"), "expected a type of floats"),
+        (lambda: reciprocity(floor, precision="float33"), "expected a type of floats"),
+        (lambda: chi_square(floor_sample, floor_pdf, views=(0, 0, 1), draws=100), "draws: got 100"),
+        (lambda: chi_square(floor_sample, floor_pdf, domain="sphere"), "domain: got 'sphere'"),
     ],
 )  # fmt: skip
 def test_wrong_arrays(call, told):
     with pytest.raises(UsageError, match=told):
         call()
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_a_value_that_is_not_finite_is_told(value):
+    def wrong(of):
+        return lambda wo, wi: np.where(wi[:, 2] < 0.1, value, of(wo, wi))
+
+    found = chi_square(floor_sample, wrong(floor_pdf), views=(0, 0, 1))
+    assert f"the density is {value} at [" in found.reason
+    assert f"a value is {value}" in furnace(wrong(floor)).reason
+    assert not found
+
+
+def test_draws_beyond_the_square_are_told():
+    found = chi_square(lambda u: 2.0 * u[:, :2], lambda x: np.full(len(x), 0.25), domain="square")
+    assert "draws are beyond the square" in found.reason
+    assert not found
+
+
+def test_few_draws_of_a_right_sampler_pass():
+    some = [chi_square(floor_sample, floor_pdf, views=(0, 0, 1), draws=FEWEST, seed=k)
+            for k in range(40)]  # fmt: skip
+    assert all(some)
+
+
+def test_the_public_module():
+    from comparisons import testing
+    from comparisons.testing import check_material as found
+
+    assert found is check_material
+    assert {"check_material", "chi_square", "furnace", "reciprocity", "weights"} <= {*dir(testing)}
+    assert {"compare", "gate", "gate_derivative", "gate_pair", "testing"} <= {*dir(comparisons)}
 
 
 def test_the_fixture(material_gate, tmp_path, monkeypatch):

@@ -155,6 +155,69 @@ def test_the_command() -> None:
     assert len(list(Path("out/candidates/A").glob("*.npy"))) == 2
 
 
+BALL = """\
+film: {width: 32, height: 24}
+sampler: {type: independent, spp: 4}
+shapes: [{type: sphere, center: [0, 0, -2]}]
+lights: [{type: constant, radiance: 1}]
+"""
+
+
+@pytest.mark.usefixtures("gate_folder")
+def test_ours_judges_without_the_rim_too() -> None:
+    Path("renderer.py").write_text(RENDERER)
+    Path("ball.yaml").write_text(BALL)
+    words = ["--suffix", ".npy", "--replicates", "4", "--scene", "ball.yaml", "--judge"]
+    result = invoke("gate", "--pair", drive("1", "0"), drive("1.1", "0"), *words, "--rim", "2")
+    assert result.exit_code == 1, result.output
+    (case,) = json.loads(Path("out/results.json").read_text())["cases"]
+    assert "of another size" not in case["tiers"]["witness"]["reason"]
+    result = invoke("gate", "--pair", drive("1", "0"), drive("1", "0"), *words, "--size", "16x12")
+    assert result.exit_code == 3, result.output
+    assert "is 32 x 24 pixels; expected 16 x 12, the size of the scene 'ball'" in result.output
+
+
+@pytest.mark.usefixtures("gate_folder")
+def test_one_start_makes_all_pictures_of_the_first_look() -> None:
+    several = "import sys\nsys.argv[2:3], seeds = [''], sys.argv[2].split(',')\n"
+    several += (
+        "path = sys.argv[1]\nfor seed in seeds:\n    sys.argv[1:3] = path % int(seed), seed\n"
+    )
+    body = RENDERER.replace("import sys\n", "")
+    Path("renderer.py").write_text(several + "".join(f"    {line}\n" for line in body.splitlines()))
+    right = drive("1", "0").replace("{seed}", "{seeds}")
+    result = invoke("gate", "--pair", right, right, "--suffix", ".npy", "--replicates", "2")
+    assert result.exit_code == 0, result.output
+    assert "look 1, 2 replicates" in result.output
+    assert "paired: replicate k" in result.output  # seen as soon as there are enough
+
+
+@pytest.mark.usefixtures("gate_folder")
+def test_a_later_picture_of_another_size_is_invalid() -> None:
+    small = "if seed > 1.5e9:\n    mean = mean[1:]\n"  # the fourth of the first look
+    Path("renderer.py").write_text(RENDERER.replace("if other", f"{small}if other"))
+    result = invoke("gate", "--pair", drive("1", "0"), drive("1", "0"), "--suffix", ".npy")
+    assert result.exit_code == 3, result.output
+    assert "is 32 x 23 pixels; expected 32 x 24, as A's first" in result.output
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_values_that_are_not_finite(value: float) -> None:
+    a, b = pictures(1), pictures(2)
+    b[3, 2, 1, 0] = value
+    case = comparisons.gate_pair(a, b)
+    assert case.verdict == "invalid"
+    assert "1 pixel of B's picture not finite" in case.reason.replace(
+        "the reference", "B's picture"
+    )
+    assert not any("nan" in note for note in case.notes)
+
+
+def test_values_whose_squares_overflow_are_refused() -> None:
+    with pytest.raises(Exception, match="has the value 1e\\+200; expected radiance within"):
+        comparisons.gate_pair(pictures(1), np.full((8, *SHAPE), 1e200))
+
+
 @pytest.mark.usefixtures("gate_folder")
 @pytest.mark.parametrize(
     ("words", "said"),

@@ -142,6 +142,18 @@ def test_a_page_is_written_for_nothing_and_nothing_without_being_asked(
     assert "file is a file; expected a folder" in refused.stderr.str()
 
 
+def test_tests_that_are_only_collected_leave_the_page(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(test_it="def test_it():\n    pass\n")
+    run(pytester)
+    page = pytester.path / "seen" / "report.html"
+    page.write_text("the last session's")
+    text, _ = run(pytester, "--collect-only")  # as editors do
+    assert page.read_text() == "the last session's"
+    assert "uses of gates" not in text
+    # A session without a gate says nothing of any, and takes no place among the last ones.
+    assert not [*(pytester.path / "kept").glob("run-*.json")]
+
+
 @pytest.mark.slow
 def test_a_verdict_that_changes_is_named(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch

@@ -46,6 +46,28 @@ def test_a_sample_where_there_is_no_density():
     assert chi_square(lambda x: np.ones(len(x)), samples, UNIT_SQUARE).p_value > 1e-6
 
 
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_a_density_that_is_not_finite_is_told(value):
+    density, samples = lobe(0.5)
+    wrong = with_values(density, value)
+    with pytest.raises(ArithmeticError, match=f"the density is {value} at "):
+        chi_square(wrong, samples)
+    with pytest.raises(ArithmeticError, match=f"the density is {value} at "):
+        integrate(wrong, samples[samples[:, 0] > 0.0])
+
+
+def with_values(density, value):
+    """The density, with another value where hardly any sample is."""
+    return lambda v: np.where(v[:, 0] < -0.999, value, density(v))
+
+
+def test_a_density_that_is_another_each_time_ends():
+    density, samples = lobe(0.5)
+    rng = np.random.default_rng(4)
+    with pytest.raises(ArithmeticError, match="the same each time"):
+        chi_square(lambda v: density(v) * rng.uniform(0.5, 1.5, len(v)), samples, points=4)
+
+
 def test_directions_and_coordinates():
     at = np.random.default_rng(3).uniform(SPHERE.low, SPHERE.high, (100, 2))
     assert SPHERE.coordinates(SPHERE.points(at)) == pytest.approx(at, abs=1e-12)

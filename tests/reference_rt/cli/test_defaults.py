@@ -6,6 +6,7 @@ import pytest
 from command_line import SCENE, invoke
 
 from reference_rt.cli.defaults import find
+from reference_rt.util.errors import MOST_TOLD
 
 
 @pytest.fixture
@@ -76,6 +77,21 @@ def test_paths_stay_within_the_folder(
     assert not [*elsewhere.iterdir()]
 
 
+def test_the_file_of_a_named_picture_is_a_path_too(
+    project: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`--beside NAME=FILE`."""
+    inside = project / "a"
+    inside.mkdir()
+    monkeypatch.chdir(inside)
+    file = project / "pyproject.toml"
+    file.write_text("[tool.reference_rt.gate]\nbeside = ['Cycles=none.exr']\n")
+    words = ("gate", "none.npy", "--reference", "none.npy")
+    assert f"{Path('..', 'none.exr')}: there is no such file" in invoke(*words).stderr
+    file.write_text("[tool.reference_rt.gate]\nbeside = ['Cycles=/elsewhere/c.exr']\n")
+    assert "expected a path within the file's folder" in invoke(*words).stderr
+
+
 def test_a_file_that_may_not_be_read_is_passed_by(
     project: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -131,3 +147,40 @@ lights: [{type: constant, radiance: 1}]
         assert told in result.stderr, told
     assert Path(SCENE).name not in result.stderr
     assert invoke("check", SCENE).exit_code == 0
+
+
+def test_check_tells_all_names_and_all_files_at_once(project: Path) -> None:
+    Path("names.yaml").write_text("""
+textures: {t: {type: product, of: [none, none]}}
+materials: {a: {type: diffuse, reflectance: t2}, b: {type: bump, base: c, height: t}}
+shapes:
+  - {type: sphere, material: nothing}
+  - {type: instance, group: g}
+groups: {h: [{type: sphere, interior: fog}]}
+camera: {type: perspective, medium: smoke}
+lights: [{type: constant, radiance: 1}, {type: constant, radiance: 1}]
+""")
+    result = invoke("check", "names.yaml")
+    assert result.exit_code == 3
+    for line in (2, 3, 5, 6, 7, 8, 9):
+        assert f"names.yaml:{line}: " in result.stderr, line
+    assert result.stderr.count("names.yaml:3: ") == 2
+    Path("files.yaml").write_text("""
+textures: {t: {type: bitmap, file: a.png}, u: {type: bitmap, file: b.png}}
+materials: {m: {type: diffuse, reflectance: t}, n: {type: diffuse, reflectance: u}}
+groups: {g: [{type: mesh, file: c.ply}]}
+shapes:
+  - {type: mesh, file: d.obj, material: m}
+  - {type: instance, group: g}
+  - {type: instance, group: g}
+  - {type: sphere, material: n}
+  - {type: mesh, file: e.stl}
+""")
+    for words in (("check", "files.yaml"), ("render", "files.yaml", "-o", "x.png")):
+        result = invoke(*words)
+        assert result.exit_code == 3
+        for file in ("a.png", "b.png", "c.ply", "d.obj", "e.stl"):
+            assert result.stderr.count(file) == 1, file
+    many = "shapes:\n" + "- {type: sphere, material: nothing}\n" * 500
+    Path("many.yaml").write_text(many)
+    assert invoke("check", "many.yaml").stderr.count("nothing") == MOST_TOLD

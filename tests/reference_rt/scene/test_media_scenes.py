@@ -29,6 +29,7 @@ WRONG = {
     "a mask of nothing": "materials: {edge: {type: none}, m: {type: mask, base: edge}}",
     "a lamp of nothing": "materials: {e: {type: none}, m: {type: emissive, radiance: 1, base: e}}",
     "no length": "media: {fog: {type: homogeneous, sigma_t: -1, albedo: 0.5}}",
+    "beyond floats": "media: {a: {type: homogeneous, sigma_t: 1.0e+300, albedo: 1, scale: 1.0e+9}}",
     "more than all": "media: {fog: {type: homogeneous, sigma_t: 1, albedo: [0.5, 1.5, 0.5]}}",
     "a mirror of a phase": (
         "media: {a: {type: homogeneous, sigma_t: 1, albedo: 1, phase: {type: hg, g: 1}}}"

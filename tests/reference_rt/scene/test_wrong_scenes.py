@@ -6,9 +6,9 @@ from command_line import invoke
 from PIL import Image
 
 import reference_rt as rt
-from reference_rt.core.diagnosis import MOST
 from reference_rt.core.exr import write_exr
 from reference_rt.util import yaml_text
+from reference_rt.util.errors import MOST_TOLD
 
 SHAPE = "shapes:\n  - type: sphere\n    "
 BOX = "shapes:\n  - type: box\n    transform: "
@@ -456,7 +456,7 @@ def test_a_mistake_in_many_places_is_told_a_few_times():
     shapes = "".join(f"  - {{type: sphere, radius: -{k + 1}}}\n" for k in range(500))
     with pytest.raises(rt.SceneError) as caught:
         rt.Scene.parse(f"shapes:\n{shapes}")
-    assert 1 + len(caught.value.others) == MOST
+    assert 1 + len(caught.value.others) == MOST_TOLD
 
 
 # ---- nested materials ---------------------------------------------------------------------------
