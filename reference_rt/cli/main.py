@@ -377,7 +377,7 @@ def check(
     ],
     allow_missing: AllowMissing = False,
 ) -> None:
-    """Read scene files and the files that they name, and print every error; exit code 3 if there is
+    """Read scene files and the files that they name, and print their errors; exit code 3 if there is
     one."""
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.errors import SceneError
