@@ -377,8 +377,8 @@ def check(
     ],
     allow_missing: AllowMissing = False,
 ) -> None:
-    """Read scene files and the files that they name, and print their errors; exit code 3 if there is
-    one."""
+    """Read scene files and the files that they name, and print their errors; exit code 3 if there
+    is one."""
     from reference_rt.rendering.scene import Scene
     from reference_rt.util.errors import SceneError
 
