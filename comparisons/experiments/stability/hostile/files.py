@@ -31,7 +31,7 @@ from comparisons.experiments.stability.hostile.damage import (
     with_structure,
 )
 from comparisons.experiments.stability.hostile.worker import Answer, answers, judged_of_mitsuba
-from reference_rt.core.diagnosis import MOST
+from reference_rt.util.errors import MOST_TOLD
 
 FOR_MITSUBA = {"quick": 8, "full": 60}
 """Scenes of a sweep point that Mitsuba gets: each takes it some 0.1 s, after 2 s to start."""
@@ -49,7 +49,7 @@ def problem(answer: Answer, scene: Path) -> str | None:
     if answer.exit == 0:
         return f"{answer.nonfinite} pixels not finite, not told" if answer.nonfinite else None
     lines = answer.said.splitlines()
-    if not 1 <= len(lines) <= MOST or not all(line.startswith("error: ") for line in lines):
+    if not 1 <= len(lines) <= MOST_TOLD or not all(line.startswith("error: ") for line in lines):
         return f"not one line of error for each problem: {answer.said[:300]!r}"
     for line in lines:
         if str(scene.parent) not in line:
