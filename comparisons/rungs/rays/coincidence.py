@@ -151,6 +151,17 @@ def is_doubled(
     return _are_two(sizes, tables, Rays(p, target - p), np.ones(len(p)))
 
 
+def together_along(sizes: ShapeSizes, tables: SceneTables, rays: Rays) -> tuple[IntArray, IntArray]:
+    """Which rays (m,) cross which two shapes (m, 2), one behind the other, in one place, within
+    float32's error."""
+    crossed = query.crossings(tables, rays.o, rays.d)
+    e = slide(sizes, rays.o[crossed.ray], rays.d[crossed.ray], _as_hits(crossed))
+    apart = np.diff(crossed.t) * np.linalg.norm(rays.d[crossed.ray[1:]], axis=1)
+    near = (np.diff(crossed.ray) == 0) & (apart <= e[1:] + e[:-1])
+    shapes = np.stack([crossed.shape[:-1], crossed.shape[1:]], axis=1)
+    return crossed.ray[1:][near], shapes[near]
+
+
 def _are_two(sizes: ShapeSizes, tables: SceneTables, rays: Rays, t: FloatArray) -> BoolArray:
     """(n,): whether rays cross two surfaces at t (n,), within float32's error."""
     crossed = query.crossings(tables, rays.o, rays.d)

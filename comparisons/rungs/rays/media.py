@@ -17,6 +17,7 @@ from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.plugins.base import is_wide
 from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays import arbiter
+from comparisons.rungs.rays.coincidence import together_along
 from comparisons.rungs.rays.rays import Rays, joined, pixel_rays, random_rays
 from comparisons.translator import load
 from comparisons.translator.moved import moved
@@ -84,6 +85,8 @@ def media_along(
         theirs = thickness_in_mitsuba(clear, counterpart, rays)
         allowed = THICK / diagonal * _slack(sizes, counterpart, rays, diagonal)
         off = _differ(ours, theirs, allowed)
+        asked = np.flatnonzero(off)
+        off[asked[_meet_two(scene, sizes, rays.rows(asked))]] = False
         for k in np.flatnonzero(off):
             near = thickness(clear, _beside(sizes, rays, int(k), rng))
             lowest, highest = near.min(axis=0), near.max(axis=0)
@@ -118,6 +121,17 @@ def _beside(sizes: ShapeSizes, rays: Rays, k: int, rng: np.random.Generator) -> 
     o, d = np.tile(rays.o[k], (MOVED, 1)), np.tile(rays.d[k], (MOVED, 1))
     size = float(sizes.frame.epsilon(rays.o[[k]])[0])
     return Rays(o + size * rng.uniform(-4.0, 4.0, o.shape), d)
+
+
+def _meet_two(scene: Scene, sizes: ShapeSizes, rays: Rays) -> Any:
+    """(n,): whether a ray meets two shapes in one place that bound different media: which of them
+    decides is nobody's fault."""
+    if not len(rays.o):
+        return np.zeros(0, bool)
+    ray, shapes = together_along(sizes, scene.tables, rays)
+    media = [(one.interior, one.exterior) for one in scene.shapes]
+    differ = np.array([a == b or media[a] != media[b] for a, b in shapes], bool)
+    return np.bincount(ray[differ], minlength=len(rays.o)) > 0
 
 
 def _described(

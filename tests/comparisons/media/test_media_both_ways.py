@@ -238,6 +238,24 @@ media: {{v0: {{type: homogeneous, sigma_t: 1, albedo: 0}}}}
     assert wrong_rays(scene, scene.changed(shapes=(bare,))).too_many
 
 
+def test_shapes_in_one_place_with_different_media_are_left_out():
+    """Which of two sheets in one plane decides is nobody's fault; beside each other they count."""
+    text = """
+camera: {type: orthographic, eye: [3, 0, 7], target: [0, 0, 0]}
+film: {height: 8, width: 4}
+shapes:
+  - {type: rectangle, transform: [{scale: 0.7}, {translate: [0, 0, Z]}]}
+  - {type: rectangle, exterior: v0}
+  - {type: sphere}
+media: {v0: {type: homogeneous, sigma_t: 1, albedo: 0}}
+"""
+    for z in (0, 1e-9, 0.1):
+        scene = Scene.parse(text.replace("Z", str(z)))
+        assert wrong_rays(scene, scene).wrong == 0
+        bare = [one.model_copy(update={"exterior": None}) for one in scene.shapes]
+        assert wrong_rays(scene, scene.changed(shapes=tuple(bare))).too_many
+
+
 def test_another_medium_inside_is_found():
     scene = Scene.load(SCENES / "nested_media.yaml").changed(**SMALL)
     for k, change in (
