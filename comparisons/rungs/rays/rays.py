@@ -79,15 +79,15 @@ def mixed_rays(
     return joined(camera, Rays(through.o[:rest], through.d[:rest]), from_hits)
 
 
-FLAT = 0.01
-"""Of a scene's largest extent, by which its bounds grow at least."""
+FLAT = 2.0**-20
+"""Of a scene's largest extent: one that is thinner has no thickness in float32."""
 
 
 def random_rays(sizes: ShapeSizes, n: int, rng: np.random.Generator) -> Rays:
     """n rays from a random point in the scene's bounds, grown by a tenth, towards another."""
     extent = sizes.upper - sizes.lower
     # Some start outside; and those of a flat scene do not lie in it, where rounding decides.
-    margin = np.maximum(0.1 * extent, FLAT * extent.max())
+    margin = 0.1 * np.where(extent > FLAT * extent.max(), extent, extent.max())
     start, end = rng.uniform(sizes.lower - margin, sizes.upper + margin, (2, n, 3))
     d = end - start
     length = np.linalg.norm(d, axis=1)[:, None]
