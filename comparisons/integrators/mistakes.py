@@ -12,7 +12,7 @@ from reference_rt.integrators import Direct, Light, Path
 from reference_rt.lights import Directional
 from reference_rt.materials import Emissive, Mask, NoSurface, ThinDielectric
 from reference_rt.scene.model import SceneModel
-from reference_rt.shapes import Mesh, Plane, Shape, Solid
+from reference_rt.shapes import Mesh, Shape, Solid
 
 
 def in_place_of(scene: SceneModel, has_solids: bool = False) -> dict[str, Any] | None:
@@ -111,9 +111,8 @@ def has_endless_media(scene: SceneModel) -> bool:
 
 
 def _holds(shape: Shape) -> bool:
-    """Whether a shape is closed, and of finite size."""
-    if isinstance(shape, Plane):
-        return False
+    """Whether a shape is closed, or a plane: its mesh in Mitsuba is so large that the scene's edge,
+    at which a medium ends, is far away."""
     return isinstance(shape, Mesh | Solid) or type_of_shape(shape).encloses(shape)
 
 

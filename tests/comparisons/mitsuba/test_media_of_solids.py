@@ -119,13 +119,13 @@ def test_a_lamp_behind_boundaries_is_not_lost():
 ENDLESS = {
     "rectangle": "interior: ink, transform: [{scale: 9}]",
     "disk": "interior: ink, transform: [{scale: 9}]",
-    "plane": "interior: ink",
     "polygon": "interior: ink, rings: [[[-9, -9], [9, -9], [9, 9], [-9, 9]]]",
     "cylinder": "interior: ink, capped: false",
     "sphere": "exterior: ink, radius: 9",
     "mesh": "exterior: ink, file: ball.obj, transform: [{scale: 9}]",
 }
 CLOSED = {
+    "plane": "interior: ink",
     "sphere": "interior: ink, radius: 9",
     "box": "interior: ink",
     "cylinder": "interior: ink",
@@ -152,6 +152,8 @@ def test_a_medium_without_end_is_not_lit_by_a_sky(shape: tuple[str, str], endles
     assert (in_place_of(scene) is not None) == endless
     if endless and kind != "cylinder":  # whose open ends the view does not meet
         assert np.all(mean(scene, 4) == 0.0)
+    if kind == "plane":
+        assert np.all(picture(load(scene).mi_scene, 4, 3) == 0.0)
     dark = scene.changed(lights=(rt.Point(position=(0, 0, 3), intensity=1.0),))
     assert in_place_of(dark) is None  # its light comes from within a finite distance
 
