@@ -1,18 +1,22 @@
 """Errors of Mitsuba's integrators, the scenes that they concern, and what a comparison does about
 them."""
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from comparisons.integrators import translate_integrator, type_of
 from comparisons.integrators.light import as_path
 from comparisons.lights import type_of as type_of_light
 from comparisons.shapes import type_of as type_of_shape
+from reference_rt.core.transform import affine
 from reference_rt.integrators import Direct, Light, Path
 from reference_rt.lights import Directional
 from reference_rt.materials import Emissive, Mask, NoSurface, ThinDielectric
 from reference_rt.scene.model import SceneModel
-from reference_rt.shapes import Mesh, Shape, Solid
+from reference_rt.shapes import Mesh, Rectangle, Shape, Solid
 
 
 def in_place_of(scene: SceneModel, has_solids: bool = False) -> dict[str, Any] | None:
@@ -99,15 +103,29 @@ def has_wrong_media(scene: SceneModel) -> bool:
 
 
 def has_endless_media(scene: SceneModel) -> bool:
-    """Whether rays may leave the scene in a medium: it is around the camera, or no closed shape has
-    it within.  Meshes with a medium in them are taken for closed ones."""
+    """Whether rays may leave the scene in a medium, and not far away: it is around the camera, or
+    no closed shape has it within.  Meshes with a medium in them are taken for closed ones.
+
+    A medium is dark in Mitsuba, too, where it takes all light on the way to the edge of the scene,
+    which is at least as far as that of its largest rectangle.
+    """
     closed: set[str | None] = {None}
     others: set[str | None] = set()
+    reach = 0.0
     for shape in (*scene.shapes, *(one for group in scene.groups.values() for one in group)):
+        if isinstance(shape, Rectangle):
+            edges = np.linalg.norm(affine(shape.transform)[:, :2], axis=0)
+            reach = max(reach, float(edges.max()))
         if shape.interior is not None:
             (closed if _holds(shape) else others).add(shape.interior)
         others.add(shape.exterior)
-    return scene.camera.medium is not None or not others <= closed
+    media = [scene.media[name] for name in others - closed if name is not None]
+    lit = any(min(m.sigma_t) * m.scale * reach < DARK for m in media)
+    return scene.camera.medium is not None or lit
+
+
+DARK = 24.0 * math.log(2.0)
+"""The optical thickness behind which light is below float32's rounding."""
 
 
 def _holds(shape: Shape) -> bool:

@@ -12,6 +12,7 @@ from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.plugins.base import is_wide
 from comparisons.mitsuba.scene import picture
 from comparisons.translator import load
+from reference_rt.core.transform import Scale
 from reference_rt.rendering.scene import Scene
 
 pytestmark = pytest.mark.skipif(not is_wide(mitsuba()), reason="needs a fast variant")
@@ -154,6 +155,11 @@ def test_a_medium_without_end_is_not_lit_by_a_sky(shape: tuple[str, str], endles
         assert np.all(mean(scene, 4) == 0.0)
     if kind == "plane":
         assert np.all(picture(load(scene).mi_scene, 4, 3) == 0.0)
+    if kind == "rectangle":  # the edge of a large scene is as dark as none
+        large = scene.shapes[0].model_copy(update={"transform": (Scale(scale=1e4),)})
+        large = scene.changed(shapes=(large,))
+        assert in_place_of(large) is None
+        assert np.all(picture(load(large).mi_scene, 4, 3) == 0.0)
     dark = scene.changed(lights=(rt.Point(position=(0, 0, 3), intensity=1.0),))
     assert in_place_of(dark) is None  # its light comes from within a finite distance
 
