@@ -107,15 +107,14 @@ def has_endless_media(scene: SceneModel) -> bool:
     no closed shape has it within.  Meshes with a medium in them are taken for closed ones.
 
     A medium is dark in Mitsuba, too, where it takes all light on the way to the edge of the scene,
-    which is at least as far as that of its largest rectangle.
+    which is at least as far as that of its largest rectangle; copies may have another size.
     """
     closed: set[str | None] = {None}
     others: set[str | None] = set()
-    reach = 0.0
+    rectangles = [affine(one.transform) for one in scene.shapes if isinstance(one, Rectangle)]
+    edges = [float(np.linalg.norm(m[:, :2], axis=0).max()) for m in rectangles]
+    reach = max(edges, default=0.0)
     for shape in (*scene.shapes, *(one for group in scene.groups.values() for one in group)):
-        if isinstance(shape, Rectangle):
-            edges = np.linalg.norm(affine(shape.transform)[:, :2], axis=0)
-            reach = max(reach, float(edges.max()))
         if shape.interior is not None:
             (closed if _holds(shape) else others).add(shape.interior)
         others.add(shape.exterior)

@@ -160,6 +160,8 @@ def test_a_medium_without_end_is_not_lit_by_a_sky(shape: tuple[str, str], endles
         large = scene.changed(shapes=(large,))
         assert in_place_of(large) is None
         assert np.all(picture(load(large).mi_scene, 4, 3) == 0.0)
+        small = rt.Instance(group="sheets", transform=(Scale(scale=1e-4),))
+        assert in_place_of(large.changed(shapes=(small,), groups={"sheets": large.shapes}))
     dark = scene.changed(lights=(rt.Point(position=(0, 0, 3), intensity=1.0),))
     assert in_place_of(dark) is None  # its light comes from within a finite distance
 
