@@ -217,8 +217,10 @@ class Trees:
         do: their light may be so much more or less where the middle of a lamp lies at the edge of a
         texel, wherever the ray goes."""
         ours, theirs, _, bound, outliers = compared
-        tables, setup = self._tables, self._setup
-        some, integrator = rays.rows(outliers), self._integrator
+        if len(outliers) == 0:
+            return np.zeros(0, bool), np.zeros(0, bool)
+        tables, integrator = self._tables, self._integrator
+        some = rays.rows(outliers)
         settled = explained_by_neighbours(
             self._context,
             some,
@@ -231,9 +233,10 @@ class Trees:
             other = integrator.model_copy(update={"min_contribution": least}).setup()
             again = query.radiance_without_noise(tables, other, some.o, some.d)
             settled |= np.abs(again - theirs[outliers]).max(axis=1) <= bound[outliers]
-        hits = query.intersect(tables, *some), trace(self._counterpart, *some)
-        context = LightContext(self._scene, tables, self._counterpart, some, *hits, self._sizes)
-        low, high = changes_of_lamps(context, setup)
+        nodes = self._theirs_at.nodes(some)
+        hits = query.intersect(tables, *nodes.rays), trace(self._counterpart, *nodes.rays)
+        lit = LightContext(self._scene, tables, self._counterpart, nodes.rays, *hits, self._sizes)
+        low, high = changes_of_lamps(lit, nodes, len(outliers), self._setup)
         apart, allowed = theirs[outliers] - ours[outliers], bound[outliers][:, None]
         within = ((apart >= low - allowed) & (apart <= high + allowed)).all(axis=1)
         return settled | within, np.asarray(within & (np.abs(apart) > allowed).any(axis=1))

@@ -1,6 +1,7 @@
 """How much light changes within float32's error of the point on a lamp that has a texture."""
 
 import dataclasses
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -9,36 +10,40 @@ from comparisons.rungs.rays.arbiter import BoolArray
 from comparisons.rungs.rays.light_context import LightContext, kind_of
 from comparisons.rungs.rays.light_error import MIDDLE
 from comparisons.rungs.rays.slopes import NEAR, slopes
-from reference_rt.core.arrays import FloatArray
+from comparisons.rungs.rays.tree_error import Nodes
+from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.integrators import WhittedSetup
 from reference_rt.lights import AREA, ENVIRONMENT, EnvironmentMap
 from reference_rt.materials import Emissive
 from reference_rt.rendering import query
 
 U_STEP = 2.0**-20
-"""Step in (u, v) for the slope of textured lights: float32's error for a light TIMES as far away as
-it is large."""
-
-TIMES = 10.0
+"""Step in (u, v) for the slope of textured lights, and the least error of (u, v): their own
+rounding, from the corners of a triangle or from a direction."""
 
 
 def magnified(context: LightContext, light: int, target: FloatArray, pdf: FloatArray) -> FloatArray:
     """(n,): float32's error of (u, v) on a textured light, in units of U_STEP, at least 1; 0 where
     its radiance does not vary.
 
-    It is the error of a point across the ray, over the light's size and its cosine:
-    1 / pdf = area cosine / distance² is the solid angle;  target, pdf: see `query.DirectLight`.
+    It is the error of a point across the ray from the surface, `Frame.delta`, over the light's
+    cosine and the side of a square of its area, which follows from the solid angle
+    1 / pdf = area cosine / distance²;  target, pdf: see `query.DirectLight`.
     """
     if not _has_image(context, light):
         return np.zeros(len(pdf))
     if kind_of(context, light) != AREA:
         return np.ones(len(pdf))
-    w = target - context.hits.p
+    p, sizes = context.hits.p, context.sizes
+    w = target - p
+    distance = np.linalg.norm(w, axis=1)
     there = query.intersect(context.tables, target - NEAR * w, w)
+    across = sizes.frame.delta(p, target, sizes.reach_of(there.shape))
     with np.errstate(divide="ignore", invalid="ignore"):
-        cosine = np.abs(np.sum(there.n * w, axis=1)) / np.linalg.norm(w, axis=1)
-        size = np.nan_to_num(np.sqrt(pdf / cosine) / TIMES, posinf=1.0)
-    return np.asarray(np.maximum(size, 1.0))
+        cosine = np.abs(np.sum(there.n * w, axis=1)) / distance
+        side = distance / np.sqrt(pdf * cosine)
+        error = np.nan_to_num(across / (cosine * side), posinf=1.0)
+    return np.asarray(np.maximum(error / U_STEP, 1.0))
 
 
 def slopes_of_image(
@@ -66,23 +71,27 @@ def is_beside(
     """(n,): whether the light has Mitsuba's value, `wanted` (n, 3), next to u, up to `allowed`
     (n,): at the edge of a texel."""
     beside = np.zeros(len(wanted), bool)
-    if not scale.any():
-        return beside
-    for at in _beside(u, float(scale.max())):
-        error = np.abs(_value_at(context, light, at) - wanted).max(axis=1)
-        beside |= (error <= allowed) & (scale > 0.0)
+    for radius, rows in _circles(scale):
+        some = context.of(rows)
+        for at in _beside(u, radius):
+            error = np.abs(_value_at(some, light, at) - wanted[rows]).max(axis=1)
+            beside[rows] |= error <= allowed[rows]
     return beside
 
 
-def changes_of_lamps(context: LightContext, setup: WhittedSetup) -> tuple[FloatArray, FloatArray]:
+def changes_of_lamps(
+    context: LightContext, nodes: Nodes, n: int, setup: WhittedSetup
+) -> tuple[FloatArray, FloatArray]:
     """The least and the greatest change, (n, 3) each, of the light that Whitted's ray tracing takes
-    from the middles of textured lamps, directly and in mirrors, within float32's error of (u, v).
+    from the middles of textured lamps, within float32's error of (u, v) at each node of the trees
+    of n rays: a mirror may show a surface from which a lamp is far, or seen edge-on.
 
     Each lamp is moved alone, with all others off, so that the changes of several add up.
+    context: of the nodes' rays.
     """
-    low, high = np.zeros((2, len(context.hits.t), 3))
+    low, high = np.zeros((2, n, 3))
     tables, rays = context.tables, context.rays
-    choice = tables.lights.choice
+    choice, setup = tables.lights.choice, setup._replace(max_depth=0)
     if choice is None or len(rays.o) == 0:
         return low, high
     for light in np.flatnonzero((choice.kind == AREA) & (choice.probability > 0.0)).tolist():
@@ -93,18 +102,38 @@ def changes_of_lamps(context: LightContext, setup: WhittedSetup) -> tuple[FloatA
         alone = np.where(np.arange(len(choice.kind)) == light, choice.probability, 0.0)
         lights = tables.lights._replace(choice=choice._replace(probability=alone))
         lit = dataclasses.replace(tables, lights=lights)
-        around = [
-            query.radiance_without_noise(lit, setup._replace(u0=u0, u1=u1), rays.o, rays.d)
-            for u0, u1 in [MIDDLE, *_beside(MIDDLE, float(scale.max()), AROUND)]
-        ]
-        changes = np.stack(around[1:]) - around[0]
-        low += np.minimum(changes.min(axis=0), 0.0)
-        high += np.maximum(changes.max(axis=0), 0.0)
+        least, most = np.zeros((2, *rays.o.shape))
+        for radius, some in _circles(np.where(ours.pdf > 0.0, scale, 0.0)):
+            around = [
+                query.radiance_without_noise(
+                    lit, setup._replace(u0=u0, u1=u1), rays.o[some], rays.d[some]
+                )
+                for u0, u1 in [MIDDLE, *_beside(MIDDLE, radius, AROUND)]
+            ]
+            changes = np.stack(around[1:]) - around[0]
+            least[some] = np.minimum(least[some], changes.min(axis=0))
+            most[some] = np.maximum(most[some], changes.max(axis=0))
+        for total, change in ((low, least), (high, most)):
+            np.add.at(total, nodes.row, nodes.weight * change)
     return low, high
 
 
 AROUND = 128
 """Points around MIDDLE: the texture of a disk goes round its middle, with all its rows."""
+
+MOST_DOUBLINGS = 18
+"""Of U_STEP: the circle is half of the lamp wide.  Where the error is larger, nothing of the lamp
+is resolved."""
+
+
+def _circles(scale: FloatArray) -> Iterator[tuple[float, IntArray]]:
+    """The radii, in units of U_STEP, of circles that are each twice as large, and the rows of
+    `scale` (n,) whose error is more than half of them: between a large circle and its middle lie
+    texels that it does not meet."""
+    with np.errstate(divide="ignore"):
+        doublings = np.minimum(np.ceil(np.log2(scale)), MOST_DOUBLINGS)
+    for k in range(int(doublings.max(initial=-1.0)) + 1):
+        yield 2.0**k, np.flatnonzero(doublings >= k)
 
 
 def _beside(u: tuple[float, float], scale: float, count: int = 4) -> list[tuple[float, float]]:
