@@ -206,7 +206,7 @@ def _factor_by_chance(pictures: FloatArray, noisy: npt.NDArray[np.bool_]) -> flo
 
 def excess_by_sharing(pictures: FloatArray) -> float:
     """The factor by which the squares of the mean's noise hardly ever exceed their expectation if
-    pixels far from each other share random numbers; 1 if they do not.
+    pixels far from each other share random numbers; 1 if they do not.  It may be infinite.
 
     pictures: replicates (R, height, width, 3).  It is 1 too for fewer than four replicates, which
     do not show it.
@@ -219,16 +219,21 @@ def excess_by_sharing(pictures: FloatArray) -> float:
     ratios = np.stack([tile_sums(x)[lit] / noise[lit] for x in squares])
     means = ratios.mean(axis=1)
     if ratios.shape[1] < FEWEST_TILES:
-        return math.exp(_log_factor(means))
+        return _factor(means)
     of_tiles = math.sqrt(float((ratios.var(axis=1, ddof=1) / ratios.shape[1]).mean()))
     if float(means.std(ddof=1)) < SHARING * of_tiles:
         return 1.0
-    return math.exp(_log_factor(means))
+    return _factor(means)
 
 
 def _differences(pictures: FloatArray) -> FloatArray:
     """(R - 1, height, width, 3): orthogonal, each with the noise of one replicate and no mean."""
     return np.asarray(np.tensordot(helmert(len(pictures)), pictures, axes=1))
+
+
+def _factor(squares: FloatArray) -> float:
+    with np.errstate(over="ignore"):  # infinite where some differences vanish
+        return float(np.exp(_log_factor(squares)))
 
 
 def _log_factor(squares: FloatArray) -> float:

@@ -115,6 +115,22 @@ def test_a_lamp_that_few_samples_met_agrees(size: int, met: int, side: int) -> N
         assert result.status == "agree", result.reason
 
 
+@pytest.mark.parametrize("count", [4, 5, 8])
+@pytest.mark.parametrize("size", [4, 16, 48])
+@pytest.mark.parametrize("met", [1, 2])
+def test_a_lamp_that_few_samples_met_in_the_dark(size: int, count: int, met: int) -> None:
+    """All other pixels have no noise, so that most differences of replicates vanish, and the factor
+    by which their squares may scatter is infinite."""
+    rng = np.random.default_rng(7)
+    for _ in range(4):
+        sides = np.zeros((2, count, size, size, 3))
+        for side in sides:
+            for k in rng.permutation(count)[:met]:
+                side[(k, *rng.integers(size, size=2))] = 0.5 + rng.random(3)
+        result = judged(*sides)
+        assert result.status in ("agree", "inconclusive"), result.reason
+
+
 @pytest.mark.slow
 def test_what_noise_gives_is_what_is_found(picture: FloatArray) -> None:
     """The expectation, given the noise, is that of new pictures: within its own scatter."""
