@@ -25,8 +25,10 @@ NAMED: dict[str, dict[str, Any]] = {
 
 
 def write_files(folder: Path) -> None:
-    """The files that examples name: an image, and the maps of two copies."""
-    np.save(folder / "image.npy", np.linspace(0.1, 0.9, 12 * 3).reshape(3, 4, 3))
+    """The files that examples name: an image, which files of float32 hold exactly, and the maps of
+    two copies."""
+    image = np.linspace(0.1, 0.9, 12 * 3, dtype=np.float32)
+    np.save(folder / "image.npy", image.reshape(3, 4, 3))
     np.save(folder / "copies.npy", np.stack([np.eye(4)[:3], 0.5 * np.eye(4)[:3]]))
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from builders import every_law, every_light
+from galleries import gallery_of_lights, gallery_of_materials
 
 import reference_rt as rt
 from comparisons.mitsuba.backend import mitsuba, scalar
@@ -48,8 +48,8 @@ def view(shape: str, integrator: str = "{type: path, max_depth: 3}") -> Callable
 
 
 SCENES: dict[str, Callable[[Path], Scene]] = {
-    "every material": lambda folder: Scene.load(every_law(folder)),
-    "every light": lambda folder: Scene.load(every_light(folder)),
+    "every material": gallery_of_materials,
+    "every light": gallery_of_lights,
     "a solid": view(SOLID),
     "direct light on a solid": view(SOLID, "{type: direct}"),
     "Whitted's light on a solid": view(SOLID, "{type: whitted}"),

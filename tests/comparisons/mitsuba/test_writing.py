@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import SCENES, every_law, every_light
+from builders import SCENES
 from command_line import invoke
+from galleries import gallery_of_lights, gallery_of_materials
 
 import reference_rt as rt
 from comparisons.mitsuba.backend import mitsuba, scalar
@@ -74,9 +75,20 @@ def assert_same_bits(scene: Scene, read: Scene) -> None:
     assert ours.tobytes() == theirs.tobytes()
 
 
-@pytest.mark.parametrize("write", [every_law, every_light], ids=lambda f: f.__name__)
-def test_every_material_texture_and_light_is_read_to_the_same_bits(write, tmp_path):
-    scene = Scene.load(write(tmp_path))
+def can_be_written(scene: Scene, folder: Path) -> bool:
+    try:
+        write_xml(scene, folder / "scene.xml")
+    except rt.SceneError:  # it has no counterpart among Mitsuba's
+        return False
+    return True
+
+
+@pytest.mark.parametrize("gallery", [gallery_of_materials, gallery_of_lights])
+def test_every_material_texture_and_light_is_read_to_the_same_bits(gallery, tmp_path):
+    scene = gallery(tmp_path)
+    kept = [s for s in scene.shapes if can_be_written(scene.changed(shapes=[s]), tmp_path)]
+    assert len(scene.shapes) - len(kept) <= 5  # products, two wraps, normal maps by `follow_v`
+    scene = scene.changed(shapes=kept)
     assert_same_bits(scene, round_trip(scene, tmp_path))
 
 

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import SCENES, every_light, every_shape
+from builders import SCENES
 from command_line import invoke
+from galleries import gallery_of_lights, gallery_of_shapes
 
 import reference_rt as rt
 from comparisons.rungs.rays.camera import camera_rays
@@ -63,9 +64,9 @@ def assert_same_surfaces(scene: Scene, folder: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("write", [every_shape, every_light], ids=lambda f: f.__name__)
-def test_every_shape(write, tmp_path):
-    scene = Scene.load(write(tmp_path))
+@pytest.mark.parametrize("gallery", [gallery_of_shapes, gallery_of_lights])
+def test_every_shape(gallery, tmp_path):
+    scene = gallery(tmp_path)
     (tmp_path / "out").mkdir()
     assert_same_surfaces(scene, tmp_path / "out")
 
@@ -86,7 +87,7 @@ def test_scenes(name, tmp_path):
 
 
 def test_everything_is_there(tmp_path):
-    scene = Scene.load(every_light(tmp_path))
+    scene = gallery_of_lights(tmp_path)
     (tmp_path / "out").mkdir()
     write_resolved(scene, tmp_path / "out" / "a.json")
     found = json.loads((tmp_path / "out" / "a.json").read_text())

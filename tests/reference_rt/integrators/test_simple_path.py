@@ -5,7 +5,8 @@ from unittest import mock
 
 import numpy as np
 import pytest
-from builders import SCENES, every_law, every_light, every_shape, in_plain_python
+from builders import SCENES, in_plain_python
+from galleries import GALLERIES
 
 import reference_rt as rt
 from reference_rt.core.ray import put_vector, ray_of
@@ -77,9 +78,9 @@ def test_paths_of_a_block_are_simple_paths(tmp_path):
 @pytest.mark.slow
 def test_of_every_scene(tmp_path):
     """Of scenes/, and of one with every shape, every material and every light."""
-    made = {one.__name__: one(tmp_path) for one in (every_shape, every_law, every_light)}
-    files = {str(file.relative_to(SCENES)): file for file in sorted(SCENES.rglob("*.yaml"))}
-    scenes = {name: rt.Scene.load(file) for name, file in (files | made).items()}
+    scenes = {gallery.__name__: gallery(tmp_path) for gallery in GALLERIES} | {
+        str(file.relative_to(SCENES)): rt.Scene.load(file) for file in SCENES.rglob("*.yaml")
+    }
     paths = {
         name: small(scene)
         for name, scene in scenes.items()

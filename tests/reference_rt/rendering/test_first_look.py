@@ -6,7 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from builders import SCENES, every_law, every_light, every_shape
+from builders import SCENES
+from galleries import gallery_of_lights, gallery_of_materials, gallery_of_shapes
 
 import reference_rt as rt
 from reference_rt.cli.picture_above import first_look, pixels_of
@@ -26,17 +27,15 @@ SMALL = rt.Film(width=9, height=6)
 
 
 def shapes(folder):
-    return rt.Scene.load(every_shape(folder)).changed(sampler=rt.Sobol(spp=3))
+    return gallery_of_shapes(folder).changed(sampler=rt.Sobol(spp=3))
 
 
-def laws(folder):
-    return rt.Scene.load(every_law(folder)).changed(sampler=rt.Independent(spp=2))
+def materials(folder):
+    return gallery_of_materials(folder).changed(sampler=rt.Independent(spp=2))
 
 
 def lights(folder):
-    return rt.Scene.load(every_light(folder)).changed(
-        integrator=rt.Whitted(), sampler=rt.Grid(spp=4)
-    )
+    return gallery_of_lights(folder).changed(integrator=rt.Whitted(), sampler=rt.Grid(spp=4))
 
 
 def direct(folder):
@@ -50,7 +49,7 @@ def media(folder):
 
 
 def cast_for_normals(folder):
-    return rt.Scene.load(every_shape(folder)).changed(integrator=rt.RayCast(show="normal"))
+    return gallery_of_shapes(folder).changed(integrator=rt.RayCast(show="normal"))
 
 
 def other_layers(folder):
@@ -71,7 +70,7 @@ def shown(scene, wait=60.0):
 
 
 @pytest.mark.parametrize(
-    "scene", [shapes, laws, lights, direct, media, cast_for_normals, other_layers]
+    "scene", [shapes, materials, lights, direct, media, cast_for_normals, other_layers]
 )
 def test_it_becomes_the_picture(scene, tmp_path):
     scene = scene(tmp_path)

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from builders import SCENES, every_law, every_shape, import_everything
+from builders import SCENES, import_everything
+from galleries import gallery_of_materials, gallery_of_shapes
 
 import reference_rt as rt
 from reference_rt.accel.geometry import geometries
@@ -82,8 +83,8 @@ def scenes(folder: Path) -> list[Any]:
     """With everything, and with few shapes, for which there is no hierarchy."""
     lamp = rt.Rectangle(material="lamp")
     few = rt.Scene(materials={"lamp": rt.Emissive(radiance=1.0)}, shapes=(rt.Sphere(), lamp))
-    files = every_shape(folder), every_law(folder), SCENES / "many_lights.yaml"
-    found = [few, *map(rt.Scene.load, files)]
+    many = rt.Scene.load(SCENES / "many_lights.yaml")
+    found = [few, gallery_of_shapes(folder), gallery_of_materials(folder), many]
     assert [scene.tables.geometry.bvh is None for scene in found][:2] == [True, False]
     return [scene.tables for scene in found]
 

@@ -11,7 +11,7 @@ from unittest import mock
 import numpy as np
 import pytest
 from builders import SCENES, cube, same_in_plain_python, unit_vectors, write_obj
-from every_shape import every_shape, tilted
+from galleries import every_shape, tilted
 
 import reference_rt as rt
 from reference_rt.rendering.kept_links import link_to_geometry

@@ -4,7 +4,8 @@ import threading
 
 import numpy as np
 import pytest
-from builders import SCENES, every_law, every_light, every_shape
+from builders import SCENES
+from galleries import gallery_of_lights, gallery_of_materials, gallery_of_shapes
 
 import reference_rt as rt
 from reference_rt.core import transform
@@ -17,15 +18,7 @@ SMALL = rt.Film(width=6, height=4)
 
 
 def shapes(folder):
-    return rt.Scene.load(every_shape(folder))
-
-
-def laws(folder):
-    return rt.Scene.load(every_law(folder))
-
-
-def lights(folder):
-    return rt.Scene.load(every_light(folder))
+    return gallery_of_shapes(folder).changed(film=SMALL)
 
 
 def cornell_box(folder):
@@ -58,16 +51,20 @@ def fog(folder):
 
 WHITTED = {"integrator": rt.Whitted(), "sampler": rt.Grid(spp=4)}
 HIDDEN = {"integrator": rt.Path(hide_emitters=True, rr_depth=1, sampling="bsdf")}
+DIRECT = {"integrator": rt.Direct(light_samples=2, bsdf_samples=2)}
 CASES = {
     "shapes, path": (shapes, {}),
     "shapes, ray cast": (shapes, {"integrator": rt.RayCast(), "sampler": None}),
     "shapes, whitted": (shapes, WHITTED),
-    "laws, path": (laws, {}),
-    "laws, whitted": (laws, WHITTED),
-    "lights, path": (lights, {}),
-    "lights, hidden lamps": (lights, HIDDEN),
-    "lights, direct": (lights, {"integrator": rt.Direct(light_samples=2, bsdf_samples=2)}),
-    "lights, whitted": (lights, WHITTED),
+    "materials, path": (gallery_of_materials, {}),
+    "materials, whitted": (gallery_of_materials, WHITTED),
+    "lights, path": (gallery_of_lights, {}),
+    "lights, hidden lamps": (gallery_of_lights, HIDDEN),
+    "lights, direct": (
+        gallery_of_lights,
+        {"integrator": rt.Direct(light_samples=2, bsdf_samples=2)},
+    ),
+    "lights, whitted": (gallery_of_lights, WHITTED),
     "cornell box, path": (cornell_box, {}),
     "cornell box, signs of a filter": (
         cornell_box,

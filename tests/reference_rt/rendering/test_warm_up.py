@@ -10,7 +10,8 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
-from builders import SCENES, every_law, every_light, every_shape
+from builders import SCENES
+from galleries import GALLERIES
 
 import reference_rt as rt
 from reference_rt.accel.geometry import Geometry, geometries
@@ -104,8 +105,8 @@ def test_every_scene(file, known):
 
 
 def test_what_the_tests_have_for_every_type(known, tmp_path):
-    for write in (every_shape, every_law, every_light):
-        scene = rt.Scene.load(write(tmp_path))
+    for gallery in GALLERIES:
+        scene = gallery(tmp_path)
         assert described(set(picture_calls(scene)) - set(known)) == set()
 
 

@@ -3,7 +3,8 @@
 import json
 
 import pytest
-from builders import EVERY_LAW, EVERY_LIGHT, EVERY_SHAPE, SCENES, every_shape
+from builders import SCENES
+from galleries import GALLERIES, gallery_of_shapes
 
 import reference_rt as rt
 from reference_rt.util import yaml_text
@@ -79,8 +80,9 @@ def problems(value, schema, where="scene"):
     return out
 
 
-def test_schema_allows_the_scenes():
-    for text in (EVERY_SHAPE, EVERY_LAW, EVERY_LIGHT, *(file.read_text() for file in FILES)):
+def test_schema_allows_the_scenes(tmp_path):
+    texts = [gallery(tmp_path).to_json() for gallery in GALLERIES]
+    for text in (*texts, *(file.read_text() for file in FILES)):
         assert problems(yaml_text.load(text), SCHEMA) == []
 
 
@@ -134,7 +136,7 @@ def test_a_number_is_grey():
 
 
 def test_changed(tmp_path):
-    scene = rt.Scene.load(every_shape(tmp_path))
+    scene = gallery_of_shapes(tmp_path)
     before = scene.to_json()
     other = scene.changed(film=rt.Film(width=3))
     assert other.film.width == 3

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from builders import U, cube, unit_vectors, write_obj
-from every_shape import every_shape, tilted
+from galleries import every_shape, tilted
 
 import reference_rt as rt
 from comparisons.geometry.exact.dyadic import Dyadic, nearest
