@@ -145,13 +145,12 @@ def _numbers(plan: Plan, done: dict[int, Checked]) -> Iterator[int]:
 def _checked(plan: Plan, done: dict[int, Checked], start: float) -> Iterator[Checked]:
     """What comes of the scenes, as they end."""
     numbers = _numbers(plan, done)
-    size = BATCH if plan.seconds is None else 20 * plan.workers.threads
 
     def is_late() -> bool:
         return plan.seconds is not None and time.monotonic() - start > plan.seconds
 
     while not is_late():
-        batch = [number for number, _ in zip(numbers, range(size), strict=False)]
+        batch = [number for number, _ in zip(numbers, range(BATCH), strict=False)]
         if not batch:
             return
         requests = [_request(plan, number) for number in batch]
