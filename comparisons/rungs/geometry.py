@@ -139,6 +139,12 @@ def geometry(
     if along is not None and along.too_many and status != "differ":
         status = "differ"
         reason = f"{along.wrong} of {along.rays} rays are in other media; {along.first}"
+    if along is not None and along.is_limited and status == "agree":
+        status = "reference-limited"
+        reason = (
+            f"{along.lost} of {along.rays} rays cross two surfaces that are nearer to each other "
+            "than Mitsuba's ray epsilon, and are in other media behind them"
+        )
     return RungResult("geometry", status, reason, numbers)
 
 

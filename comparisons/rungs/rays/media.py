@@ -26,6 +26,7 @@ from reference_rt.integrators import Path
 from reference_rt.lights import Constant
 from reference_rt.materials import NoSurface
 from reference_rt.media import Homogeneous
+from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Shape
 from reference_rt.shapes.csg import Solid
@@ -48,22 +49,27 @@ MOVED = 16
 """Rays beside one whose lengths differ: those of float32 may pass an edge on its other side."""
 
 FEW = 2e-3
-"""Largest fraction of rays that differ from all beside them.  More means another medium; Mitsuba
-may lose the way of a ray that meets two surfaces within its ray epsilon."""
+"""Largest fraction of rays that differ from all beside them.  More means another medium."""
 
 
 class Media(NamedTuple):
-    """rays, media: how many were compared;  wrong: of rays whose lengths differ;  first: one of
-    them, in words."""
+    """rays, media: how many were compared;  wrong: of rays whose lengths differ;  lost: of others
+    that differ, in which Mitsuba steps over a surface (see `_steps_over`);  first: one that is
+    wrong, in words."""
 
     rays: int
     media: int
     wrong: int
+    lost: int
     first: str
 
     @property
     def too_many(self) -> bool:
         return arbiter.too_many(self.wrong, self.rays, FEW)
+
+    @property
+    def is_limited(self) -> bool:
+        return arbiter.too_many(self.lost, self.rays)
 
 
 def media_along(
@@ -77,7 +83,7 @@ def media_along(
     if np.isfinite(sizes.lower).all():
         rays = joined(rays, random_rays(sizes, most, rng))
         diagonal = float(np.linalg.norm(sizes.upper - sizes.lower)) or 1.0
-    wrong = np.zeros(len(rays.o), bool)
+    wrong, lost = np.zeros((2, len(rays.o)), bool)
     first = ""
     for three in (names[k : k + 3] for k in range(0, len(names), 3)):
         clear = absorbing(scene, three, THICK / diagonal)
@@ -87,6 +93,9 @@ def media_along(
         off = _differ(ours, theirs, allowed)
         asked = np.flatnonzero(off)
         off[asked[_meet_two(scene, sizes, rays.rows(asked))]] = False
+        over = asked[_steps_over(scene, sizes, rays.rows(asked))]
+        lost[over] |= off[over]
+        off[over] = False
         for k in np.flatnonzero(off):
             near = thickness(clear, _beside(sizes, rays, int(k), rng))
             lowest, highest = near.min(axis=0), near.max(axis=0)
@@ -95,7 +104,8 @@ def media_along(
             if off[k] and not first:
                 first = _described(three, rays, int(k), ours[k], theirs[k], THICK / diagonal)
         wrong |= off
-    return Media(len(rays.o), len(names), int(np.count_nonzero(wrong)), first)
+    of_wrong, of_lost = int(np.count_nonzero(wrong)), int(np.count_nonzero(lost))
+    return Media(len(rays.o), len(names), of_wrong, of_lost, first)
 
 
 def _differ(a: FloatArray, b: FloatArray, allowed: FloatArray) -> Any:
@@ -132,6 +142,25 @@ def _meet_two(scene: Scene, sizes: ShapeSizes, rays: Rays) -> Any:
     media = [(one.interior, one.exterior) for one in scene.shapes]
     differ = np.array([a == b or media[a] != media[b] for a, b in shapes], bool)
     return np.bincount(ray[differ], minlength=len(rays.o)) > 0
+
+
+def _steps_over(scene: Scene, sizes: ShapeSizes, rays: Rays) -> Any:
+    """(n,): whether a ray crosses a surface behind which another one lies within Mitsuba's ray
+    epsilon, along the normal: Mitsuba goes on from beyond both, and loses its way."""
+    if not len(rays.o):
+        return np.zeros(0, bool)
+    crossed = query.crossings(scene.tables, rays.o, rays.d)
+    onwards = np.sign(np.sum(rays.d[crossed.ray] * crossed.n, axis=1))[:, None] * crossed.n
+    behind = query.crossings(scene.tables, crossed.p, onwards)
+    epsilon = sizes.frame.epsilon(crossed.p)[behind.ray]
+    # The surface itself is at 0, but for the rounding of float64.
+    near = (behind.t > OWN * epsilon) & (behind.t <= epsilon)
+    return np.bincount(crossed.ray[behind.ray[near]], minlength=len(rays.o)) > 0
+
+
+OWN = 2.0**-20
+"""Of Mitsuba's ray epsilon, which is 2^-13 of a point's coordinates: float64's errors are 2^-50 of
+them."""
 
 
 def _described(

@@ -14,6 +14,7 @@ from comparisons.media import PHASES, translate_medium
 from comparisons.media.phases import translate_phase
 from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.referee.sizes import ShapeSizes
+from comparisons.rungs.geometry import geometry
 from comparisons.rungs.rays import media as along
 from comparisons.rungs.sampling.media import density_of
 from comparisons.translator import load
@@ -254,6 +255,31 @@ media: {v0: {type: homogeneous, sigma_t: 1, albedo: 0}}
         assert wrong_rays(scene, scene).wrong == 0
         bare = [one.model_copy(update={"exterior": None}) for one in scene.shapes]
         assert wrong_rays(scene, scene.changed(shapes=tuple(bare))).too_many
+
+
+@pytest.mark.parametrize(
+    "shape", ["type: sphere", "type: box", "type: cylinder, z_min: -1", "type: torus"]
+)
+def test_surfaces_within_the_ray_epsilon_are_beyond_mitsuba(shape: str):
+    """It starts behind both, and never leaves the medium; of what is thicker it finds all."""
+    text = f"""
+camera: {{type: pinhole, target: [0, 0, 0], eye: [4, 3, 5]}}
+film: {{width: 24, height: 18}}
+shapes:
+  - {{{shape}, interior: v0, transform: [{{scale: [1, 1, FLAT]}}]}}
+  - {{type: sphere, radius: 0.5, interior: v0, transform: [{{translate: [0, 0, 2]}}]}}
+media: {{v0: {{type: homogeneous, sigma_t: 1, albedo: 0}}}}
+"""
+    for flat, is_limited in ((2e-5, True), (0.1, False)):
+        scene = Scene.parse(text.replace("FLAT", str(flat)))
+        found = wrong_rays(scene, scene)
+        assert not found.too_many, found.first
+        assert found.is_limited == is_limited
+        bare = scene.shapes[1].model_copy(update={"interior": None})
+        assert wrong_rays(scene, scene.changed(shapes=(scene.shapes[0], bare))).too_many
+        with scalar():
+            rung = geometry(scene, scene.tables, load(scene), 100)
+        assert rung.status == ("reference-limited" if is_limited else "agree"), rung.reason
 
 
 def test_another_medium_inside_is_found():
