@@ -7,11 +7,11 @@ import numpy as np
 from comparisons import shapes
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import Copy, copies_of, place_of
-from comparisons.geometry.frame import OURS, Frame
+from comparisons.geometry.frame import OURS, ROUNDINGS, UNIT_ROUNDOFF, Frame, largest
 from reference_rt.core.arrays import Bounds, FloatArray, IdArray, IntArray
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
-from reference_rt.shapes import TABLES
+from reference_rt.shapes import TABLES, Sphere
 from reference_rt.shapes.shape import Shape
 
 
@@ -62,7 +62,8 @@ class ShapeSizes:
         maps = np.array([copy.outer for copy in self.copies]).reshape(-1, 3, 4)
         self._offset, self._inverse = maps[:, :, 3], np.linalg.inv(maps[:, :, :3])
         # A map shrinks lengths at most by its smallest singular value.
-        self._least = np.linalg.svd(maps[:, :, :3], compute_uv=False)[:, -1]
+        values = np.linalg.svd(maps[:, :, :3], compute_uv=False)
+        self._most, self._least = values[:, 0], values[:, -1]
         self._first_copy = np.searchsorted(
             [c.shape for c in self.copies], np.arange(len(self.reach))
         )
@@ -134,6 +135,25 @@ class ShapeSizes:
             rows = np.flatnonzero(leaf == number)
             feature = self.leaves[number].feature_at(local[rows], hits.primitive[rows])
             found[rows] = self._least[copy[rows]] * feature
+        return found
+
+    def slip_of(self, o: FloatArray, hits: Intersections) -> FloatArray:
+        """(n,): how far float32 moves points of ellipsoids along them, by the rounding of the rays'
+        origins o (n, 3) in the coordinates of the unit sphere; 0 elsewhere.
+
+        Mitsuba has an instance of a sphere, whose points it projects onto the sphere: the error
+        across a flat ellipsoid becomes one along it.
+        """
+        found = np.zeros(len(o))
+        copy, leaf = self.copy_of(hits), self.leaf_of(hits)
+        local = np.einsum("nij,nj->ni", self._inverse[copy], o - self._offset[copy])
+        for number in np.unique(leaf[leaf >= 0]).tolist():
+            of = self.leaves[number]
+            if isinstance(of.shape, Sphere) and of.field == "quadrics":
+                rows, m = np.flatnonzero(leaf == number), of.table.to_local[0].reshape(3, 3)
+                there = (local[rows] - of.table.center[0]) @ m.T
+                stretch = self._most[copy[rows]] / np.linalg.svd(m, compute_uv=False)[-1]
+                found[rows] = ROUNDINGS * UNIT_ROUNDOFF * stretch * largest(there)
         return found
 
     def straightness_of(self, hits: Intersections) -> FloatArray:

@@ -200,10 +200,14 @@ def too_many_elsewhere(
     concern, if that is more than such rays may be; else 0.
 
     Those that hit a shape for which a mesh stands in are not asked: its edges are wider, and also
-    change what lies beyond the hit.
+    change what lies beyond the hit; nor those whose points float32 moves further along a flat
+    ellipsoid than it moves the surface.
     """
     hits = query.intersect(tables, rays.o, rays.d)
-    asked = rays.rows(np.flatnonzero(counterpart.off_by(hits.shape, "sag") == 0.0))
+    sizes = ShapeSizes(scene, counterpart.frame)
+    e = sizes.frame.delta(rays.o, hits.p, sizes.reach_of(hits.shape))
+    is_exact = (counterpart.off_by(hits.shape, "sag") == 0.0) & (sizes.slip_of(rays.o, hits) <= e)
+    asked = rays.rows(np.flatnonzero(is_exact))
     if not arbiter.too_many(len(asked.o), total):
         return 0
     count = elsewhere(scene, tables, counterpart, asked, following)
