@@ -18,7 +18,7 @@ from comparisons.shapes.reading_maps import (
     turned_inside_out,
 )
 from comparisons.shapes.shape import OwnPlugin, PbrtPart, PbrtPlace, ShapeType, is_capped
-from comparisons.shapes.site import Site, curved_instance, in_float32, to_world
+from comparisons.shapes.site import Site, curved_instance, in_float32, is_thin, to_world
 from comparisons.shapes.stand_ins import stand_in
 from comparisons.shapes.tubes import (
     Tube,
@@ -34,11 +34,6 @@ from comparisons.shapes.tubes import (
 from reference_rt.core.arrays import FloatArray
 from reference_rt.shapes import Cylinder, Shape
 
-THIN = 64.0
-"""Cylinders this many times smaller than the scene are meshes in llvm variants: Mitsuba solves its
-own in float32 with an error of some u D² / r (see `hits.CURVED`), and with D / r = 1000 every other
-ray misses them."""
-
 
 def _tube(shape: Cylinder) -> Tube:
     return Tube(shape.radius, shape.radius, shape.z_min, shape.z_max, shape.capped)
@@ -50,8 +45,9 @@ def _to_mitsuba(shape: Cylinder, site: Site) -> list[Plugin]:
     unit = followed(m, np.array([r, r, height]), shape.z_min)
     least = np.linalg.svd(m[:, :2], compute_uv=False)[-1] * r
     is_circular = is_round(unit[:, :3])
-    is_thin = least * THIN < site.reach and in_float32(least) > 0.0
-    if is_thin or ("emitter" in site.parts and not is_circular):  # Mitsuba's instances do not emit
+    if is_thin(least, site) or (
+        "emitter" in site.parts and not is_circular
+    ):  # Mitsuba's instances do not emit
         surface = tube_surface(_tube(shape), site.textured)
         side = stand_in(shape, surface, site, of_cone(r, 0.0, shape.z_min, height))
     elif is_circular:

@@ -122,6 +122,18 @@ def curved_instance(name: str, m: affine.Affine, site: Site) -> Plugin:
     return instance_of(f"{name} {scale}", member, map_, site)._replace(curved=in_float32(least))
 
 
+THIN = 64.0
+"""Cylinders and ellipsoids this many times thinner than the scene are meshes in llvm variants:
+Mitsuba solves its own in float32 with an error of some u D² / r (see `hits.CURVED`).  With D / r =
+100 one in 2,000 rays that leave an ellipsoid hits it again, with 1000 every other ray misses a
+cylinder."""
+
+
+def is_thin(least: float, site: Site) -> bool:
+    """Whether a shape with the least radius `least` is one of those."""
+    return in_float32(least) > 0.0 and least * THIN < site.reach
+
+
 def in_float32(radius: float) -> float:
     """`Plugin.curved` of a surface with this radius; 0 in scalar variants, which solve its equation
     in float64."""

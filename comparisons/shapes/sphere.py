@@ -9,9 +9,8 @@ from comparisons.geometry import affine
 from comparisons.geometry.affine import Affine
 from comparisons.geometry.exact.crossings import Crossings, Row, column, ordered, where
 from comparisons.geometry.exact.dyadic import Dyadic, dot, roots
-from comparisons.geometry.frame import UNIT_ROUNDOFF
 from comparisons.mitsuba.files import Vector
-from comparisons.mitsuba.hits import CURVED, Plugin, same_uv
+from comparisons.mitsuba.hits import Plugin, same_uv
 from comparisons.mitsuba.node import Node, Reading
 from comparisons.mitsuba.parse import as_transform
 from comparisons.mitsuba.plugins.exact_coordinates import Round
@@ -34,7 +33,7 @@ from comparisons.shapes.shape import (
     always,
     per_face,
 )
-from comparisons.shapes.site import Site, curved_instance, in_float32, to_world
+from comparisons.shapes.site import Site, curved_instance, is_thin, to_world
 from comparisons.shapes.soup import Soup
 from comparisons.shapes.stand_ins import stand_in, tessellated
 from comparisons.shapes.surface import Patch, Surface
@@ -76,10 +75,8 @@ def _to_mitsuba(shape: Sphere, site: Site) -> list[Plugin]:
     if not affine.is_similarity(m[:, :3]):
         m = m @ np.vstack([np.column_stack([shape.radius * np.eye(3), shape.center]), [0, 0, 0, 1]])
         least = float(np.linalg.svd(m[:, :3], compute_uv=False)[-1])
-        thin = in_float32(least) > 0.0 and CURVED * UNIT_ROUNDOFF * site.reach**2 > least**2
-        # The error of Mitsuba's own sphere would exceed its thickness, and its instances do not
-        # emit. Float32 is more exact for a mesh's corners than for a quadratic.
-        if thin or "emitter" in site.parts:
+        # Mitsuba's instances do not emit.
+        if is_thin(least, site) or "emitter" in site.parts:
             of = Round(shape.center, 0.0, is_sphere=True)
             return [stand_in(shape, surface_of(shape), site, of)]
         return [curved_instance("sphere", m, site)._replace(uv=same_uv)]
