@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Pictures lose light in Radiance .hdr files: 0.28 % of it on average, at most 1/129 where all colours are the same. OpenCV 5.0.0,
-# OpenImageIO 3.2.2 and imageio 2.38.1 cut mantissas off after 8 bits when they write, as Radiance does, but OpenCV and
-# OpenImageIO do not add the half of a step when they read, as Radiance (6.0a, pyradiance 1.3.1) does, by whose `pvalue` the
-# same files have no error on average. Of values that are spread evenly in their logarithm 1 / (512 ln 2) is lost: the mean
+# OpenImageIO 3.2.2 and imageio 2.38.1 cut mantissas off after 8 bits when they write, and OpenCV and OpenImageIO do not add the
+# half of a step when they read, as Radiance (6.0a, pyradiance 1.3.1) does: by its `pvalue` the same files have no error on
+# average. Of values that are spread evenly in their logarithm 1 / (512 ln 2) is lost: the mean
 # of half a step, 1/512, by a mantissa between 1/2 and 1. Seen on 2026-11-29.
 set -euo pipefail
 work=$(mktemp -d)

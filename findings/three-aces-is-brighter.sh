@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Tone mapping by one name: a grey of 0.18 is 127 (of 255) by ACESFilmicToneMapping of three.js 0.187.0, 92 by TONEMAPPING_ACES of
 # Babylon.js 9.35.0, and 91 by "ACES 1.0 - SDR Video" of OpenColorIO 2.6.0's own configuration for an sRGB display. three.js
-# multiplies by 1 / 0.6 first, whatever the exposure is: with toneMappingExposure = 0.6 it is 91, too.
+# divides by 0.6 first: with toneMappingExposure = 0.6, which cancels that, it is 91, too.
 # Without tone mapping Babylon.js encodes by the power of 1 / 2.2, three.js by sRGB's curve: 0.05 is 65, and 63.
 # Seen on 2026-11-29. It needs Chromium (apt install chromium); the page is served to it alone, by Playwright.
 set -euo pipefail
