@@ -2,7 +2,8 @@
 # Embree, by Open3D 0.20.0 (RaycastingScene) and by embreex 4.4.0 (trimesh 5.2.0): from inside a closed ball of 20480 triangles every
 # ray must meet it, however its numbers are rounded. Of those towards vertices 0.9 % and 0.1 % leave it without a hit; of those
 # towards edges and middles of triangles none. Embree's maintainers know "very tiny cracks at the vertices" of its robust mode
-# (issue 188 of RenderKit/embree, 2018). Open3D's count_intersections counts 8.6 % of the rays towards edges twice, 18 % if
+# (issue 188 of RenderKit/embree, 2018); tests by Pluecker coordinates have them, by Woop et al. (2013, "Watertight Ray/Triangle
+# Intersection", figure 1). Open3D's count_intersections counts 8.6 % of the rays towards edges twice, 18 % if
 # the ball is a cube of 12 triangles: odd and even do not tell inside from outside there. Seen on 2026-11-29.
 set -euo pipefail
 work=$(mktemp -d)

@@ -3,7 +3,7 @@
 # - Of the rays towards edges and diagonals 0.7 %, and towards corners 2.3 %, leave the cube of 12 triangles without a hit, by
 #   mesh_query_ray and mesh_query_ray_anyhit alike, with the default hierarchy, "sah"; none of the same rays does with
 #   bvh_constructor="median": the boxes lose them. The test of triangles is that of Woop et al. (2013, "Watertight Ray/Triangle
-#   Intersection"), whose paper rounds that of boxes outwards too.
+#   Intersection"), whose abstract says that the boxes must be enlarged for it, too.
 # - mesh_query_ray_count_intersections counts a hit on an edge once for each of its triangles. An odd count tells that a point is
 #   inside, as its documentation says; straight up from the middle of the cube of that page's example it is 2: outside.
 # Rays towards the middles of triangles have one hit each. Seen on 2026-11-29.
