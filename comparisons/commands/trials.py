@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -289,6 +289,10 @@ def fuzz(
             '"prog {scene} -o {output} --seed {seed} --spp {spp}", as in `gate`.',
         ),
     ] = None,
+    variant: Annotated[
+        Literal["scalar_rgb", "llvm_ad_rgb"],
+        typer.Option(help="Of Mitsuba: `compare` takes llvm_ad_rgb, five times as long a scene."),
+    ] = "scalar_rgb",
     stop: Annotated[bool, typer.Option("--stop", help="Stop at the first finding.")] = False,
     reduce: Annotated[str, duration("Time to reduce a finding, or 0 for not at all")] = "2m",
     workers: NumberOfWorkers = None,
@@ -324,6 +328,7 @@ def fuzz(
         from comparisons.experiments.fuzz.run import Plan, run
         from comparisons.experiments.fuzz.schema import features as known
         from comparisons.experiments.fuzz.summary import Display, write_page
+        from comparisons.mitsuba.backend import asked_for
         from comparisons.runs.provenance import provenance
     from reference_rt.cli.options import Where
     from reference_rt.cli.quantities import seconds_of
@@ -335,7 +340,8 @@ def fuzz(
             raise UsageError("--planted: changes the renderer's sources here; expected --workers")
         _plant(planted, out, seed, workers or os.cpu_count() or 1)
         return
-    effort: dict[str, Any] = {} if rays is None else {"pixels": rays, "light_pixels": rays}
+    effort: dict[str, Any] = {"variant": variant}
+    effort |= {} if rays is None else {"pixels": rays, "light_pixels": rays}
     if rungs is not None:
         effort["rungs"] = some_of("--rungs", rungs.split(","), RUNGS)
     names = () if features is None else tuple(features.split(","))
@@ -363,7 +369,8 @@ def fuzz(
         )
         with Display(len(plan.scenes) or plan.count) as display:
             found = run(plan, display.done, display.line)
-    facts = provenance()
+    with asked_for(variant):
+        facts = provenance()
     summary.write_results(plan, found, facts, junit)
     write_page(writes.files[-1], plan, found, facts)
     for line in summary.words(found):

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from comparisons.experiments.fuzz.data import Data
+from comparisons.mitsuba.backend import SCALAR
 
 DETERMINISTIC = ("files", "film", "geometry", "direct", "whitted", "layers")
 """Rungs without noise."""
@@ -28,7 +29,7 @@ class Grammar:
 class Effort(BaseModel):
     """rungs: some of RUNGS;  pixels: camera rays of geometry and Whitted;  light_pixels: of direct
     light;  spp, replicates: of statistics;  identity_rays: that each identity traces;  every: the
-    statistics of each so many-th scene only."""
+    statistics of each so many-th scene only;  variant: Mitsuba's."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -39,6 +40,7 @@ class Effort(BaseModel):
     replicates: int = 8
     identity_rays: int = 240
     every: int = 2
+    variant: str = SCALAR
 
 
 class Finding(BaseModel):

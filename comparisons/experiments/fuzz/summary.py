@@ -12,6 +12,7 @@ from comparisons.experiments.fuzz.coverage import TYPES, coverage
 from comparisons.experiments.fuzz.data import text_of
 from comparisons.experiments.fuzz.finding import Checked, Finding, Reduced
 from comparisons.experiments.fuzz.run import Plan, Run
+from comparisons.mitsuba.backend import SCALAR
 from comparisons.report.ci import Test, write_tests
 from comparisons.report.table import Table, table_of
 from comparisons.report.templates import template, write
@@ -79,6 +80,7 @@ def again(plan: Plan, one: Reduced) -> str:
         words += ["--extreme"] if plan.grammar.extreme else []
         words += ["--features", ",".join(plan.grammar.features)] if plan.grammar.features else []
     words += ["--renderer", plan.command] if plan.command else []
+    words += ["--variant", plan.effort.variant] if plan.effort.variant != SCALAR else []
     return shlex.join([*words, "--out", str(plan.out / "again")])
 
 

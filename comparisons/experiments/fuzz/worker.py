@@ -1,8 +1,9 @@
 """`python -m comparisons.experiments.fuzz.worker`: a process that checks and reduces scenes.
 
 It follows `comparisons.runs.processes`: it reads `Request`s and stores results in their
-folders.  Mitsuba runs in its scalar variant: for a few hundred rays of a scene that is seen once, a
-variant that compiles takes several times as long (measured: 2 s against 9 s a scene)."""
+folders.  Mitsuba runs in its scalar variant, unless another one is asked for: for a few hundred
+rays of a scene that is seen once, a variant that compiles takes several times as long (measured:
+2 s against 9 s a scene)."""
 
 import os
 import time
@@ -31,7 +32,7 @@ from comparisons.gate.reference import is_noise_free
 from comparisons.gate.request import Request as GateRequest
 from comparisons.gate.rounds import Rounds, gated_renderer
 from comparisons.mitsuba import scene as mitsuba_scene
-from comparisons.mitsuba.backend import FORCE, SCALAR
+from comparisons.mitsuba.backend import FORCE
 from comparisons.report.thumbnails import png_url
 from comparisons.results.case import Case, RungResult
 from comparisons.runs.processes import serve
@@ -172,8 +173,14 @@ hang on which rays are drawn."""
 
 def main() -> None:
     """Handle requests until standard input ends."""
-    os.environ.setdefault(FORCE, SCALAR)
-    serve(Request, lambda asked: do_scene(asked) if asked.task == "scene" else do_reduce(asked))
+    serve(Request, carry_out)
+
+
+def carry_out(asked: Request) -> None:
+    """Check or reduce a scene; the first one chooses Mitsuba's variant, and all of a run have the
+    same."""
+    os.environ.setdefault(FORCE, asked.effort.variant)
+    (do_scene if asked.task == "scene" else do_reduce)(asked)
 
 
 def checked(request: Request, scene: Data, effort: Effort) -> Checked:

@@ -115,9 +115,14 @@ JUST_BEFORE = 1e-7
 """The fraction of a shadow ray, before its end, from which the light's own shape is met."""
 
 
+def lamp_at(context: LightContext, target: FloatArray) -> query.Intersections:
+    """What lies at the points (n, 3) on an area light: the light's own surface."""
+    step = JUST_BEFORE * (target - context.hits.p)
+    return query.intersect(context.tables, target - step, 2.0 * step)
+
+
 def _lamp(context: LightContext, light: int, target: FloatArray) -> IntArray:
     """(n,): the shape that the points on an area light lie on; -1 if that is not known."""
     if kind_of(context, light) != AREA:
         return np.full(len(target), -1)
-    step = JUST_BEFORE * (target - context.hits.p)
-    return query.intersect(context.tables, target - step, 2.0 * step).shape.astype(np.int64)
+    return lamp_at(context, target).shape.astype(np.int64)

@@ -290,3 +290,30 @@ def test_images_that_lights_project(light: str, texture: str, tmp_path: Path) ->
     scene = Scene.parse(text, folder=tmp_path)
     rung = direct(scene, scene.tables, load(scene))
     assert rung.status == "agree", rung.reason
+
+
+EDGE = """
+camera: {type: orthographic, eye: [6, 2, 2], target: [0, 0, 0]}
+film: {height: 4, width: 4}
+materials: {lamp: {type: emissive, radiance: 1}}
+shapes:
+  - {type: rectangle}
+  - {type: box, material: lamp, transform: [{matrix: [[0.2, -0.1, 0.269, 0],
+     [0, -0.704, -0.055, 0], [0.311, 0, -0.172, 2]]}]}
+"""
+
+
+def test_a_point_on_an_edge_of_a_box() -> None:
+    """The sizes of its faces put it there: from behind its face no light arrives, but a ray towards
+    it meets the next face within float32's error."""
+    scene = Scene.parse(EDGE)
+    with scalar():
+        right = direct(scene, scene.tables, load(scene), 144)
+        wrong = direct(
+            scene,
+            scene.tables,
+            load(Scene.parse(EDGE.replace("radiance: 1", "radiance: 1.1"))),
+            144,
+        )
+    assert right.status == "reference-limited", right.reason
+    assert wrong.status == "differ"

@@ -20,11 +20,11 @@ from comparisons.rungs.sampling.materials import (
 )
 from reference_rt.core.model import name_of, types_of
 from reference_rt.integrators import Direct
-from reference_rt.materials import AnyMaterial, Bsdf, Emissive
+from reference_rt.materials import AnyMaterial, Bsdf, Emissive, NoSurface
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.examples import NAMED, examples, write_files
 
-TYPES = [of for of in types_of(AnyMaterial) if of is not Emissive]
+TYPES = [of for of in types_of(AnyMaterial) if of not in (Emissive, NoSurface)]
 LEAVES = list(types_of(Bsdf))
 
 
