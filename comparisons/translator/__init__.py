@@ -16,7 +16,7 @@ from comparisons.cameras import translate_camera
 from comparisons.cameras.film import translate_film
 from comparisons.cameras.samplers import translate_sampler
 from comparisons.geometry import affine
-from comparisons.geometry.flatten import Copy, Leaf, Member, copies_of, place_of
+from comparisons.geometry.flatten import Copy, Leaf, copies_of, place_of
 from comparisons.geometry.frame import Frame
 from comparisons.integrators import translate_integrator
 from comparisons.integrators.mistakes import (
@@ -56,9 +56,12 @@ ROBUST = {"embree_use_robust_intersections": True}
 
 
 class _Translated(NamedTuple):
+    """drawn: of each light and lamp, whether its light is sampled."""
+
     plain: dict[str, Any]
     mi_shapes: dict[str, MitsubaShape]
     solids: list[SolidCounterpart]
+    drawn: list[bool]
 
 
 def to_mitsuba(scene: Scene, native: bool = False) -> dict[str, Any]:
@@ -133,7 +136,7 @@ def _translated(scene: Scene, native: bool = False) -> _Translated:
         plain["integrator"] = integrator
         if counts_lights_often(scene):
             integrator["emitter_samples"] = 1
-    result = _Translated(plain, {}, [])
+    result = _Translated(plain, {}, [], [])
     copies = copies_of(scene)
     count = {group: sum(c.group == group for c in copies) for group in {c.group for c in copies}}
     shared: dict[Any, Any] = {}
@@ -148,6 +151,9 @@ def _translated(scene: Scene, native: bool = False) -> _Translated:
         emitter = translate_light(light, context)
         if emitter is not None:
             plain[light_id(i)] = emitter
+            result.drawn.append(True)
+    if result.drawn and not any(result.drawn):  # Mitsuba refuses lights of which it may draw none
+        plain["dark"] = BLACK | {"sampling_weight": 1.0}
     if drops_light(scene) and not native:
         plain["black"] = BLACK
     return result
@@ -163,16 +169,14 @@ def _reach(scene: Scene, copies: list[Copy]) -> float:
     return found
 
 
-def _never_samples(
-    integrator: Any, copy: Copy, member: Member, leaf: Leaf, place: TabulationContext
-) -> bool:
+def _never_samples(integrator: Any, copy: Copy, leaf: Leaf, place: TabulationContext) -> bool:
     """Whether a lamp lights nothing, because `reference_rt` samples lights alone and not this one:
-    parts of groups and of solids, ellipsoids, and shapes that are not `is_sampled` shine where a
-    ray of a BSDF's samples hits them.  Mitsuba samples the mesh that stands in for it."""
+    parts of groups, ellipsoids, and shapes that are not `is_sampled` shine where a ray of a BSDF's
+    samples hits them.  Mitsuba samples the mesh that stands in for it."""
     if not isinstance(integrator, Direct) or integrator.bsdf_samples > 0:
         return False
     shape = leaf.shape
-    if copy.instance >= 0 or member.tree is not None or not type_of(shape).is_sampled:
+    if copy.instance >= 0 or not type_of(shape).is_sampled:
         return True
     return isinstance(shape, Sphere) and not affine.is_similarity(
         affine.map_in(shape, place)[:, :3]
@@ -198,8 +202,11 @@ def _add(
             place = place_of(scene, leaf, copy.outer)
             sides = media_of_shape(leaf, scene.media)
             parts = parts_of(leaf.material, context) | sides
-            if "emitter" in parts and _never_samples(scene.integrator, copy, member, leaf, place):
-                parts["emitter"]["sampling_weight"] = 0.0
+            if "emitter" in parts and member.tree is None:
+                drawn = not _never_samples(scene.integrator, copy, leaf, place)
+                result.drawn.append(drawn)
+                if not drawn:
+                    parts["emitter"]["sampling_weight"] = 0.0
             coloured = coloured_parts_of(leaf.material, context)
             site = Site(
                 place=place,
