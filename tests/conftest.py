@@ -134,10 +134,14 @@ def _leave_out_dear_ones(config: pytest.Config, items: list[pytest.Item]) -> Non
     if (dear := config.option.dear) == "with" or not DEAR.exists():
         return
     names = set(json.loads(DEAR.read_text(encoding="utf-8")))
-    kept = [item for item in items if (item.nodeid in names) == (dear == "only")]
-    if dear == "without":  # who asks for slow ones by -m has each of them
-        kept = [x for x in items if x.nodeid not in names or x.get_closest_marker("slow")]
-    config.hook.pytest_deselected(items=[x for x in items if x not in set(kept)])
+    kept: list[pytest.Item] = []
+    left: list[pytest.Item] = []
+    for item in items:
+        chosen = (item.nodeid in names) == (dear == "only")
+        if dear == "without":  # who asks for slow ones by -m has each of them
+            chosen = chosen or item.get_closest_marker("slow") is not None
+        (kept if chosen else left).append(item)
+    config.hook.pytest_deselected(items=left)
     items[:] = kept
 
 
