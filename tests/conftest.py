@@ -221,12 +221,16 @@ def pytest_runtest_makereport(
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Iterator[None]:
-    """A file that leaves Mitsuba in another variant than the one that comparisons use fails: else
-    tests of later files would."""
+    """After the last test of a file: what is left by then stays, such as modules, so that later
+    collections need not look at it again.  A file that leaves Mitsuba in another variant than the
+    one that comparisons use fails: else tests of later files would."""
     yield
+    if nextitem is not None and nextitem.path == item.path:
+        return
+    gc.collect()
+    gc.freeze()
     used = sys.modules.get("comparisons.mitsuba.backend")
-    is_last = nextitem is None or nextitem.path != item.path
-    if is_last and used is not None and used.mitsuba.cache_info().currsize:
+    if used is not None and used.mitsuba.cache_info().currsize:
         variant, expected = used.mitsuba().variant(), used.backend().variant
         if variant != expected:
             used.mitsuba().set_variant(expected)
