@@ -27,6 +27,10 @@ ELSEWHERE = (
     rt.Sphere(transform=FAR),
     rt.Box(transform=FAR),
     rt.Cylinder(transform=FAR),
+    rt.Cone(transform=FAR),
+    rt.Quadric(
+        coefficients=(1, 1, 1, 0, 0, 0, 0, 0, 0, -1), lower=(-1,) * 3, upper=(1,) * 3, transform=FAR
+    ),
     rt.Torus(transform=FAR),
     rt.Mesh(vertices=BALL[0], faces=BALL[1], transform=FAR),
     rt.Intersection(of=(rt.Box(), rt.Plane()), transform=FAR),
