@@ -36,14 +36,21 @@ LONGEST_FIRST = (
     "test_counterpart_light",
     "test_plain_python",
     "test_reading_plugins",
+    "test_truth_renderers",
+    "test_first_look",
     "test_rungs",
     "test_stability_metamorphic",
     "test_film_layers",
     "test_crossings",
+    "test_truth_cases",
+    "test_transport",
     "test_gate",
     "test_stability_leaving",
     "test_invariances",
     "test_stability_explained",
+    "test_shapes_exact",
+    "test_pictured",
+    "test_solids_of_many",
     "test_stability_furnace",
     "test_convergence_run",
     "test_csg_methods",
@@ -107,6 +114,17 @@ def pytest_configure(config: pytest.Config) -> None:
     if hasattr(config, "workerinput"):
         # Every core runs a process of tests already: a kernel is compiled in it, not in a child.
         parallel_compile.may_fork = lambda: False
+        _collect_from_one_end(config)
+
+
+def _collect_from_one_end(config: pytest.Config) -> None:
+    """Of a run of everything every other process collects the last files first: so each of two
+    rewrites the assertions of half of them, and reads those that the other has put into the cache
+    (12 s of CPU time for all files, 4 s from the cache)."""
+    tests = Path(__file__).parent
+    everything = [Path(config.invocation_params.dir, name) for name in config.args] == [tests]
+    if everything and int(config.workerinput["workerid"].removeprefix("gw")) % 2:  # type: ignore[attr-defined]
+        config.args = sorted(map(str, tests.rglob("test_*.py")), reverse=True)
 
 
 # ---- which tests a run holds --------------------------------------------------------------------
@@ -127,7 +145,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if zlib.crc32(item.nodeid.encode()) % 10 == tenth % 10]
     _leave_out_dear_ones(config, items)
     places = {name: k for k, name in enumerate(LONGEST_FIRST)}
-    items.sort(key=lambda item: places.get(Path(item.path).stem, len(places)))
+    items.sort(key=lambda item: (places.get(item.path.stem, len(places)), item.path))
 
 
 def _leave_out_dear_ones(config: pytest.Config, items: list[pytest.Item]) -> None:
