@@ -25,6 +25,9 @@ import pytest
 # in child processes.  BLAS reads this when NumPy is imported.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
+# No test can see whether a file outlives a power failure, and a disk's word takes 10 ms.
+os.fsync = lambda file: None
+
 # pytest puts this folder on the path, where its own folder `reference_rt` would stand for the
 # package if that is installed as editable.
 sys.path[:] = [path for path in sys.path if Path(path) != Path(__file__).parent]
