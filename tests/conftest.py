@@ -25,6 +25,9 @@ import pytest
 # in child processes.  BLAS reads this when NumPy is imported.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
+# No test can see whether a file outlives a power failure, and a disk's word takes 10 ms.
+os.fsync = lambda file: None
+
 # pytest puts this folder on the path, where its own folder `reference_rt` would stand for the
 # package if that is installed as editable.
 sys.path[:] = [path for path in sys.path if Path(path) != Path(__file__).parent]
@@ -36,14 +39,21 @@ LONGEST_FIRST = (
     "test_counterpart_light",
     "test_plain_python",
     "test_reading_plugins",
+    "test_truth_renderers",
+    "test_first_look",
     "test_rungs",
     "test_stability_metamorphic",
     "test_film_layers",
     "test_crossings",
+    "test_truth_cases",
+    "test_transport",
     "test_gate",
     "test_stability_leaving",
     "test_invariances",
     "test_stability_explained",
+    "test_shapes_exact",
+    "test_pictured",
+    "test_solids_of_many",
     "test_stability_furnace",
     "test_convergence_run",
     "test_csg_methods",
@@ -107,6 +117,17 @@ def pytest_configure(config: pytest.Config) -> None:
     if hasattr(config, "workerinput"):
         # Every core runs a process of tests already: a kernel is compiled in it, not in a child.
         parallel_compile.may_fork = lambda: False
+        _collect_from_one_end(config)
+
+
+def _collect_from_one_end(config: pytest.Config) -> None:
+    """Of a run of everything every other process collects the last files first: so each of two
+    rewrites the assertions of half of them, and reads those that the other has put into the cache
+    (12 s of CPU time for all files, 4 s from the cache)."""
+    tests = Path(__file__).parent
+    everything = [Path(config.invocation_params.dir, name) for name in config.args] == [tests]
+    if everything and int(config.workerinput["workerid"].removeprefix("gw")) % 2:  # type: ignore[attr-defined]
+        config.args = sorted(map(str, tests.rglob("test_*.py")), reverse=True)
 
 
 # ---- which tests a run holds --------------------------------------------------------------------
@@ -127,17 +148,21 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if zlib.crc32(item.nodeid.encode()) % 10 == tenth % 10]
     _leave_out_dear_ones(config, items)
     places = {name: k for k, name in enumerate(LONGEST_FIRST)}
-    items.sort(key=lambda item: places.get(Path(item.path).stem, len(places)))
+    items.sort(key=lambda item: (places.get(item.path.stem, len(places)), item.path))
 
 
 def _leave_out_dear_ones(config: pytest.Config, items: list[pytest.Item]) -> None:
     if (dear := config.option.dear) == "with" or not DEAR.exists():
         return
     names = set(json.loads(DEAR.read_text(encoding="utf-8")))
-    kept = [item for item in items if (item.nodeid in names) == (dear == "only")]
-    if dear == "without":  # who asks for slow ones by -m has each of them
-        kept = [x for x in items if x.nodeid not in names or x.get_closest_marker("slow")]
-    config.hook.pytest_deselected(items=[x for x in items if x not in set(kept)])
+    kept: list[pytest.Item] = []
+    left: list[pytest.Item] = []
+    for item in items:
+        chosen = (item.nodeid in names) == (dear == "only")
+        if dear == "without":  # who asks for slow ones by -m has each of them
+            chosen = chosen or item.get_closest_marker("slow") is not None
+        (kept if chosen else left).append(item)
+    config.hook.pytest_deselected(items=left)
     items[:] = kept
 
 
@@ -217,12 +242,16 @@ def pytest_runtest_makereport(
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Iterator[None]:
-    """A file that leaves Mitsuba in another variant than the one that comparisons use fails: else
-    tests of later files would."""
+    """After the last test of a file: what is left by then stays, such as modules, so that later
+    collections need not look at it again.  A file that leaves Mitsuba in another variant than the
+    one that comparisons use fails: else tests of later files would."""
     yield
+    if nextitem is not None and nextitem.path == item.path:
+        return
+    gc.collect()
+    gc.freeze()
     used = sys.modules.get("comparisons.mitsuba.backend")
-    is_last = nextitem is None or nextitem.path != item.path
-    if is_last and used is not None and used.mitsuba.cache_info().currsize:
+    if used is not None and used.mitsuba.cache_info().currsize:
         variant, expected = used.mitsuba().variant(), used.backend().variant
         if variant != expected:
             used.mitsuba().set_variant(expected)

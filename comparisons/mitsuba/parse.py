@@ -2,7 +2,6 @@
 their author wrote them."""
 
 import re
-import warnings
 import xml.parsers.expat
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
@@ -11,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.mitsuba.backend import imported
+from comparisons.mitsuba.backend import imported, set_variant
 from comparisons.mitsuba.included import OLD_ELEMENT, Included, Note, adapt, as_utf8
 from reference_rt.core.transform import Affine, compose, rotate, scale, translate
 from reference_rt.rendering.scene import Scene
@@ -258,16 +257,11 @@ def scalar() -> Iterator[Any]:
     """The module in the variant VARIANT."""
     mi = module()
     old = mi.variant()
-    with warnings.catch_warnings():
-        # Dr.Jit warns after many changes that defining plugins again is slow.
-        warnings.simplefilter("ignore", RuntimeWarning)
-        if old != VARIANT:
-            mi.set_variant(VARIANT)
-        try:
-            yield mi
-        finally:
-            if old != VARIANT:
-                mi.set_variant(old)
+    set_variant(mi, VARIANT)
+    try:
+        yield mi
+    finally:
+        set_variant(mi, old)
 
 
 _UNKNOWN = re.compile(r"encountered an unsupported XML element: (<[\w.:-]+>)")

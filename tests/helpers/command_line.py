@@ -3,11 +3,18 @@
 from pathlib import Path
 from typing import Any
 
+from typer import testing
+from typer.main import get_command
 from typer.testing import CliRunner, Result
 
 from reference_rt.cli.main import _add_commands, app
 
 _add_commands()
+
+COMMAND = get_command(app)
+
+# Typer would make all commands and their options anew, for 11 ms of a run of the program.
+testing._get_command = lambda program: COMMAND if program is app else get_command(program)  # type: ignore[attr-defined]
 
 
 def invoke(*words: Any, catch_exceptions: bool = True, **environment: str) -> Result:

@@ -14,7 +14,6 @@ from reference_rt.rendering.scene import Scene
 TOKEN = re.compile(r'\s+|#[^\n]*|("(?:[^"\\\n]|\\.)*"|[\[\]]|[^\s"\[\]#]+)')
 
 NUMBERS = {"Scale": 3, "LookAt": 9, "Translate": 3, "Rotate": 4}
-BARE = {"AttributeBegin", "AttributeEnd", "ReverseOrientation", "WorldBegin", "ObjectEnd"}
 NAMED = {"NamedMaterial", "ObjectBegin", "ObjectInstance"}
 
 ROUGH = "texture|float uroughness, texture|float vroughness, texture|float roughness, "

@@ -4,22 +4,17 @@ import gc
 import math
 import re
 from contextlib import suppress
-from typing import Any
 
 import pytest
-import typer.main
-from command_line import ARGUMENTS, WorkBegan, invoke
+from command_line import ARGUMENTS, COMMAND, WorkBegan, invoke
 
 from comparisons.compare.budget import Budget
 from comparisons.suites.suite import Suite
-from reference_rt.cli.main import app
 from reference_rt.util.errors import SceneError
-
-GROUP: Any = typer.main.get_command(app)
 
 OPTIONS = {
     (name, option.opts[0]): option
-    for name, command in GROUP.commands.items()
+    for name, command in COMMAND.commands.items()
     for option in command.params
     if option.opts[0].startswith("-")
 }

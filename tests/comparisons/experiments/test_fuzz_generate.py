@@ -32,6 +32,13 @@ def files(tmp_path_factory):
     return assets.write(tmp_path_factory.mktemp("files"))
 
 
+@pytest.fixture
+def dark(monkeypatch):
+    """No picture is rendered, to see whether it shows light: each scene is mended, as often as it
+    can be."""
+    monkeypatch.setattr("comparisons.experiments.fuzz.generate._shows_light", lambda *_: False)
+
+
 def test_every_type_of_the_schema_is_known():
     defined = {
         part["properties"]["type"]["const"]
@@ -42,6 +49,7 @@ def test_every_type_of_the_schema_is_known():
     assert defined - {"light"} == {name for kind, name in all_types() if kind != "step"}
 
 
+@pytest.mark.usefixtures("dark")
 def test_a_scene_is_a_function_of_its_seed_and_number(files):
     first, again = (generate(5, 3, Grammar(), files) for _ in range(2))
     assert first == again
@@ -64,6 +72,7 @@ def test_scenes_are_valid_and_survive_their_text(files, extreme):
         assert text_of(data).count("\n") < 60
 
 
+@pytest.mark.usefixtures("dark")
 def test_features_are_in_every_scene(files):
     for number in range(4):
         names = {n for _, n in types_in(generate(1, number, Grammar(("csg", "glass")), files))}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from counterparts import coarse_meshes
 
-from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba import backend
 from comparisons.mitsuba.counterpart import trace
 from comparisons.rungs import geometry
 from comparisons.translator import load
@@ -45,11 +45,8 @@ def coarse() -> Iterator[None]:
 
 @pytest.fixture
 def scalar() -> Iterator[None]:
-    mi = mitsuba()
-    chosen = mi.variant()
-    mi.set_variant("scalar_rgb")
-    yield
-    mi.set_variant(chosen)
+    with backend.scalar():
+        yield
 
 
 LAWS = (

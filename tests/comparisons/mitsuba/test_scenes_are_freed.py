@@ -10,7 +10,7 @@ import pytest
 from galleries import gallery_of_lights, gallery_of_materials
 
 import reference_rt as rt
-from comparisons.mitsuba.backend import mitsuba, scalar
+from comparisons.mitsuba.backend import SCALAR, mitsuba, scalar, set_variant
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.scene import picture
 from comparisons.rungs import direct, geometry, whitted
@@ -70,6 +70,24 @@ def use(scene: Scene, counterpart: Counterpart) -> None:
         rung(scene, scene.tables, counterpart, 20)
     if not counterpart.no_pictures_reason and not isinstance(scene.integrator, rt.Whitted):
         picture(counterpart.mi_scene, 1, 0)
+
+
+def test_integrators_in_python_are_those_of_the_variant_and_made_once() -> None:
+    """A scalar variant between two wide ones, which has none of its own, costs nothing; another
+    wide one has its own."""
+    mi = mitsuba()
+    chosen, made = mi.variant(), []
+    if chosen == SCALAR:
+        pytest.skip("no wide variant works here")
+    other = next(name for name in mi.variants() if name[:7] == chosen[:7] and name != chosen)
+    for name in (SCALAR, chosen, SCALAR, chosen, other, SCALAR, other, chosen):
+        set_variant(mi, name)
+        if name != SCALAR:
+            made.append(mi.ad.integrators.prb.PRBIntegrator)
+            assert issubclass(made[-1], mi.CppADIntegrator)
+            assert type(mi.load_dict({"type": "prb"})) is made[-1]
+    assert made[0] is made[1]
+    assert made[1] is not made[2] is made[3] is not made[4]
 
 
 @pytest.mark.slow

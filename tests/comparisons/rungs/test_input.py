@@ -1,5 +1,7 @@
 """The input rung: each defect of a picture is reported as what it is."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy import ndimage
@@ -168,6 +170,7 @@ def test_two_replicates_with_overlapping_seeds() -> None:
     assert "replicates 4 and 9 of the candidate share noise" in result.reason
 
 
+@cache
 def wrong_pictures() -> dict[str, FloatArray]:
     candidate = noisy(0, 16)
     wrong = {
@@ -186,9 +189,14 @@ def wrong_pictures() -> dict[str, FloatArray]:
     return wrong
 
 
+@cache
+def right_pictures() -> FloatArray:
+    return noisy(1, 16)
+
+
 @pytest.mark.parametrize("name", wrong_pictures())
 def test_a_wrong_picture_is_not_taken_for_noise(name: str) -> None:
-    result = input_rung(wrong_pictures()[name], noisy(1, 16))
+    result = input_rung(wrong_pictures()[name], right_pictures())
     assert result.status == "agree", result.reason
 
 

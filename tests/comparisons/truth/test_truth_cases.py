@@ -1,6 +1,7 @@
 """The cases: formulas that hold their stated bounds, and pictures that do not pass for them."""
 
 import ast
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,12 @@ from comparisons.truth.renderers import load
 
 SCENES = Path(__file__).parents[3] / "scenes" / "truth"
 CASES = cases()
+
+
+@cache
+def formula(name):
+    """What the case's formula says: several tests ask for it."""
+    return CASES[name].compute()
 
 
 def test_every_case_has_its_scene_and_every_area_its_cases():
@@ -73,14 +80,14 @@ def test_names_areas_and_patterns():
 @pytest.mark.parametrize("name", CASES)
 def test_the_formula_has_the_size_of_the_scene(name):
     found = load(SCENES / f"{name}.yaml").film
-    assert CASES[name].compute().pixels.shape == (found.height, found.width, 3)
+    assert formula(name).pixels.shape == (found.height, found.width, 3)
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_quadratures_hold_their_bounds(name, monkeypatch):
     """With more nodes, no pixel's mean changes by more than the stated bound of the picture's
     mean, where both state it."""
-    first = CASES[name].compute()
+    first = formula(name)
     gauss = np.polynomial.legendre.leggauss
     monkeypatch.setattr(np.polynomial.legendre, "leggauss", lambda n: gauss(n + 5))
     monkeypatch.setattr(optics, "RADII", optics.RADII * 3 // 2)
@@ -97,7 +104,7 @@ def test_quadratures_hold_their_bounds(name, monkeypatch):
 def test_what_is_not_the_picture_does_not_pass(name):
     """Black, of one value, and half as bright, as a single picture and as replicates; the formula's
     own picture does, in every precision that files have."""
-    expected = CASES[name].compute()
+    expected = formula(name)
     truth = np.where(expected.stated[..., None], expected.pixels, 0.7)
     mean = np.full_like(truth, np.nanmean(expected.pixels))
     for count in (1, 4):

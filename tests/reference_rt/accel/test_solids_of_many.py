@@ -27,8 +27,15 @@ ELSEWHERE = (
     rt.Sphere(transform=FAR),
     rt.Box(transform=FAR),
     rt.Cylinder(transform=FAR),
+    rt.Cone(transform=FAR),
+    rt.Quadric(
+        coefficients=(1, 1, 1, 0, 0, 0, 0, 0, 0, -1), lower=(-1,) * 3, upper=(1,) * 3, transform=FAR
+    ),
     rt.Torus(transform=FAR),
-    rt.Mesh(vertices=BALL[0], faces=BALL[1], transform=FAR),
+    # Mirrored, as some operands are: its triangles keep their uv.
+    rt.Mesh(
+        vertices=BALL[0], faces=BALL[1], transform=(transform.Scale(scale=(-1.0, 1.0, 1.0)), *FAR)
+    ),
     rt.Intersection(of=(rt.Box(), rt.Plane()), transform=FAR),
 )
 """Out of the way: scenes have the same kinds of shapes, and share kernels."""

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from builders import unit_vectors
 from scipy.stats import chi2
 
 from comparisons.statistics.chi_square import sidak
@@ -45,11 +46,6 @@ def picks(tree, p, n, u):
     with np.errstate(all="ignore"):
         _picks(tree, np.array([p], float), np.array([n], float), u, light, probability)
     return light, probability
-
-
-def units(rng, n):
-    v = rng.normal(size=(n, 3))
-    return v / np.linalg.norm(v, axis=1, keepdims=True)
 
 
 def random_points(rng, n):
@@ -108,10 +104,10 @@ def test_never_dark_where_a_light_shines():
     tree = build(bounds, np.arange(500), 500)
     grazing = 0
     for k in range(200):
-        p, n = rng.uniform(-6, 6, 3), units(rng, 1)[0]
+        p, n = rng.uniform(-6, 6, 3), unit_vectors(rng, 1)[0]
         if k % 2:  # on a light's own plane and horizon, but for rounding
             p = corners[k] @ rng.uniform(-2, 2, 3)
-            n = units(rng, 1)[0]
+            n = unit_vectors(rng, 1)[0]
             to_light = corners[k + 1, 0] - p
             n -= to_light * (n @ to_light) / (to_light @ to_light)
             n /= np.linalg.norm(n)
@@ -133,7 +129,7 @@ def test_pick_and_probability_are_one():
         bounds, _ = random_flats(rng, count)
         for table in (bounds, random_points(rng, count)):
             tree = build(table, np.arange(count), count)
-            for n in (ANY_SIDE, units(rng, 1)[0]):
+            for n in (ANY_SIDE, unit_vectors(rng, 1)[0]):
                 p = rng.uniform(-6, 6, 3)
                 expected = probabilities(tree, p, n)
                 light, probability = picks(tree, p, n, rng.random(100_000))
@@ -164,7 +160,7 @@ def test_unbiased_and_better_than_by_power():
     power = bounds.lambertian / bounds.lambertian.sum()
     ratios = []
     for _ in range(30):
-        p, n = rng.uniform(-5, 5, 3), units(rng, 1)[0]
+        p, n = rng.uniform(-5, 5, 3), unit_vectors(rng, 1)[0]
         shines = irradiance(bounds, corners[:, 0], p, n)
         chance = probabilities(tree, p, n)
         lit = shines > 0

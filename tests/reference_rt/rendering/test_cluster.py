@@ -178,8 +178,8 @@ def test_a_scheduler_that_does_not_answer(machines, cluster, monkeypatch):
 def test_not_a_scheduler(answer, monkeypatch):
     """A program that says nothing, closes the connection, or speaks of something else.  Attempts
     leave no threads behind: there may be many, of a batch system that lets jobs wait."""
-    monkeypatch.setattr("reference_rt.util.cluster._PATIENCE", 2.0)
-    monkeypatch.setattr("reference_rt.util.cluster._TRY", 0.5)
+    monkeypatch.setattr("reference_rt.util.cluster._PATIENCE", 0.5)
+    monkeypatch.setattr("reference_rt.util.cluster._TRY", 0.1)
     listening, open_ones = socket.create_server(("127.0.0.1", 0)), []
 
     def serve():
