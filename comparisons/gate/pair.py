@@ -27,6 +27,7 @@ from comparisons.gate.pair_noise import FEWEST, Streams, notes_of, streams_of
 from comparisons.gate.pictures_in import Picture, pictures_of
 from comparisons.gate.question import LIMIT
 from comparisons.gate.reference import check_sizes, size_of, stacked
+from comparisons.gate.rim import check_rim, left_out, without
 from comparisons.gate.rounds import Rounds
 from comparisons.results.case import Case, FloatArray, Images, RungResult
 from comparisons.results.naming import named
@@ -74,8 +75,10 @@ def pair_case(a: Sequence[Picture], b: Sequence[Picture], asked: Asked) -> Case:
     """The verdict on the pictures of both sides, several being replicates.  Raises ImageError,
     UsageError, SceneError."""
     check_sizes([*a, *b], *_size(asked, a[0]))
-    one, two = (_without_rim(stacked(side), asked.rim) for side in (a, b))
-    return _case(one, two, _notes(a[0], b[0]), asked)
+    one, two = (stacked(side) for side in (a, b))
+    check_rim(one.shape, asked.rim)
+    one, two = (without(side, asked.rim, 1) for side in (one, two))
+    return _case(one, two, _notes(a[0], b[0], asked), asked)
 
 
 def _size(asked: Asked, first: Picture) -> tuple[str, str]:
@@ -86,8 +89,9 @@ def _size(asked: Asked, first: Picture) -> tuple[str, str]:
     return f"{film.width} x {film.height}", f"the size of the scene '{asked.scene.name}'"
 
 
-def _notes(a: Picture, b: Picture) -> list[str]:
-    return [picture.note for picture in (a, b) if picture.note]
+def _notes(a: Picture, b: Picture, asked: Asked) -> list[str]:
+    notes = [picture.note for picture in (a, b) if picture.note]
+    return [*notes, left_out(asked.rim)] if asked.rim else notes
 
 
 def _case(
@@ -131,7 +135,8 @@ def _case(
     if case.verdict != "differ" or case.images is None:
         return case
     return replace(
-        case, cause=cause_of(case, one[0], two[0], asked.scene, asked.spp, asked.threads)
+        case,
+        cause=cause_of(case, one[0], two[0], asked.scene, asked.spp, asked.threads, asked.rim),
     )
 
 
@@ -171,6 +176,7 @@ def driven_pair(
 
     make(1 if asked.noise_free or rounds.replicates == 1 else 2)
     first = [picture.radiance for side in sides for picture in side[:1]]
+    check_rim(first[0].shape, asked.rim)
     bad = not all(np.isfinite(picture).all() for picture in first)
     if bad or asked.noise_free or all(_is_fixed(stacked(side)) for side in sides):
         return pair_case(*sides, asked)
@@ -189,7 +195,7 @@ def driven_pair(
         make(count)
         for pool, side in zip(pools, sides, strict=True):
             for k in range(pooled, count):
-                pool.add(_without_rim(side[k].radiance[None], asked.rim)[0])
+                pool.add(without(side[k].radiance, asked.rim))
                 side[k] = replace(side[k], radiance=_NONE)  # the pool has it
         pooled = count
         if not told:
@@ -209,7 +215,7 @@ def driven_pair(
         grow, judged_at, seconds=rounds.seconds, first=max(2, rounds.replicates), most=most, say=say
     )
     one, two = (np.stack(pool.pictures()) for pool in pools)
-    return _case(one, two, _notes(sides[0][0], sides[1][0]), asked, found, streams)
+    return _case(one, two, _notes(sides[0][0], sides[1][0], asked), asked, found, streams)
 
 
 _NONE = np.zeros((0, 0, 3))
@@ -265,13 +271,6 @@ def _as_many(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
     return a[:count], b[:count]
 
 
-def _without_rim(pictures: FloatArray, rim: int) -> FloatArray:
-    height, width = pictures.shape[1:3]
-    if 2 * rim >= min(height, width):
-        raise UsageError(f"--rim: {rim} leaves nothing of {width} x {height} pixels")
-    return pictures[:, rim : height - rim, rim : width - rim]
-
-
 def _checked(a: FloatArray, b: FloatArray, sides: tuple[str, str]) -> RungResult:
     """The rung `input`, of either side beside the other's mean: sides may share noise, replicates
     of one side must not."""
@@ -293,7 +292,7 @@ def _third(asked: Asked, rendered: Rendered) -> Witness:
     ) -> tuple[RungResult, dict[str, FloatArray]]:
         assert asked.scene is not None
         ours = reference.of_scene(asked.scene, asked.limit, threads=asked.threads)
-        pictures = _without_rim(ours.pictures, asked.rim)
+        pictures = without(ours.pictures, asked.rim, 1)
         shown = {OURS: pictures.mean(axis=0)}
         if (
             rendered.replicates is None
