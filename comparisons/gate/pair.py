@@ -10,8 +10,10 @@ shows, the differences of pairs are judged: they see biases that are far smaller
 """
 
 import os
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
@@ -108,6 +110,8 @@ def _case(
         if not asked.noise_free:
             notes.append("each side's replicates are the same: there is no noise")
         rendered = _still(one[0], two[0])
+    elif _are_copies(one, two):
+        rendered = _copies(one, asked.sides)
     elif not all(np.isfinite(side).all() for side in (one, two)):
         with np.errstate(invalid="ignore"):  # of infinities
             rendered = rendered_pair(one, two, paired=False)
@@ -207,7 +211,9 @@ def driven_pair(
         one, two = (np.stack(pool.pictures()) for pool in pools)
         with np.errstate(invalid="ignore"):  # of infinities, which are told
             rendered = rendered_pair(one, two, streams is not None and streams.shared)
-        if level == looks.level_of(1):
+        if _are_copies(one, two):
+            rendered = _copies(one, asked.sides)
+        elif level == looks.level_of(1):
             rendered = replace(rendered, checked=_checked(one, two, asked.sides))
         return at_look(rendered, asked.limit, level)
 
@@ -266,6 +272,29 @@ def _is_fixed(pictures: FloatArray) -> bool:
     return bool((apart <= ROUNDED * np.abs(pictures[0]) + TINY * np.abs(pictures).max()).all())
 
 
+def _are_copies(a: FloatArray, b: FloatArray) -> bool:
+    """Whether each picture of A is one of B, bit for bit, in any order; finite, and not black."""
+
+    def prints(side: FloatArray) -> Counter[bytes]:  # -0 and 0 are the same radiance
+        return Counter(sha256((x + 0.0).tobytes()).digest() for x in side)
+
+    if len(a) != len(b) or not np.isfinite(a).all() or not a.any():
+        return False
+    return prints(a) == prints(b)
+
+
+def _copies(pictures: FloatArray, sides: tuple[str, str]) -> Rendered:
+    """Of sides that have the same pictures: their difference is known, and is zero, so that no
+    statistics of it can say how far it might be from zero."""
+    count = len(pictures)
+    are = "picture is" if count == 1 else f"{count} pictures are, one by one,"
+    reason = f"{sides[0]} {are} {sides[1]}, bit for bit: there is no difference"
+    rendered = rendered_pair(pictures, pictures, paired=count > 1)
+    same = RungResult("statistics", "unchanged", reason, {"copies": count})
+    # Whether replicates are independent does not matter.
+    return replace(rendered, checked=input_rung(pictures[0], pictures[0]), tested=same)
+
+
 def _as_many(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
     count = min(len(a), len(b))
     return a[:count], b[:count]
@@ -304,7 +333,9 @@ def _third(asked: Asked, rendered: Rendered) -> Witness:
         one, two = rendered.replicates
         assert isinstance(two, np.ndarray)
         known = None
-        if rendered.paired:
+        if rendered.tested is not None:
+            known = replace(rendered.tested, status="agree")
+        elif rendered.paired:
             known = at_look(replace(rendered, checked=None), asked.limit, 1.0)
         rung = vote((one, two, pictures), (*sides, OURS), asked.limit, known)
         return rung, shown
