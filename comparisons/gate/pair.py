@@ -35,6 +35,7 @@ from comparisons.results.case import Case, FloatArray, Images, RungResult
 from comparisons.results.naming import named
 from comparisons.rungs.input import input_rung
 from comparisons.rungs.witness import Witness, vote
+from comparisons.statistics import in_range
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import UsageError
 
@@ -106,6 +107,12 @@ def _case(
 ) -> Case:
     """The verdict on pictures without their rim, which `asked` has only for ours.  looked, streams:
     of an earlier look at a part of them."""
+    exponent = in_range.exponent_of(one, two)
+    if exponent:
+        one, two = (in_range.times(side, exponent) for side in (one, two))
+        notes.append(in_range.note(exponent))
+        # What is rendered for a diagnosis has other values.
+        asked = replace(asked, scene=None, judged=False)
     if asked.noise_free or (_is_fixed(one) and _is_fixed(two)):
         if not asked.noise_free:
             notes.append("each side's replicates are the same: there is no noise")
@@ -204,11 +211,15 @@ def driven_pair(
         pooled = count
         if not told:
             pictures = [np.stack(pool.pictures()) for pool in pools]
+            exponent = in_range.exponent_of(*pictures)
+            pictures = [in_range.times(side, exponent) for side in pictures]
             if all(np.isfinite(side).all() for side in pictures):
                 streams = streams_of(*pictures)
 
     def judged_at(level: float) -> RungResult:
         one, two = (np.stack(pool.pictures()) for pool in pools)
+        exponent = in_range.exponent_of(one, two)
+        one, two = (in_range.times(side, exponent) for side in (one, two))
         with np.errstate(invalid="ignore"):  # of infinities, which are told
             rendered = rendered_pair(one, two, streams is not None and streams.shared)
         if _are_copies(one, two):

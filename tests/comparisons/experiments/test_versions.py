@@ -87,7 +87,7 @@ def test_the_installed_version_agrees_with_itself() -> None:
         backend(),
         lambda line: None,
     )
-    assert [case.verdict for case in cases] == ["unchanged"], cases[0].reason
+    assert cases[0].verdict in ("agree", "unchanged"), cases[0].reason
     assert left_out == []
     images = cases[0].images
     assert images is not None
