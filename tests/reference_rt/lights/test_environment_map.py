@@ -340,5 +340,5 @@ def test_what_does_not_fit_into_memory_is_refused_by_all_that_is_stored(tmp_path
     sky.tabulate(tmp_path)
     # Rows and columns have a few bytes more.
     monkeypatch.setattr(memory, "machine_memory", lambda: 0.98 * stored)
-    with pytest.raises(ValueError, match="300 x 200 pixels, which take .* of memory"):
+    with pytest.raises(ValueError, match=r"300 x 200 pixels, which take .* of memory"):
         sky.tabulate(tmp_path)
