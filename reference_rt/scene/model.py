@@ -15,6 +15,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from reference_rt.cameras import AnyCamera
 from reference_rt.cameras.film import Film
 from reference_rt.cameras.perspective import Perspective
+from reference_rt.core.diagnosis import what_else
 from reference_rt.core.model import AS_DIGEST, Description, as_linear, name_of
 from reference_rt.integrators import AnyIntegrator, Direct, RayCast
 from reference_rt.integrators import Path as PathTracing
@@ -57,8 +58,7 @@ which each operation takes two."""
 
 
 WITHOUT_LINES = "]"
-"""In place of the text of a scene that was read from another program's file: it is no YAML, so that
-errors found later name no line of it."""
+"""The text of a scene of another program's file: it is no YAML, so that no error names a line."""
 
 _NAMES = (str, str | None)
 """The types of fields that only name something."""
@@ -421,8 +421,8 @@ class SceneModel(Description):
             raise SceneError(f"malformed: {error}", file=name, line=error.line) from None
         except RecursionError:
             raise SceneError("malformed: nested too deeply", file=name) from None
-        if not isinstance(data, dict):
-            raise SceneError("expected keys such as camera, shapes, lights", file=name, line=1)
+        if (other := what_else(data)) is not None:
+            raise SceneError(other, file=name, line=1)
         try:
             scene = cls._checked(data)
         except SceneError as error:
