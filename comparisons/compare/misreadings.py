@@ -5,6 +5,7 @@ The scene is rendered with each such change, and the picture is what the candida
 a scene with noise the change is known from pictures with the same random numbers.
 """
 
+import math
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -19,9 +20,9 @@ from comparisons.compare.path_length import Lengths
 from reference_rt.cameras import Orthographic
 from reference_rt.cameras.view_rectangle import CentralCamera
 from reference_rt.core.arrays import FloatArray
-from reference_rt.integrators import Light
-from reference_rt.lights import Directional
-from reference_rt.materials import GltfPbr, NormalMap
+from reference_rt.integrators import Light, Whitted
+from reference_rt.lights import Ambient, Directional, Projector
+from reference_rt.materials import GltfPbr, NormalMap, Phong
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Grid
@@ -126,6 +127,86 @@ MATERIALS: dict[str, _OfField] = {
     **{f"reflectance head-on (F0) is {factor:g} times as large": _f0(factor) for factor in F0},
 }
 
+NORMALISED: dict[str, Callable[[float], float]] = {
+    "(p + 2) / 2": lambda p: (p + 2.0) / 2.0,
+    "(p + 8) / 8": lambda p: (p + 8.0) / 8.0,
+    "(p + 2) / (2 pi)": lambda p: (p + 2.0) / (2.0 * math.pi),
+    "(p + 8) / (8 pi)": lambda p: (p + 8.0) / (8.0 * math.pi),
+}
+"""Factors that make a highlight of the exponent p hold the same light as others."""
+
+
+def _normalised(factor: Callable[[float], float]) -> _OfField:
+    return lambda part: _of("specular", lambda s: s * factor(part.exponent))(part)
+
+
+PHONG: dict[str, _OfField] = {
+    "half vectors and mirrored directions are exchanged": lambda phong: {
+        "half_vector": not phong.half_vector
+    },
+    **{
+        f"the highlight's exponent is {factor:g} times as large": _of("exponent", factor.__mul__)
+        for factor in (0.25, 0.5, 2.0, 4.0)
+    },
+    **{
+        f"the highlight is multiplied by {name}": _normalised(of) for name, of in NORMALISED.items()
+    },
+    "without highlights": _of("specular", lambda s: 0.0),
+    "without mirrored light": _of("mirror", lambda s: 0.0),
+}
+"""Of the textbook's local shading."""
+
+
+def _of_phong(change: _OfField) -> _OfField:
+    return lambda material: change(material) if isinstance(material, Phong) else {}
+
+
+MATERIALS |= {name: _of_phong(change) for name, change in PHONG.items()}
+
+BRIGHTER = {"pi times": math.pi, "1/pi of": 1.0 / math.pi}
+
+
+def _brighter(factor: float) -> _OfField:
+    """Lights without extent."""
+
+    def update(light: Any) -> _Update:
+        for field in ("intensity", "irradiance"):
+            if hasattr(light, field) and not isinstance(light, Projector):
+                return _of(field, lambda x: x * factor)(light)
+        return {}
+
+    return update
+
+
+LIGHTS: dict[str, _OfField] = {
+    "ambient light is counted twice": lambda light: (
+        _of("radiance", lambda x: 2.0 * x)(light) if isinstance(light, Ambient) else {}
+    ),
+    **{
+        f"lights without extent are {name} what they should be": _brighter(factor)
+        for name, factor in BRIGHTER.items()
+    },
+}
+
+
+def _of_whitted(scene: Scene) -> Iterator[tuple[str, _Update]]:
+    """Light that is left out, and how often rays are reflected."""
+    lit = [light for light in scene.lights if not isinstance(light, Ambient)]
+    if len(lit) < len(scene.lights):
+        yield "without ambient light", {"lights": lit}
+    own = scene.integrator
+    if not isinstance(own, Whitted):
+        return
+    most = own.max_depth
+    for depth, name in (
+        (most - 1, "one reflection fewer"),
+        (most + 1, "one reflection more"),
+        (0, "without reflections and refractions"),
+    ):
+        if depth >= 0 and depth != most:
+            yield name, {"integrator": own.model_copy(update={"max_depth": depth})}
+
+
 TEXTURES: dict[str, _OfField] = {
     "textures are upside down": _placed(lambda u, v: (u, _ONE - v)),
     "textures are mirrored": _placed(lambda u, v: (_ONE - u, v)),
@@ -207,6 +288,11 @@ def _changes(scene: Scene, place: Path, with_cameras: bool) -> Iterator[tuple[st
     ]
     if others != list(scene.lights):
         yield "directions of light are reversed", {"lights": others}
+    yield from _of_whitted(scene)
+    for name, change in LIGHTS.items():
+        others = [light.model_copy(update=change(light)) for light in scene.lights]
+        if others != list(scene.lights):
+            yield name, {"lights": others}
     for parts, changes in (("materials", MATERIALS), ("textures", TEXTURES)):
         of: dict[str, Any] = getattr(scene, parts)
         for name, change in changes.items():

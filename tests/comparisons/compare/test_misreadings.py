@@ -88,6 +88,53 @@ def test_names_of_textures_are_no_paths() -> None:
     assert "green of normal maps is flipped" in [h.name for h in found(reference)]
 
 
+WHITTED = """\
+film: {width: 64, height: 48}
+camera: {type: perspective, eye: [0, 0.6, 3], target: [0, 0.4, 0], fov: 45}
+integrator: {type: whitted, max_depth: 2}
+materials:
+  floor: {type: phong, diffuse: 0.6, ambient: 0.6}
+  ball: {type: phong, ambient: 0.1, diffuse: [0.7, 0.3, 0.2], specular: 0.4, exponent: 20}
+  chrome: {type: phong, ambient: 0.05, diffuse: 0.1, mirror: 0.7}
+shapes:
+  - type: rectangle
+    material: floor
+    transform: [{scale: 3}, {rotate: {axis: [1, 0, 0], degrees: -90}}]
+  - {type: sphere, material: ball, center: [-0.6, 0.5, 0.3], radius: 0.5}
+  - {type: sphere, material: chrome, center: [0.5, 0.5, 0.3], radius: 0.5}
+lights:
+  - {type: ambient, radiance: 0.3}
+  - {type: point, position: [2, 3, 2], intensity: 20}
+"""
+
+
+@pytest.mark.cases(4)
+@pytest.mark.parametrize(
+    ("right", "wrong", "name"),
+    [
+        ("exponent: 20", "exponent: 40", "the highlight's exponent is 2 times as large"),
+        ("exponent: 20", "exponent: 20, half_vector: true", "half vectors and mirrored directions"),
+        ("specular: 0.4", "specular: 4.4", "the highlight is multiplied by (p + 2) / 2"),
+        ("specular: 0.4", "specular: 0", "without highlights"),
+        ("mirror: 0.7", "mirror: 0", "without reflections and refractions, or without mirrored"),
+        ("max_depth: 2", "max_depth: 1", "one reflection fewer"),
+        ("max_depth: 2", "max_depth: 3", "one reflection more"),
+        ("  - {type: ambient, radiance: 0.3}\n", "", "without ambient light"),
+        ("radiance: 0.3", "radiance: 0.6", "ambient light is counted twice"),
+        ("intensity: 20", "intensity: 62.8318530718", "lights without extent are pi times"),
+    ],
+)
+def test_a_mistake_of_the_textbooks_shading_is_named(right: str, wrong: str, name: str) -> None:
+    assert right in WHITTED
+    facing = WHITTED.replace("ball: {type: phong,", "ball: {type: phong, mirror: 0.5,")
+    text = facing if "max_depth" in right else WHITTED  # two mirrors, which see each other
+    scene, reference = picture(text)
+    _, candidate = picture(text.replace(right, wrong))
+    cause = diagnosis.likeliest(Images(candidate, reference), {}, misreadings(scene))
+    assert cause is not None
+    assert cause.name.startswith(name)
+
+
 NOISY = """\
 film: {width: 32, height: 24}
 camera: {type: perspective, eye: [0, 1.2, 4], target: [0, 0.5, 0], fov: 45}
