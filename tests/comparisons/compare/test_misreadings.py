@@ -135,6 +135,19 @@ def test_a_mistake_of_the_textbooks_shading_is_named(right: str, wrong: str, nam
     assert cause.name.startswith(name)
 
 
+def test_whitted_without_shadows() -> None:
+    """A floor without shadows is one without the ball, where no ball hides it."""
+    text = "".join(line for line in WHITTED.splitlines(keepends=True) if "chrome" not in line)
+    scene, reference = picture(text)
+    _, alone = picture("".join(x for x in text.splitlines(keepends=True) if "sphere" not in x))
+    o, d, *_ = scene.camera_rays()
+    candidate = np.where((scene.intersect(o, d).shape == 0)[..., None], alone, reference)
+    assert (candidate != reference).any()
+    cause = diagnosis.likeliest(Images(candidate, reference), {}, misreadings(scene))
+    assert cause is not None
+    assert cause.name == "without shadows"
+
+
 NOISY = """\
 film: {width: 32, height: 24}
 camera: {type: perspective, eye: [0, 1.2, 4], target: [0, 0.5, 0], fov: 45}
