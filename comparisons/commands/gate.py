@@ -1,6 +1,7 @@
 """`reference-rt gate`: the pictures of another renderer."""
 
 import shlex
+import signal
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -448,8 +449,9 @@ def with_others(case: "Case", pictures: Mapping[str, tuple["Picture", ...]]) -> 
 
 
 def judged_again(judge: Callable[[], int], files: Sequence[Path]) -> int:
-    """Judge, and again whenever one of the files has been written, until an interruption; the last
-    exit code.  Outputs of the judgement before stay until the next ones replace them."""
+    """Judge, and again whenever one of the files has been written, until Ctrl-C; the last exit
+    code.  Other signals end it as any command, with their own exit code.  Outputs of the judgement
+    before stay until the next ones replace them."""
     while True:
         before = stamps(files)
         try:
@@ -462,5 +464,7 @@ def judged_again(judge: Callable[[], int], files: Sequence[Path]) -> int:
         say("waiting for another candidate; Ctrl-C ends", err=True)
         try:
             wait_for_change(files, before)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as error:
+            if error.args not in ((), (signal.SIGINT,)):
+                raise
             return code

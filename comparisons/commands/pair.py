@@ -17,7 +17,6 @@ from reference_rt.util.errors import ReferenceRtError, UsageError, printable
 
 if TYPE_CHECKING:
     from comparisons.gate.driver import Command
-    from comparisons.gate.pictures_in import Picture
     from reference_rt.rendering.scene import Scene
 
 _SUFFIXES = (".exr", ".png", ".pfm", ".hdr", ".npy")
@@ -54,6 +53,7 @@ def pair_gate(
         from comparisons.gate.driver import Driver
         from comparisons.gate.gate import not_run
         from comparisons.gate.pair import SIDES, Asked, driven_pair, pair_case
+        from comparisons.gate.pictures_in import read_candidates
         from comparisons.gate.reference import is_noise_free
         from comparisons.gate.rounds import Rounds
         from comparisons.report import biases, terminal
@@ -70,10 +70,13 @@ def pair_gate(
     film = None if described is None else (described.film.width, described.film.height)
     more: dict[str, Any] = {"spp": spp, "size": film, "seconds": seconds or SECONDS}
     data = None if scene is None else out / "candidates" / "scene.json"
-    sides = [_side(text, scene, data, suffix, layer, more) for text in pair]
+    sides = [_side(text, scene, data, suffix, more) for text in pair]
     commands = [side for side in sides if not isinstance(side, list)]
     if len(commands) == 1:
         raise UsageError("--pair: expected two commands or pages, or pictures of both")
+    files = [side for side in sides if isinstance(side, list)]
+    if all(Path(text).is_dir() for text in pair):
+        files = _matched(pair, files)
     driving = {"seed": seed, "replicates": replicates, "fixed": fixed, "suffix": suffix}
     if not commands and (given := [name for name, value in driving.items() if value]):
         raise UsageError(f"--{given[0]}: only applies to commands and pages, got pictures")
@@ -100,8 +103,10 @@ def pair_gate(
                 )
                 case = driven_pair(asked, (drivers[0], drivers[1]), rounds, progress.line)
             else:
-                one, two = (side for side in sides if isinstance(side, list))
+                one, two = ([p for f in side for p in read_candidates(f, layer)] for side in files)
                 case = pair_case(one, two, asked)
+                if [f.resolve() for f in files[0]] == [f.resolve() for f in files[1]]:
+                    case = replace(case, notes=(*case.notes, "A and B are the same files"))
     except UsageError as error:
         raise UsageError(str(error).replace("--command", "--pair")) from None
     except ReferenceRtError as error:
@@ -144,22 +149,45 @@ def _side(
     scene: Path | None,
     data: Path | None,
     suffix: str | None,
-    layer: str,
     more: dict[str, Any],
-) -> "Command | list[Picture]":
-    """What one side is.  data: where a web page finds the scene;  more: of a command.  Raises
-    ImageError, UsageError."""
+) -> "Command | list[Path]":
+    """What one side is: what makes its pictures, or their files.  data: where a web page finds the
+    scene;  more: of a command.  Raises UsageError."""
     from comparisons.gate.driver import Command
-    from comparisons.gate.pictures_in import read_candidates
 
     path, page = Path(text), Path(text.partition("?")[0])
     if path.is_dir():
         files = sorted(p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES)
+        files = [file for file in files if not file.name.startswith(".")]
         if not files:
             raise UsageError(f"--pair: {path} has no pictures; expected {', '.join(_SUFFIXES)}")
-        return [picture for file in files for picture in read_candidates(file, layer)]
+        return files
     if path.suffix.lower() in _SUFFIXES:
-        return list(read_candidates(path, layer))
+        return [path]
     if page.suffix.lower() in (".html", ".htm"):
         return Command.of_page(text, scene=data, suffix=suffix or ".npy", **more)
     return Command(text, scene, suffix=suffix or ".exr", **more)
+
+
+def _matched(folders: tuple[str, str], files: Sequence[list[Path]]) -> list[list[Path]]:
+    """The files of both folders, those of one name at the same place; without their suffixes, if
+    formats differ.  Raises UsageError for a name that only one of them has."""
+    names = [{path.name: path for path in side} for side in files]
+    stems = [{path.stem: path for path in side} for side in files]
+    is_clear = all(len(by_stem) == len(side) for by_stem, side in zip(stems, files, strict=True))
+    one, two = stems if is_clear and stems[0].keys() == stems[1].keys() else names
+    lacking = [
+        f"{folder} has no {', '.join(missing[:MOST_NAMED])}{', ...' * (len(missing) > MOST_NAMED)}"
+        for folder, missing in (
+            (folders[0], sorted(two.keys() - one.keys())),
+            (folders[1], sorted(one.keys() - two.keys())),
+        )
+        if missing
+    ]
+    if lacking:
+        raise UsageError(f"--pair: {'; '.join(lacking)}; expected pictures of the same names")
+    return [[one[name] for name in sorted(one)], [two[name] for name in sorted(one)]]
+
+
+MOST_NAMED = 5
+"""Missing pictures of a folder that an error names."""

@@ -56,9 +56,9 @@ class Rendered:
     """What is compared.
 
     images: the two pictures;  seconds: wall clock by side and step;  replicates: of noisy pictures,
-    whose means the images are;  checked: the rung `input` of these, if it is known already;  still:
-    the rung `statistics` of pictures without noise;  fixed_reference, paired: as in
-    `statistics.compare`.
+    whose means the images are;  checked, tested: the rungs `input` and `statistics` of these, if
+    they are known already;  still: the rung `statistics` of pictures without noise;
+    fixed_reference, paired: as in `statistics.compare`.
     """
 
     images: Images
@@ -66,6 +66,7 @@ class Rendered:
     replicates: Replicates | None = None
     notes: tuple[str, ...] = ()
     checked: RungResult | None = None
+    tested: RungResult | None = None
     still: Callable[[], RungResult] = _deterministic
     fixed_reference: bool = False
     paired: bool = False
@@ -224,6 +225,8 @@ def at_look(rendered: Rendered, limit: float, level: float) -> RungResult:
 
 
 def _tested(rendered: Rendered, limit: float, level: float = 1.0) -> RungResult:
+    if rendered.tested is not None:
+        return rendered.tested
     if rendered.replicates is None:
         return rendered.still()
     how: dict[str, Any] = {"fixed_reference": rendered.fixed_reference}

@@ -29,8 +29,9 @@ the best one leaves: where they are interpolated, edges leave some."""
 
 
 SINGLE, TINY, ALIKE = 1e-5, 1e-9, 0.99
-"""Relative difference of a value that is rounded to float32 on the way, and the least share of
-values that have no other: of a hundred, one may be rounded to the next code."""
+"""Difference of a value that is rounded to float32 on the way, relative to the value and to the
+largest, and the least share of values that have no other: of a hundred, one may be rounded to the
+next code."""
 
 
 def as_renderers(
@@ -151,7 +152,8 @@ def _is_final(undo: Undo) -> bool:
 def _same(images: Images, undo: Undo, threads: int | None) -> bool:
     """Whether the candidate is what our picture becomes."""
     predicted = _predicted(undo, images, threads)
-    near = np.abs(images.candidate - predicted) <= SINGLE * np.abs(predicted) + TINY
+    size = np.abs(predicted)
+    near = np.abs(images.candidate - predicted) <= SINGLE * size + TINY * size.max()
     return bool(near.mean() >= ALIKE) and images.error is None
 
 

@@ -18,6 +18,7 @@ from comparisons.gate.rim import question_without_rim, without_rim
 from comparisons.results.case import Case, FloatArray, Images, RungResult, Status, decide
 from comparisons.rungs.edges import edges_rung
 from comparisons.rungs.input import input_rung
+from comparisons.statistics import in_range
 from comparisons.statistics.metrics import image_metrics
 from reference_rt.util.errors import ImageError, UsageError
 
@@ -45,6 +46,11 @@ def gate_pictures(
             return unchanged(question.name, copies, reference, notes)
         if copies.count:
             notes.append(copies.note(len(candidates)))
+    candidates, reference, exponent = _in_range(candidates, reference)
+    if exponent:
+        notes.append(in_range.note(exponent))
+        # What is rendered for a diagnosis has other values.
+        question = replace(question, lights=None, lengths=None, edges=None, witness=None)
     if question.rim:
         candidates, reference = without_rim(candidates, reference, question.rim)
         question = question_without_rim(question)
@@ -95,6 +101,21 @@ def unchanged(name: str, copies: Copies, reference: Reference, notes: Sequence[s
     )
 
 
+def _in_range(
+    candidates: Sequence[Picture], reference: Reference
+) -> tuple[Sequence[Picture], Reference, int]:
+    """Both sides times a power of two, if their squares are no numbers; and its exponent, or 0."""
+    exponent = in_range.exponent_of(reference.pictures, *(p.radiance for p in candidates))
+    if not exponent:
+        return candidates, reference, 0
+    variance = reference.variance
+    if variance is not None:
+        variance = in_range.times(variance, 2 * exponent)
+    pictures = in_range.times(reference.pictures, exponent)
+    scaled = [replace(p, radiance=in_range.times(p.radiance, exponent)) for p in candidates]
+    return scaled, replace(reference, pictures=pictures, variance=variance), exponent
+
+
 def _rendered(candidates: Sequence[Picture], reference: Reference) -> Rendered:
     pictures = stacked(candidates)
     if reference.noise_free:
@@ -138,7 +159,8 @@ def first_fault(candidate: Picture, reference: Reference) -> RungResult | None:
     """What is wrong with the input, as far as one picture shows it, so that no others need to be
     rendered; None if nothing is.  Raises ImageError for another size."""
     check_sizes([candidate], size_of(reference.pictures[0]), "as the reference")
-    rung = _input([candidate], reference)
+    candidates, reference, _ = _in_range([candidate], reference)
+    rung = _input(candidates, reference)
     return rung if rung.status == "invalid" else None
 
 
@@ -147,6 +169,7 @@ def look(
 ) -> RungResult:
     """The statistics of replicates;  level: the share of the levels that this look may use;  rim:
     as in `gate_pictures`.  At the first look a fault of the input, if there is one."""
+    candidates, reference, _ = _in_range(candidates, reference)
     if rim:
         candidates, reference = without_rim(candidates, reference, rim)
     rendered = _rendered(candidates, reference)

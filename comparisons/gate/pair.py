@@ -10,8 +10,10 @@ shows, the differences of pairs are judged: they see biases that are far smaller
 """
 
 import os
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
@@ -27,11 +29,13 @@ from comparisons.gate.pair_noise import FEWEST, Streams, notes_of, streams_of
 from comparisons.gate.pictures_in import Picture, pictures_of
 from comparisons.gate.question import LIMIT
 from comparisons.gate.reference import check_sizes, size_of, stacked
+from comparisons.gate.rim import check_rim, left_out, without
 from comparisons.gate.rounds import Rounds
 from comparisons.results.case import Case, FloatArray, Images, RungResult
 from comparisons.results.naming import named
 from comparisons.rungs.input import input_rung
 from comparisons.rungs.witness import Witness, vote
+from comparisons.statistics import in_range
 from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import UsageError
 
@@ -74,8 +78,10 @@ def pair_case(a: Sequence[Picture], b: Sequence[Picture], asked: Asked) -> Case:
     """The verdict on the pictures of both sides, several being replicates.  Raises ImageError,
     UsageError, SceneError."""
     check_sizes([*a, *b], *_size(asked, a[0]))
-    one, two = (_without_rim(stacked(side), asked.rim) for side in (a, b))
-    return _case(one, two, _notes(a[0], b[0]), asked)
+    one, two = (stacked(side) for side in (a, b))
+    check_rim(one.shape, asked.rim)
+    one, two = (without(side, asked.rim, 1) for side in (one, two))
+    return _case(one, two, _notes(a[0], b[0], asked), asked)
 
 
 def _size(asked: Asked, first: Picture) -> tuple[str, str]:
@@ -86,8 +92,9 @@ def _size(asked: Asked, first: Picture) -> tuple[str, str]:
     return f"{film.width} x {film.height}", f"the size of the scene '{asked.scene.name}'"
 
 
-def _notes(a: Picture, b: Picture) -> list[str]:
-    return [picture.note for picture in (a, b) if picture.note]
+def _notes(a: Picture, b: Picture, asked: Asked) -> list[str]:
+    notes = [picture.note for picture in (a, b) if picture.note]
+    return [*notes, left_out(asked.rim)] if asked.rim else notes
 
 
 def _case(
@@ -100,10 +107,18 @@ def _case(
 ) -> Case:
     """The verdict on pictures without their rim, which `asked` has only for ours.  looked, streams:
     of an earlier look at a part of them."""
+    exponent = in_range.exponent_of(one, two)
+    if exponent:
+        one, two = (in_range.times(side, exponent) for side in (one, two))
+        notes.append(in_range.note(exponent))
+        # What is rendered for a diagnosis has other values.
+        asked = replace(asked, scene=None, judged=False)
     if asked.noise_free or (_is_fixed(one) and _is_fixed(two)):
         if not asked.noise_free:
             notes.append("each side's replicates are the same: there is no noise")
         rendered = _still(one[0], two[0])
+    elif _are_copies(one, two):
+        rendered = _copies(one, asked.sides)
     elif not all(np.isfinite(side).all() for side in (one, two)):
         with np.errstate(invalid="ignore"):  # of infinities
             rendered = rendered_pair(one, two, paired=False)
@@ -131,7 +146,8 @@ def _case(
     if case.verdict != "differ" or case.images is None:
         return case
     return replace(
-        case, cause=cause_of(case, one[0], two[0], asked.scene, asked.spp, asked.threads)
+        case,
+        cause=cause_of(case, one[0], two[0], asked.scene, asked.spp, asked.threads, asked.rim),
     )
 
 
@@ -171,6 +187,7 @@ def driven_pair(
 
     make(1 if asked.noise_free or rounds.replicates == 1 else 2)
     first = [picture.radiance for side in sides for picture in side[:1]]
+    check_rim(first[0].shape, asked.rim)
     bad = not all(np.isfinite(picture).all() for picture in first)
     if bad or asked.noise_free or all(_is_fixed(stacked(side)) for side in sides):
         return pair_case(*sides, asked)
@@ -189,19 +206,25 @@ def driven_pair(
         make(count)
         for pool, side in zip(pools, sides, strict=True):
             for k in range(pooled, count):
-                pool.add(_without_rim(side[k].radiance[None], asked.rim)[0])
+                pool.add(without(side[k].radiance, asked.rim))
                 side[k] = replace(side[k], radiance=_NONE)  # the pool has it
         pooled = count
         if not told:
             pictures = [np.stack(pool.pictures()) for pool in pools]
+            exponent = in_range.exponent_of(*pictures)
+            pictures = [in_range.times(side, exponent) for side in pictures]
             if all(np.isfinite(side).all() for side in pictures):
                 streams = streams_of(*pictures)
 
     def judged_at(level: float) -> RungResult:
         one, two = (np.stack(pool.pictures()) for pool in pools)
+        exponent = in_range.exponent_of(one, two)
+        one, two = (in_range.times(side, exponent) for side in (one, two))
         with np.errstate(invalid="ignore"):  # of infinities, which are told
             rendered = rendered_pair(one, two, streams is not None and streams.shared)
-        if level == looks.level_of(1):
+        if _are_copies(one, two):
+            rendered = _copies(one, asked.sides)
+        elif level == looks.level_of(1):
             rendered = replace(rendered, checked=_checked(one, two, asked.sides))
         return at_look(rendered, asked.limit, level)
 
@@ -209,7 +232,7 @@ def driven_pair(
         grow, judged_at, seconds=rounds.seconds, first=max(2, rounds.replicates), most=most, say=say
     )
     one, two = (np.stack(pool.pictures()) for pool in pools)
-    return _case(one, two, _notes(sides[0][0], sides[1][0]), asked, found, streams)
+    return _case(one, two, _notes(sides[0][0], sides[1][0], asked), asked, found, streams)
 
 
 _NONE = np.zeros((0, 0, 3))
@@ -260,16 +283,32 @@ def _is_fixed(pictures: FloatArray) -> bool:
     return bool((apart <= ROUNDED * np.abs(pictures[0]) + TINY * np.abs(pictures).max()).all())
 
 
+def _are_copies(a: FloatArray, b: FloatArray) -> bool:
+    """Whether each picture of A is one of B, bit for bit, in any order; finite, and not black."""
+
+    def prints(side: FloatArray) -> Counter[bytes]:  # -0 and 0 are the same radiance
+        return Counter(sha256((x + 0.0).tobytes()).digest() for x in side)
+
+    if len(a) != len(b) or not np.isfinite(a).all() or not a.any():
+        return False
+    return prints(a) == prints(b)
+
+
+def _copies(pictures: FloatArray, sides: tuple[str, str]) -> Rendered:
+    """Of sides that have the same pictures: their difference is known, and is zero, so that no
+    statistics of it can say how far it might be from zero."""
+    count = len(pictures)
+    are = "picture is" if count == 1 else f"{count} pictures are, one by one,"
+    reason = f"{sides[0]} {are} {sides[1]}, bit for bit: there is no difference"
+    rendered = rendered_pair(pictures, pictures, paired=count > 1)
+    same = RungResult("statistics", "unchanged", reason, {"copies": count})
+    # Whether replicates are independent does not matter.
+    return replace(rendered, checked=input_rung(pictures[0], pictures[0]), tested=same)
+
+
 def _as_many(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
     count = min(len(a), len(b))
     return a[:count], b[:count]
-
-
-def _without_rim(pictures: FloatArray, rim: int) -> FloatArray:
-    height, width = pictures.shape[1:3]
-    if 2 * rim >= min(height, width):
-        raise UsageError(f"--rim: {rim} leaves nothing of {width} x {height} pixels")
-    return pictures[:, rim : height - rim, rim : width - rim]
 
 
 def _checked(a: FloatArray, b: FloatArray, sides: tuple[str, str]) -> RungResult:
@@ -293,7 +332,7 @@ def _third(asked: Asked, rendered: Rendered) -> Witness:
     ) -> tuple[RungResult, dict[str, FloatArray]]:
         assert asked.scene is not None
         ours = reference.of_scene(asked.scene, asked.limit, threads=asked.threads)
-        pictures = _without_rim(ours.pictures, asked.rim)
+        pictures = without(ours.pictures, asked.rim, 1)
         shown = {OURS: pictures.mean(axis=0)}
         if (
             rendered.replicates is None
@@ -305,7 +344,9 @@ def _third(asked: Asked, rendered: Rendered) -> Witness:
         one, two = rendered.replicates
         assert isinstance(two, np.ndarray)
         known = None
-        if rendered.paired:
+        if rendered.tested is not None:
+            known = replace(rendered.tested, status="agree")
+        elif rendered.paired:
             known = at_look(replace(rendered, checked=None), asked.limit, 1.0)
         rung = vote((one, two, pictures), (*sides, OURS), asked.limit, known)
         return rung, shown

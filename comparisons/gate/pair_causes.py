@@ -12,6 +12,7 @@ from comparisons.compare.diagnosis.misfit import REST, Misfit
 from comparisons.compare.diagnosis.spots import FEW_PIXELS, ONE_PIXEL, ONE_TILE
 from comparisons.compare.judge import likeliest_cause
 from comparisons.compare.path_length import path_lengths
+from comparisons.gate.rim import lengths_without_rim, without
 from comparisons.results.case import Case, Cause, FloatArray, Images
 from comparisons.statistics.cells import HALF
 from reference_rt.rendering.render import render
@@ -48,30 +49,32 @@ def cause_of(
     scene: Scene | None,
     spp: int | None,
     threads: int | None = None,
+    rim: int = 0,
 ) -> Cause | None:
     """The likeliest cause of a case that differs, which the pictures alone have told.  a, b
     (height, width, 3): a picture of either;  scene: what they show, None where it is not known;
-    spp: samples per pixel of a picture."""
+    spp: samples per pixel of a picture;  rim: how many of the scene's outermost pixels the pictures
+    lack."""
     images, told = case.images, case.cause
     assert images is not None
     if spp is not None and (found := _dropped(case, images, spp)) is not None:
         return found
     if (found := _halves(case.sides, images, a, b, spp)) is not None or is_sure(told):
         return found or told
-    size = None if scene is None else (scene.film.height, scene.film.width, 3)
     misfit = Misfit(images)
-    if scene is None or images.reference.shape != size or not (misfit.clear and misfit.excess > 0):
+    if scene is None or not (misfit.clear and misfit.excess > 0):
         return told
     squares = misfit.weights * (images.candidate - images.reference) ** 2
     if images.error is not None:
         squares = squares - misfit.weights * images.error**2
-    seen = _Seen(scene, case.sides, images, squares.sum(axis=-1))
+    seen = _Seen(scene, case.sides, images, squares.sum(axis=-1), rim)
     if (found := _of_change(seen, threads)) is not None:
         return found
     of_shape = _on_shape(seen)
     if of_shape is not None and of_shape.name.endswith(BLACK):
         return of_shape
-    also = likeliest_cause(images, None, path_lengths(scene, threads))
+    lengths = path_lengths(scene, threads)
+    also = likeliest_cause(images, None, lengths and lengths_without_rim(lengths, rim))
     is_place = also is None or also.name.endswith((ONE_TILE, FEW_PIXELS, ONE_PIXEL))
     if also is not None and not is_place and not also.name.startswith(IN_PART):
         return also
@@ -137,21 +140,25 @@ class _Seen:
 
     excess (height, width): squares beyond noise;  hit: the shapes' numbers, -1 for none;  facing:
     the cosine towards the eye, negative on back sides;  order: the shapes, those first that hold
-    most.
+    most.  All are without the rim.
     """
 
     def __init__(
-        self, scene: Scene, sides: tuple[str, str], images: Images, excess: FloatArray
+        self, scene: Scene, sides: tuple[str, str], images: Images, excess: FloatArray, rim: int
     ) -> None:
-        self.scene, self.sides = scene, sides
+        self.scene, self.sides, self.rim = scene, sides, rim
         self.images, self.excess = images, excess
         o, d, *_ = scene.camera_rays()
         hits = scene.intersect(o, d)
-        self.hit = hits.shape
-        self.facing = -(hits.n * d).sum(axis=-1) / np.linalg.norm(d, axis=-1)
+        self.hit = without(hits.shape, rim)
+        self.facing = without(-(hits.n * d).sum(axis=-1) / np.linalg.norm(d, axis=-1), rim)
         shares = np.bincount(self.hit.ravel() + 1, excess.ravel(), len(scene.shapes) + 1)
         self.shares = shares[1:] / shares.sum()
         self.order = np.argsort(-self.shares).tolist()
+
+    def picture(self, scene: Scene, threads: int | None) -> FloatArray:
+        """Of the scene, or of a changed one."""
+        return without(_picture(scene, threads), self.rim)
 
     def named(self, shape: int) -> str:
         one = self.scene.shapes[shape]
@@ -205,11 +212,11 @@ def _changes(seen: _Seen, threads: int | None) -> Iterator[tuple[str, FloatArray
     """How our picture changes (height, width, 3) without each of some shapes, and with the next or
     the last material of each in place of its own."""
     scene = seen.scene
-    right = _picture(scene, threads)
+    right = seen.picture(scene, threads)
     for shape in seen.order[:SHAPES]:
         rest = [one for k, one in enumerate(scene.shapes) if k != shape]
         other = scene.changed(shapes=rest)
-        yield f"without {seen.named(shape)}", _picture(other, threads) - right
+        yield f"without {seen.named(shape)}", seen.picture(other, threads) - right
     names = list(scene.materials)
     used = [str(getattr(one, "material", None)) for one in scene.shapes]
     if len(names) < 2 or not all(name in names for name in used):
@@ -220,7 +227,7 @@ def _changes(seen: _Seen, threads: int | None) -> Iterator[tuple[str, FloatArray
             for one, name in zip(scene.shapes, used, strict=True)
         ]
         name = f"of materials whose index is off by {step:+d}"
-        yield name, _picture(scene.changed(shapes=moved), threads) - right
+        yield name, seen.picture(scene.changed(shapes=moved), threads) - right
 
 
 def _picture(scene: Scene, threads: int | None) -> FloatArray:

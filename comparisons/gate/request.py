@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -377,4 +378,6 @@ def _baseline(
 
 
 def _hypotheses(scene: Scene, threads: int | None) -> Lengths | None:
-    return path_lengths(scene, threads) or misreadings(scene, threads)
+    kinds = path_lengths(scene, threads), misreadings(scene, threads)
+    known = [kind for kind in kinds if kind is not None]
+    return (lambda reference: chain(*(of(reference) for of in known))) if known else None

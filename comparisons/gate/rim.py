@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from comparisons.compare.diagnosis.hypothesis import Hypothesis
+from comparisons.compare.path_length import Lengths
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.question import Question
 from comparisons.gate.reference import Reference
@@ -38,22 +39,26 @@ def without_rim(
     cropped = [
         replace(
             picture,
-            radiance=_inner(picture.radiance, pixels),
-            opacity=None if picture.opacity is None else _inner(picture.opacity, pixels),
+            radiance=without(picture.radiance, pixels),
+            opacity=None if picture.opacity is None else without(picture.opacity, pixels),
         )
         for picture in candidates
     ]
-    note = (
+    judge = replace(
+        reference,
+        pictures=without(reference.pictures, pixels, 1),
+        variance=None if reference.variance is None else without(reference.variance, pixels),
+        notes=(*reference.notes, left_out(pixels)),
+    )
+    return cropped, judge
+
+
+def left_out(pixels: int) -> str:
+    """The note about it."""
+    return (
         f"the outermost {pixels} pixels on each side are left out; positions count from the first "
         "pixel that is compared"
     )
-    judge = replace(
-        reference,
-        pictures=_inner(reference.pictures, pixels, 1),
-        variance=None if reference.variance is None else _inner(reference.variance, pixels),
-        notes=(*reference.notes, note),
-    )
-    return cropped, judge
 
 
 def question_without_rim(question: Question) -> Question:
@@ -62,24 +67,29 @@ def question_without_rim(question: Question) -> Question:
 
     def inner_lights() -> dict[str, FloatArray]:
         assert lights is not None
-        return {name: _inner(light, pixels) for name, light in lights().items()}
-
-    def inner_lengths(reference: FloatArray) -> Iterator[Hypothesis]:
-        assert lengths is not None
-        rim = ((pixels, pixels), (pixels, pixels), (0, 0))
-        for one in lengths(np.pad(reference, rim)):
-            noise = None if one.noise is None else _inner(one.noise, pixels)
-            yield replace(one, picture=_inner(one.picture, pixels), noise=noise)
+        return {name: without(light, pixels) for name, light in lights().items()}
 
     return replace(
         question,
         lights=inner_lights if lights else None,
-        lengths=inner_lengths if lengths else None,
+        lengths=lengths and lengths_without_rim(lengths, pixels),
         edges=None if edges is None else edges.without_rim(pixels),
     )
 
 
-def _inner(x: FloatArray, pixels: int, first: int = 0) -> FloatArray:
+def lengths_without_rim(lengths: Lengths, pixels: int) -> Lengths:
+    """The same for hypotheses about whole pictures."""
+
+    def inner(reference: FloatArray) -> Iterator[Hypothesis]:
+        rim = ((pixels, pixels), (pixels, pixels), (0, 0))
+        for one in lengths(np.pad(reference, rim)):
+            noise = None if one.noise is None else without(one.noise, pixels)
+            yield replace(one, picture=without(one.picture, pixels), noise=noise)
+
+    return inner
+
+
+def without(x: np.ndarray, pixels: int, first: int = 0) -> FloatArray:
     """`x` without its rim along axis `first` and the next."""
     rows, columns = (slice(pixels, x.shape[first + k] - pixels) for k in range(2))
     return x[(slice(None),) * first + (rows, columns)]

@@ -22,6 +22,7 @@ from reference_rt.cameras import Orthographic
 from reference_rt.cameras.view_rectangle import CentralCamera
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray, IntArray
+from reference_rt.core.diagnosis import RESOLVED
 from reference_rt.lights import EnvironmentMap
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Mesh, Plane, Shape, Triangle
@@ -120,7 +121,7 @@ def placed(mesh: MeshData, outer: Affine) -> MeshData:
 # ---- the document --------------------------------------------------------------------------------
 
 
-FORMAT, VERSION = "reference_rt resolved scene", 1
+VERSION = 1
 
 
 def write_resolved(scene: Scene, path: Path, float32: bool = False) -> int:
@@ -172,7 +173,7 @@ class _Document:
         scene = self.scene
         shapes = self.shapes()
         return {
-            "format": FORMAT,
+            "format": RESOLVED,
             "version": VERSION,
             "description": scene.description,
             "camera": self.camera(),

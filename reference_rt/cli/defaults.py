@@ -1,6 +1,7 @@
 """Defaults of commands from a project's file: [tool.reference_rt.COMMAND] of its pyproject.toml."""
 
 import os
+import re
 import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
@@ -23,8 +24,14 @@ NEVER = frozenset({"command", "pair", "browser", "renderer", "scheduler", "clust
 who stands in its folder has not asked for that."""
 
 
-NAMED = frozenset({"beside"})
-"""Options whose values are NAME=FILE."""
+IN_TEXTS = {
+    "beside": re.compile("[^=]+=(?P<file>.+)"),
+    "tone-curve": re.compile(r"(?P<file>.+?)(:[\d.eE+-]+)?"),
+    "to": re.compile("(?P<file>.+)"),
+    "scene": re.compile("(?P<file>.+)"),
+}
+"""Options whose texts may hold a path, and where.  What has no dot and no slash is the name of
+something else, unless there is such a file."""
 
 
 def find(folder: Path) -> Path | None:
@@ -32,15 +39,31 @@ def find(folder: Path) -> Path | None:
     for parent in (folder, *folder.parents):
         path = parent / FILE
         with suppress(OSError):  # somebody else's, which may not be read
-            if path.is_file() and f"tool.{SECTION}".encode() in path.read_bytes():
+            if path.is_file() and _is_ours(path.read_bytes()):
                 return path
     return None
 
 
-def read(path: Path) -> dict[str, Any]:
-    """Our section.  Raises UsageError."""
+def _is_ours(data: bytes) -> bool:
+    """Whether a file has our section, or would if it were TOML."""
+    if SECTION.encode() not in data:
+        return False
     try:
-        found = tomllib.loads(path.read_text(encoding="utf-8")).get("tool", {}).get(SECTION, {})
+        tool = tomllib.loads(data.decode("utf-8")).get("tool")
+    except ValueError:
+        return bool(_OUR_SECTION.search(data))
+    return isinstance(tool, dict) and SECTION in tool
+
+
+_OUR_SECTION = re.compile(
+    rb"""tool["']?\s*\.\s*["']?reference_rt|^\s*["']?reference_rt["']?\s*[.=]""", re.MULTILINE
+)
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Our section of a file that has one.  Raises UsageError."""
+    try:
+        found = tomllib.loads(path.read_text(encoding="utf-8"))["tool"][SECTION]
     except (OSError, ValueError) as error:
         raise UsageError(f"{path}: cannot be read: {error}") from None
     if not isinstance(found, dict):
@@ -86,22 +109,24 @@ def of_command(
             told = getattr(error, "message", str(error))
             raise UsageError(f"{where}.{name}.{key}: {told}") from None
         try:
-            is_named = any(opt.removeprefix("--") in NAMED for opt in option.opts)
-            found[option.name] = _placed(value, cast, path.parent, is_named)
+            in_text = IN_TEXTS.get(key.replace("_", "-"))
+            found[option.name] = _placed(value, cast, path.parent, in_text)
         except ValueError:
             told = f"expected a path within the file's folder, got '{value}'"
             raise UsageError(f"{where}.{name}.{key}: {told}") from None
     return found
 
 
-def _placed(value: Any, cast: Any, folder: Path, is_named: bool = False) -> Any:
+def _placed(value: Any, cast: Any, folder: Path, in_text: re.Pattern[str] | None = None) -> Any:
     """A value; where it means a path, relative to `folder`, the path as seen from here.  Raises
-    ValueError for one that leaves the folder, by a link too.  is_named: it is NAME=FILE."""
+    ValueError for one that leaves the folder, by a link too.  in_text: where a text holds one."""
     if isinstance(cast, list | tuple):
-        return [_placed(*pair, folder, is_named) for pair in zip(value, cast, strict=True)]
-    if is_named and "=" in cast:
-        name, _, file = cast.partition("=")
-        return f"{name}={_placed(file, Path(file), folder)}"
+        return [_placed(*pair, folder, in_text) for pair in zip(value, cast, strict=True)]
+    if isinstance(cast, str) and in_text and (found := in_text.fullmatch(cast)):
+        file, (start, end) = found["file"], found.span("file")
+        if not ("." in file or Path(file).name != file or (folder / file).is_file()):
+            return value
+        return f"{cast[:start]}{_placed(file, Path(file), folder)}{cast[end:]}"
     if not isinstance(cast, Path):
         return value
     (folder / cast).resolve().relative_to(folder.resolve())

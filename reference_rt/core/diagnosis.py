@@ -106,6 +106,21 @@ def scene_error(model: type[BaseModel], error: ValidationError, data: Any) -> Sc
     return SceneError(errors[0].message, errors[0].path, others=errors[1:])
 
 
+RESOLVED = "reference_rt resolved scene"
+"""What `convert --to json` writes says that it is this."""
+
+
+def what_else(data: Any) -> str | None:
+    """The message for data that is no scene as a whole; None for what may be one."""
+    if not isinstance(data, dict):
+        return "expected keys such as camera, shapes, lights"
+    if data.get("format") == RESOLVED:
+        return f"is a {RESOLVED}, for other renderers; expected the scene that it was made of"
+    if isinstance(data.get("asset"), dict) and "version" in data["asset"]:
+        return "is glTF; expected a file name that ends in .gltf"
+    return None
+
+
 def _meant_keys(model: type[BaseModel], reported: Iterable[Any]) -> set[Keys]:
     """The keys that are meant by unknown ones, each with those that lead to it."""
     found: set[Keys] = set()

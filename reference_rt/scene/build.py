@@ -4,7 +4,8 @@ Every array is C-contiguous and writable, and has the same type in all scenes, s
 type have the same Numba type and share compiled kernels.  A table that the scene lacks is None.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -14,7 +15,7 @@ from reference_rt.accel.geometry import Geometry
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.materials import Emissive
 from reference_rt.scene.build_geometry import assemble
-from reference_rt.scene.build_lights import light_tables
+from reference_rt.scene.build_lights import environment_of, light_tables
 from reference_rt.scene.build_materials import material_tables
 from reference_rt.scene.build_media import Boundary, boundaries
 from reference_rt.scene.build_textures import texture_tables, with_uv_sets
@@ -61,29 +62,28 @@ def build_tables(scene: SceneModel) -> SceneTables:
     with np.errstate(over="ignore", invalid="ignore"):  # checked afterwards: not finite
         try:
             textures, palette = texture_tables(scene)
-        except SceneError as error:
-            raise _with_those_of_shapes(error, scene, numbers) from None
-        geometry = assemble(scene, numbers)
+            geometry = assemble(scene, numbers)
+            environment = environment_of(scene)
+        except SceneError:
+            raise together(_wrong_in_files(scene, numbers)) from None
         if any(isinstance(material, Emissive) for material in scene.materials.values()):
             geometry = _with_triangles(geometry, spread)  # which may be numbered as lights
         default = numbers[Boundary(None)]
         has_default = len(numbers) > default + 1 or _has_material(geometry, default)
         materials = material_tables(scene, palette, has_default, numbers)
-        lights = light_tables(scene, geometry, palette, numbers)
+        lights = light_tables(scene, geometry, palette, numbers, environment)
         textures = with_uv_sets(scene, textures, geometry.shapes.triangles)
         geometry = _with_triangles(geometry, _as_in_scenes)
         return SceneTables(geometry, materials, lights, textures)
 
 
-def _with_those_of_shapes(
-    error: SceneError, scene: SceneModel, numbers: dict[Boundary, int]
-) -> SceneError:
-    """An error of textures, with those of shapes, so that all files that are missing are told."""
-    try:
-        assemble(scene, numbers)
-    except SceneError as of_shapes:
-        return together((error, of_shapes))
-    return error
+def _wrong_in_files(scene: SceneModel, numbers: dict[Boundary, int]) -> Iterator[SceneError]:
+    """The errors of textures, shapes and lights, so that all files that are missing are told."""
+    for read in (texture_tables, partial(assemble, materials=numbers), environment_of):
+        try:
+            read(scene)
+        except SceneError as error:
+            yield error
 
 
 def _with_triangles(geometry: Geometry, change: Callable[[Triangles], Triangles]) -> Geometry:

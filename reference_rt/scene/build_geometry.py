@@ -45,24 +45,22 @@ def assemble(scene: SceneModel, materials: dict[Boundary, int]) -> Geometry:
     work = _Assembly(scene, materials)
     top: list[TableRows] = []
     copies: list[ExpandedInstance] = []
-    wrong: dict[int | str, SceneError] = {}
+    wrong: list[SceneError] = []
     for i, shape in enumerate(scene.shapes):
-        group = shape.group if isinstance(shape, Instance) else i
         try:
-            if group in wrong:  # which other instances draw, too
-                continue
             if isinstance(shape, Instance):
                 copies.append(ExpandedInstance(i, *work.copies(shape)))
             else:
                 top.append(work.member(shape, i, None))
         except ValueError as error:
-            wrong[group] = scene.error(str(error), "shapes", i)
+            wrong.append(scene.error(str(error), "shapes", i))
         except SceneError as error:
-            wrong[group] = error
+            if error not in wrong:  # of a group that another instance draws, too
+                wrong.append(error)
         if len(wrong) == MOST_TOLD:
             break
     if wrong:
-        raise together(wrong.values())
+        raise together(wrong)
     tables: dict[str, Any] = {}
     bounds: dict[int, Bounds] = {}
     for code, field, _, _ in TABLES:
@@ -137,6 +135,7 @@ class _Assembly:
         # (kind, row, number of the tree) of each operand.
         self.operands: list[tuple[int, int, int]] = []
         self.expansions: dict[str, tuple[IntArray, FloatArray]] = {}
+        self.wrong_groups: dict[str, SceneError] = {}
         self.uv_sets = _uv_sets(scene, materials)
 
     def add(self, shape: Shape, place: TabulationContext) -> TableRows:
@@ -201,6 +200,7 @@ class _Assembly:
         """Add a solid, and return its number.  Its operands become primitives that are in no
         hierarchy of shapes."""
         first, boxes = len(self.operands), []
+        wrong: list[SceneError] = []
         operands = csg.operands_of(shape, identity(), of.material)
         steps = csg.postfix(shape)
         if max(steps) >= MOST_OPERANDS:
@@ -215,7 +215,12 @@ class _Assembly:
                 self.paths[place.owner] = self.path_of(owner)
                 boxes.append(self.operand(operand, place._replace(outer=outer)))
             except ValueError as error:
-                raise ValueError(f"operand {k}, a {_type_of(operand)}: {error}") from None
+                what = f"operand {k}, a {_type_of(operand)}: {error}"
+                wrong.append(self.scene.error(what, *self.path_of(owner)))
+                if len(wrong) == MOST_TOLD:
+                    break
+        if wrong:
+            raise together(wrong)
         program = _Program(first, steps, boxes, anchor)
         bounded = first + np.flatnonzero(program.finite).astype(np.int32)
         if len(bounded) >= OPERANDS_FROM:
@@ -296,14 +301,21 @@ class _Assembly:
             raise ValueError(
                 f"the group contains itself: {' -> '.join([*path, name])}; expected no circle"
             )
+        if name in self.wrong_groups:
+            raise self.wrong_groups[name]
         if name not in self.expansions:
-            self.expansions[name] = self._expansion(name, (*path, name))
+            try:
+                self.expansions[name] = self._expansion(name, (*path, name))
+            except SceneError as error:
+                self.wrong_groups[name] = error
+                raise
         return self.expansions[name]
 
     def _expansion(self, name: str, path: Sequence[str]) -> tuple[IntArray, FloatArray]:
         references: list[TableRows] = []
         trees, maps = [], []
         more = 0  # operands of solids so far, beyond one for each solid
+        wrong: list[SceneError] = []
         for k, shape in enumerate(self.scene.groups[name]):
             try:
                 if isinstance(shape, Instance):
@@ -322,7 +334,13 @@ class _Assembly:
                     if isinstance(shape, Solid):
                         more += self.solids[-1].count - 1
             except ValueError as error:
-                raise self.scene.error(str(error), "groups", name, k) from None
+                wrong.append(self.scene.error(str(error), "groups", name, k))
+            except SceneError as error:
+                wrong.append(error)
+            if len(wrong) == MOST_TOLD:
+                break
+        if wrong:
+            raise together(wrong)
         if references:
             self.trees.append((references, False))
             trees.insert(0, np.array([len(self.trees) - 1]))

@@ -48,10 +48,14 @@ of 1/2 fit the strata of the samples.
 
 
 def light_tables(
-    scene: SceneModel, geometry: Geometry, palette: Palette, boundaries: Iterable[Boundary]
+    scene: SceneModel,
+    geometry: Geometry,
+    palette: Palette,
+    boundaries: Iterable[Boundary],
+    environment: Any,
 ) -> Lights:
     """All lights, selected in proportion to their power.  Writes the primitives' `light` columns.
-    boundaries: the rows of the materials.  Raises SceneError."""
+    boundaries: the rows of the materials;  environment: by `environment_of`."""
     radius = scene_radius(geometry)
     materials = [scene.materials.get(boundary.material or "") for boundary in boundaries]
     areas, powers = _area_lights(scene, geometry, palette, materials)
@@ -65,7 +69,6 @@ def light_tables(
             kinds += [code] * len(found)
             rows += range(len(found))
             weights.append(module.power(tables[field], radius))
-    environment = _environment(scene)
     if environment is not None:
         module = constant if isinstance(environment, constant.Environment) else environment_map
         kinds.append(ENVIRONMENT)
@@ -223,7 +226,8 @@ def _sphere_around(geometry: Geometry) -> FloatArray:
     return np.append(centre, radius * (1.0 + 1e-6))
 
 
-def _environment(scene: SceneModel) -> Any:
+def environment_of(scene: SceneModel) -> Any:
+    """The table of a scene's environment; None without one.  Raises SceneError."""
     for i, light in enumerate(scene.lights):
         if isinstance(light, Constant):
             return light.tabulate()

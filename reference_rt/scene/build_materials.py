@@ -22,6 +22,7 @@ from reference_rt.scene.build_media import Boundary
 from reference_rt.scene.model import SceneModel
 from reference_rt.textures import Palette
 from reference_rt.textures.parameter import join
+from reference_rt.util.errors import MOST_TOLD, together
 
 DEFAULT = "\0"
 """The name of the default material, of shapes without one; no scene can use this name."""
@@ -41,7 +42,7 @@ def material_tables(
     for boundary in [*boundaries][len(scene.materials) + 1 :]:
         materials[f"{DEFAULT}{len(materials)}"] = materials[boundary.material or DEFAULT]
     leaves, flat_leaves = _Leaves(materials, palette), FlattenedBuilder(palette)
-    kinds, rows, found_traits, shown = [], [], [], []
+    kinds, rows, found_traits, shown, wrong = [], [], [], [], []
     for name in materials:
         try:
             shown.append(palette.colours(colour_of(name, materials), np.inf))
@@ -55,11 +56,16 @@ def material_tables(
             numbers = [leaves.add(path.leaf) for path in paths]
             flat_leaves.add(list(zip(paths, numbers, strict=True)))
         except ValueError as error:
-            raise scene.error(str(error), "materials", name) from None
+            wrong.append(scene.error(str(error), "materials", name))
+            if len(wrong) == MOST_TOLD:
+                break
+            continue
         kind, row = numbers[0] if len(numbers) == 1 else (BLACK, -1)
         kinds.append(kind)
         rows.append(row)
         found_traits.append(traits(paths, materials))
+    if wrong:
+        raise together(wrong)
     smooth, uses_u_lobe, behind, oriented = np.ascontiguousarray(np.array(found_traits, np.int64).T)
     asks = np.array([bool(textures_of(name, materials)) for name in materials], np.int64)
     return Materials(

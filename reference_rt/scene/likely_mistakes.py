@@ -7,12 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from reference_rt.core.ray import SURFACE_ROUNDING
 from reference_rt.core.transform import Rotate, Transform
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.lights import EnvironmentMap, Spot
 from reference_rt.materials import Emissive
+from reference_rt.scene.build_media import boundaries
 from reference_rt.scene.model import SceneModel
+from reference_rt.shapes import TABLES as SHAPE_TABLES
 from reference_rt.shapes import Shape
 from reference_rt.shapes.csg import Solid
 
@@ -35,7 +38,8 @@ class Mistake(NamedTuple):
 
 def likely_mistakes(scene: SceneModel, tables: SceneTables) -> list[Mistake]:
     """Probable mistakes in a scene that is about to be rendered, in the order of its keys."""
-    return [*_camera(scene), *_shapes(scene, tables), *_angles(scene), *_darkness(scene, tables)]
+    found = [*_camera(scene), *_shapes(scene, tables), *_angles(scene)]
+    return [*found, *_density(scene, tables), *_darkness(scene, tables)]
 
 
 def _camera(scene: SceneModel) -> Iterator[Mistake]:
@@ -114,6 +118,44 @@ def _steps(
     for k, step in enumerate(transform):
         if isinstance(step, Rotate):
             yield step.rotate.degrees, (*path, "transform", k, "rotate", "degrees")
+
+
+LOST = 1e-3
+"""The largest error of a boundary's points over the length of a free path in a medium: a ray begins
+by the former beside its boundary, and about that share of the light that is scattered there is
+lost.  Of a ball of radius 1 (albedo 1, sky) 0.02 % is lost at 1e11 / unit, 0.7 % at 1e12, all at
+1e16 (measured)."""
+
+
+def _density(scene: SceneModel, tables: SceneTables) -> Iterator[Mistake]:
+    """Media in which light is scattered nearer to their boundary than float64 resolves."""
+    error: dict[str, float] = {}
+    if not scene.media or isinstance(scene.integrator, RayCast):
+        return
+    rows = [*boundaries(scene)]
+    for _, field, _, module in SHAPE_TABLES:
+        table = getattr(tables.geometry.shapes, field)
+        if table is None:
+            continue
+        lower, upper = module.bounds(table)
+        reach = np.maximum(np.abs(lower), np.abs(upper)).max(axis=1)
+        bound = SURFACE_ROUNDING * (2.0 * reach + (upper - lower).max(axis=1))
+        of = np.broadcast_to(table.material, bound.shape)  # one for a whole mesh
+        for row in np.unique(of[np.isfinite(bound)]):
+            at = (of == row) & np.isfinite(bound)
+            for name in {rows[row].interior, rows[row].exterior} - {None}:
+                error[str(name)] = max(error.get(str(name), 0.0), float(bound[at].max()))
+    for name, bound in error.items():
+        medium = scene.media[name]
+        densest = max((s for s, a in zip(medium.sigma_t, medium.albedo, strict=True) if a > 0.0),
+                      default=0.0) * medium.scale  # fmt: skip
+        if densest * bound > LOST:
+            yield Mistake(
+                f"light travels {1.0 / densest:.3g} in it, and points of its boundary have an "
+                f"error of up to {bound:.3g}: light that it scatters is lost; expected a 'sigma_t' "
+                f"times 'scale' of at most {LOST / bound:.2g}, or a surface",
+                ("media", name),
+            )
 
 
 def _darkness(scene: SceneModel, tables: SceneTables) -> Iterator[Mistake]:

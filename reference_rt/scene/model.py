@@ -4,10 +4,9 @@ import hashlib
 import importlib.metadata
 import json
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from functools import partial
-from itertools import chain
+from itertools import islice
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -16,6 +15,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from reference_rt.cameras import AnyCamera
 from reference_rt.cameras.film import Film
 from reference_rt.cameras.perspective import Perspective
+from reference_rt.core.diagnosis import what_else
 from reference_rt.core.model import AS_DIGEST, Description, as_linear, name_of
 from reference_rt.integrators import AnyIntegrator, Direct, RayCast
 from reference_rt.integrators import Path as PathTracing
@@ -40,6 +40,7 @@ from reference_rt.textures import AnyTexture, Product, texture_names
 from reference_rt.textures.tables import largest_uv_set
 from reference_rt.util import yaml_text
 from reference_rt.util.errors import (
+    MOST_TOLD,
     ReferenceUnavailableError,
     SceneError,
     SceneWarning,
@@ -57,8 +58,7 @@ which each operation takes two."""
 
 
 WITHOUT_LINES = "]"
-"""In place of the text of a scene that was read from another program's file: it is no YAML, so that
-errors found later name no line of it."""
+"""The text of a scene of another program's file: it is no YAML, so that no error names a line."""
 
 _NAMES = (str, str | None)
 """The types of fields that only name something."""
@@ -123,37 +123,10 @@ class SceneModel(Description):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        parts: Iterable[Callable[[], None]] = chain(
-            (partial(self._check_shape, shape, "shapes", i) for i, shape in enumerate(self.shapes)),
-            (
-                partial(self._check_shape, shape, "groups", name, k)
-                for name, shapes in self.groups.items()
-                for k, shape in enumerate(shapes)
-            ),
-            (partial(self._check_texture, name) for name in self.textures),
-            (partial(self._check_parts, *item) for item in self.materials.items()),
-            (partial(self._check_textures, one, "lights", i) for i, one in enumerate(self.lights)),
-            [partial(self._check_medium, self.camera.medium, "camera", "medium")],
-            [self._check_follows_media, self._check_environments, self._check_on_grid],
-        )
-        wrong = []
-        for check in parts:
-            try:
-                check()
-            except SceneError as error:
-                wrong.append(error)
-        if wrong:
-            raise together(wrong)
-        # All that is named is there.
-        for i, light in enumerate(self.lights):
-            self._check_uv_set(light, "lights", i)
-        for name, material in self.materials.items():
-            self._check_uv_set(material, "materials", name)
-            if isinstance(material, Wrapper):
-                try:
-                    material_paths(name, self.materials)
-                except ValueError as error:
-                    raise SceneError(str(error), ("materials", name)) from None
+        found = [*islice(self._wrong_parts(), MOST_TOLD)]
+        found = found or [*islice(self._wrong_in_nesting(), MOST_TOLD)]
+        if found:
+            raise together(found)
         return self
 
     @property
@@ -162,30 +135,61 @@ class SceneModel(Description):
         first surface that they meet."""
         return bool(self.media) or any(isinstance(m, NoSurface) for m in self.materials.values())
 
-    def _check_follows_media(self) -> None:
+    def _wrong_parts(self) -> Iterator[SceneError]:
+        """Of each part: names of nothing, and what does not fit to what is named."""
+        for i, shape in enumerate(self.shapes):
+            yield from self._wrong_in_shape(shape, "shapes", i)
+        for name, shapes in self.groups.items():
+            for i, shape in enumerate(shapes):
+                yield from self._wrong_in_shape(shape, "groups", name, i)
+        for name in self.textures:
+            yield from self._wrong_in_texture(name)
+        for name, material in self.materials.items():
+            yield from self._wrong_in_material(name, material)
+        for i, light in enumerate(self.lights):
+            yield from self._wrong_textures(light, "lights", i)
+        yield from self._wrong_medium(self.camera.medium, "camera", "medium")
+        yield from self._wrong_beside_media()
+        yield from self._wrong_environments()
+        yield from self._wrong_on_grid()
+
+    def _wrong_in_nesting(self) -> Iterator[SceneError]:
+        """Of what is named, and is there: textures that do not fit, materials of themselves."""
+        for i, light in enumerate(self.lights):
+            yield from self._wrong_uv_set(light, "lights", i)
+        for name, material in self.materials.items():
+            yield from self._wrong_uv_set(material, "materials", name)
+            if isinstance(material, Wrapper):
+                try:
+                    material_paths(name, self.materials)
+                except ValueError as error:
+                    yield SceneError(str(error), ("materials", name))
+
+    def _wrong_beside_media(self) -> Iterator[SceneError]:
         if self.has_media and not isinstance(self.integrator, PathTracing | RayCast):
             what = "media" if self.media else "the material 'none'"
-            raise SceneError(
+            yield SceneError(
                 f"'{self.integrator.type}' knows no {what}; expected 'path', or 'ray_cast', which "
                 "shows the first surfaces",
                 ("integrator", "type"),
             )
 
-    def _check_environments(self) -> None:
+    def _wrong_environments(self) -> Iterator[SceneError]:
         if sum(isinstance(light, Constant | EnvironmentMap) for light in self.lights) > 1:
-            raise SceneError("more than one environment; expected at most one", ("lights",))
+            yield SceneError("more than one environment; expected at most one", ("lights",))
 
-    def _check_on_grid(self) -> None:
-        """Check that an integrator that may need random numbers has no use for them, on a grid."""
+    def _wrong_on_grid(self) -> Iterator[SceneError]:
+        """An integrator that may need random numbers must have no use for them, on a grid."""
         if not isinstance(self.sampler, Grid) or self.integrator.deterministic:
             return
         kind = self.integrator.type
         if not isinstance(self.integrator, Direct):
-            raise SceneError(
+            yield SceneError(
                 f"'{kind}' needs random numbers, which 'grid' does not have; "
                 "expected 'sobol' or 'independent'",
                 ("sampler", "type"),
             )
+            return
         points = tuple(description for _, _, description, _ in LIGHT_TABLES)
         extended: list[tuple[tuple[str | int, ...], str]] = [
             (("lights", i), light.type)
@@ -198,40 +202,40 @@ class SceneModel(Description):
             if isinstance(material, Emissive)
         ]
         for path, light in extended:
-            raise SceneError(
+            yield SceneError(
                 f"'{kind}' needs random numbers for the light '{light}', which 'grid' does not "
                 "have; expected 'sobol' or 'independent', or lights without extent alone "
                 f"({', '.join(map(name_of, points))})",
                 path,
             )
 
-    def _check_texture(self, name: str) -> None:
-        """Check that a product's factors exist, and are no products."""
+    def _wrong_in_texture(self, name: str) -> Iterator[SceneError]:
+        """A product's factors must exist, and be no products."""
         texture = self.textures[name]
-        self._check_textures(texture, "textures", name)
+        yield from self._wrong_textures(texture, "textures", name)
         for k, of in enumerate(texture.of if isinstance(texture, Product) else ()):
-            if isinstance(self.textures[of], Product):
+            if isinstance(self.textures.get(of), Product):
                 message = f"'{of}' is a product itself; expected textures of other types"
-                raise SceneError(message, ("textures", name, "of", k))
+                yield SceneError(message, ("textures", name, "of", k))
 
-    def _check_textures(self, part: Description, *path: str | int) -> None:
-        """Check that the textures that a material, a light or a texture names exist."""
+    def _wrong_textures(self, part: Description, *path: str | int) -> Iterator[SceneError]:
+        """The textures that a material, a light or a texture names must exist."""
         for field, texture in texture_names(part).items():
             if texture not in self.textures:
                 only_names = type(part).__pydantic_fields__[str(field[0])].annotation in _NAMES
                 instead = "" if only_names else f"numbers{as_linear(texture)}, or "
                 message = no_such("texture", texture, self.textures, instead)
-                raise SceneError(message, (*path, *field))
+                yield SceneError(message, (*path, *field))
 
-    def _check_uv_set(self, part: Description, *path: str | int) -> None:
+    def _wrong_uv_set(self, part: Description, *path: str | int) -> Iterator[SceneError]:
         why = _OWN_UV.get(type(part))
         for field, texture in texture_names(part).items() if why else ():
             if largest_uv_set(texture, self.textures):
-                raise SceneError(f"'{texture}' has another 'uv_set' than 0; {why}", (*path, *field))
+                yield SceneError(f"'{texture}' has another 'uv_set' than 0; {why}", (*path, *field))
 
-    def _check_parts(self, name: str, material: Material) -> None:
-        """Check that the textures and materials that a material names exist and fit."""
-        self._check_textures(material, "materials", name)
+    def _wrong_in_material(self, name: str, material: Material) -> Iterator[SceneError]:
+        """The textures and materials that a material names must exist and fit."""
+        yield from self._wrong_textures(material, "materials", name)
         bases: tuple[str, ...] = ()
         if isinstance(material, Emissive):
             bases = ("base",)
@@ -239,55 +243,57 @@ class SceneModel(Description):
             bases = material.bases
         for field in bases:
             base = getattr(material, field)
-            self._check_material(base, "materials", name, field)
-            if base is not None and isinstance(self.materials[base], Emissive):
-                raise SceneError(
+            yield from self._wrong_name_of_material(base, "materials", name, field)
+            if isinstance(self.materials.get(base), Emissive):
+                yield SceneError(
                     f"'{base}' is emissive itself; expected a material that only scatters",
                     ("materials", name, field),
                 )
-            if base is not None and isinstance(self.materials[base], NoSurface):
-                raise SceneError(
+            if isinstance(self.materials.get(base), NoSurface):
+                yield SceneError(
                     f"'{base}' is no surface; expected a material that scatters",
                     ("materials", name, field),
                 )
 
-    def _check_shape(self, shape: Shape, *path: str | int) -> None:
-        self._check_material(shape.material, *path, "material")
+    def _wrong_in_shape(self, shape: Shape, *path: str | int) -> Iterator[SceneError]:
         sides = {side: getattr(shape, side) for side in ("interior", "exterior")}
-        for side, medium in sides.items():
-            self._check_medium(medium, *path, side)
-            if medium is not None and "of" in path:
-                message = "an operand bounds no medium; expected it on the whole solid"
-                raise SceneError(message, (*path, side))
-        if isinstance(shape, Solid):
-            if path.count("of") >= MOST_NESTED:
-                raise SceneError(
-                    f"set operations nest deeper than {MOST_NESTED}; expected fewer levels: one "
-                    "operation may have any number of operands",
-                    path,
-                )
-            for k, operand in enumerate(shape.of):
-                self._check_shape(operand, *path, "of", k)
         if isinstance(shape, Instance):
             if shape.group not in self.groups:
-                message = no_such("group", shape.group, self.groups)
-                raise SceneError(message, (*path, "group"))
+                yield SceneError(no_such("group", shape.group, self.groups), (*path, "group"))
             if shape.material is not None:
-                raise SceneError(
+                yield SceneError(
                     "an instance has the materials of its group; expected none here",
                     (*path, "material"),
                 )
             for side in [side for side, medium in sides.items() if medium is not None]:
                 message = "an instance has the media of its group's shapes; expected none here"
-                raise SceneError(message, (*path, side))
+                yield SceneError(message, (*path, side))
+            return
+        yield from self._wrong_name_of_material(shape.material, *path, "material")
+        for side, medium in sides.items():
+            if medium is not None and "of" in path:
+                message = "an operand bounds no medium; expected it on the whole solid"
+                yield SceneError(message, (*path, side))
+            else:
+                yield from self._wrong_medium(medium, *path, side)
+        if isinstance(shape, Solid):
+            if path.count("of") >= MOST_NESTED:
+                yield SceneError(
+                    f"set operations nest deeper than {MOST_NESTED}; expected fewer levels: one "
+                    "operation may have any number of operands",
+                    path,
+                )
+                return
+            for k, operand in enumerate(shape.of):
+                yield from self._wrong_in_shape(operand, *path, "of", k)
 
-    def _check_material(self, name: str | None, *path: str | int) -> None:
+    def _wrong_name_of_material(self, name: str | None, *path: str | int) -> Iterator[SceneError]:
         if name is not None and name not in self.materials:
-            raise SceneError(no_such("material", name, self.materials), path)
+            yield SceneError(no_such("material", name, self.materials), path)
 
-    def _check_medium(self, name: str | None, *path: str | int) -> None:
+    def _wrong_medium(self, name: str | None, *path: str | int) -> Iterator[SceneError]:
         if name is not None and name not in self.media:
-            raise SceneError(no_such("medium", name, self.media), path)
+            yield SceneError(no_such("medium", name, self.media), path)
 
     def __eq__(self, other: object) -> bool:
         """Equality of descriptions; file names do not count."""
@@ -415,8 +421,8 @@ class SceneModel(Description):
             raise SceneError(f"malformed: {error}", file=name, line=error.line) from None
         except RecursionError:
             raise SceneError("malformed: nested too deeply", file=name) from None
-        if not isinstance(data, dict):
-            raise SceneError("expected keys such as camera, shapes, lights", file=name, line=1)
+        if (other := what_else(data)) is not None:
+            raise SceneError(other, file=name, line=1)
         try:
             scene = cls._checked(data)
         except SceneError as error:

@@ -28,12 +28,15 @@ READER = 8
 """The most bytes per pixel that reading an image takes beside its values."""
 
 
-def read_image(path: Path, encoding: Encoding, scale: float = 1.0, layer: str = "") -> FloatArray:
-    """(height, width, 3) linear sRGB times `scale`, row 0 on top, finite and at least 0.  Raises
-    ValueError (what is wrong, what was expected)."""
+def read_image(
+    path: Path, encoding: Encoding, scale: float = 1.0, layer: str = "", beside: int = 0
+) -> FloatArray:
+    """(height, width, 3) linear sRGB times `scale`, row 0 on top, finite and at least 0.  beside:
+    bytes per pixel that are made of these and stored, too.  Raises ValueError (what is wrong, what
+    was expected)."""
     with reading(path, encoding, layer) as image:
         pixels = image.height * image.width
-        check_memory((24 + READER) * pixels, f"{image.width} x {image.height} pixels")
+        check_memory((24 + max(READER, beside)) * pixels, f"{image.width} x {image.height} pixels")
         colours = np.empty((image.height, image.width, 3))
         for rows, values, _ in image.strips(curve_of(image, encoding)):
             check_values(values, rows.start)

@@ -157,9 +157,9 @@ the line of each takes a walk through the text."""
 
 
 def together(errors: Iterable[SceneError]) -> SceneError:
-    """The first of some errors, of parts that were checked one by one; `others` are the rest, up to
-    MOST_TOLD in all."""
-    first, *rest = (one for error in errors for one in (error, *error.others))
+    """The first of some errors, of parts that were checked one by one; `others` are the rest, each
+    once, up to MOST_TOLD in all."""
+    first, *rest = dict.fromkeys(one for error in errors for one in (error, *error.others))
     first.others = tuple(rest[: MOST_TOLD - 1])
     return first
 

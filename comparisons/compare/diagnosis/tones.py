@@ -29,9 +29,19 @@ NEAR = 0.03
 """How near a fitted gamma must be to a customary one to be called by it."""
 
 
+SLIGHT = 0.03
+"""A gamma is farther from 1: of radiances far from 1 one that is nearer is a gain, in effect."""
+
+WHITE = 2.0
+"""Of a picture that was encoded most values are below it: brighter ones sRGB's curve, encoded and
+decoded by another, changes by a gain, in effect."""
+
+
 def _gamma(misfit: Misfit) -> Iterator[Hypothesis]:
     r = np.maximum(misfit.reference, 0.0)
     gamma = _fitted(misfit, lambda of, g: _positive(of.reference) ** g)
+    if abs(gamma - 1.0) < SLIGHT:
+        return
     evidence = f"the candidate is the reference to the power of {gamma:.4g}"
     yield of_pixels(
         "gamma", f"gamma of {gamma:.4g}", evidence, lambda p: _positive(p) ** gamma, r, 1
@@ -65,6 +75,8 @@ def _seen(misfit: Misfit) -> Callable[[FloatArray], FloatArray]:
 
 def _decoded(misfit: Misfit) -> Iterator[Hypothesis]:
     r, seen = np.maximum(misfit.reference, 0.0), _seen(misfit)
+    if np.median(r) > WHITE:
+        return
     decoded = _fitted(misfit, lambda of, g: _encoded(seen(of.reference)) ** g)
     yield of_pixels(
         "encoding",
@@ -78,6 +90,8 @@ def _decoded(misfit: Misfit) -> Iterator[Hypothesis]:
 
 def _encoded_by(misfit: Misfit) -> Iterator[Hypothesis]:
     r, seen = np.maximum(misfit.reference, 0.0), _seen(misfit)
+    if np.median(r) > WHITE:
+        return
     encoded_by = 1.0 / _fitted(misfit, lambda of, g: linear(seen(of.reference) ** g))
     yield of_pixels(
         "encoding",

@@ -165,8 +165,8 @@ OF_IMAGES = (
     ),
     _shared(
         "scale of a sky ignored", SKY, "lights/emitters/environment_map.py",
-        "read_image(path, self.encoding, self.scale, self.layer)",
-        "read_image(path, self.encoding, 1.0, self.layer)",
+        "read_image(path, self.encoding, self.scale, self.layer, BESIDE)",
+        "read_image(path, self.encoding, 1.0, self.layer, BESIDE)",
     ),
     _shared(
         "a sky turned backwards", SKY, "lights/emitters/environment_map.py",

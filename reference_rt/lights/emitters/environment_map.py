@@ -68,7 +68,7 @@ class EnvironmentMap(Description):
     def tabulate(self, folder: Path) -> "EnvironmentMaps":
         """One row.  Raises ValueError (what is wrong, what was expected)."""
         path = folder / self.file
-        texels = read_image(path, self.encoding, self.scale, self.layer)
+        texels = read_image(path, self.encoding, self.scale, self.layer, BESIDE)
         if len(texels) < 2:
             raise ValueError(f"{path}: has one row of pixels; expected two or more")
         with np.errstate(over="ignore", invalid="ignore"):
@@ -91,6 +91,10 @@ def orthogonal(steps: Transform) -> FloatArray:
         )
     left, _, right = np.linalg.svd(linear_part)
     return np.asarray(left @ right)  # the nearest one
+
+
+BESIDE = 12
+"""Bytes per texel of a map's sums and guides, beside those of its radiance."""
 
 
 class EnvironmentMaps(NamedTuple):

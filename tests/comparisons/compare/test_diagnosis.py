@@ -1,6 +1,6 @@
 """Diagnoses: each fault planted in a picture is named, and none where only noise differs."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from comparisons.compare.diagnosis import brightness, likeliest, of_rungs, tones
+from comparisons.compare.diagnosis import brightness, likeliest, of_rungs
 from comparisons.compare.diagnosis.contest import contenders, possible
+from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.diagnosis.misfit import Misfit
 from comparisons.compare.diagnosis.sample import POINTS
 from comparisons.results.case import FloatArray, Images, RungResult
@@ -319,18 +320,36 @@ def test_a_cause_reproduces_each_channel_and_each_block() -> None:
 
 
 def test_only_what_a_sample_leaves_possible_is_fitted_to_the_whole_picture() -> None:
-    """A gamma leaves much of a gain; in noise that hides both, the whole picture decides."""
+    """An offset leaves much of a gain; in noise that hides both, the whole picture decides."""
     rng = np.random.default_rng(3)
     reference = rng.uniform(0.5, 1.0, (96, 96, 3)) * np.linspace(0.1, 2.0, 96)[:, None, None]
     error = np.full(reference.shape, 0.01)
     noise = error * rng.normal(size=reference.shape)
-    for gain, families in ((1.2, ["gain"]), (1.0005, ["gain", "gamma"])):
+
+    def offset(misfit: Misfit) -> Iterator[Hypothesis]:
+        return (one for one in brightness.FITS[1](misfit) if one.family == "offset")
+
+    for gain, families in ((1.2, ["gain"]), (1.0005, ["gain", "offset"])):
         misfit = Misfit(Images(gain * reference + noise, reference, error))
         small = misfit.sampled()
         assert small.reference.size == 3 * POINTS < reference.size
-        fits = (brightness.FITS[0], tones.FITS[0])
+        fits = (brightness.FITS[0], offset)
         found = possible(list(contenders(fits, small, lambda misfit=misfit: misfit)))
         assert [one.family for one, _ in found] == families
+
+
+@pytest.mark.parametrize("power", [-20, -10, -7, -4, 0, 4, 7, 10, 20])
+def test_a_gain_is_one_at_any_exposure(power: int) -> None:
+    """Of radiances far from 1 a gamma of nearly 1 has the same effect, and so has sRGB's curve: a
+    picture without deep shadows does not tell them apart in noise."""
+    y, x = np.mgrid[:24, :32]
+    shape = 1.0 + 0.5 * np.sin(x / 5.0) * np.cos(y / 4.0)
+    clean = 2.0**power * shape[..., None] * np.array([1.0, 0.7, 0.4])
+    error = 0.08 * clean
+    noise = error * np.random.default_rng(5).normal(size=clean.shape)
+    cause = likeliest(Images(1.05 * clean + noise, clean, error))
+    assert cause is not None
+    assert cause.name.startswith("constant gain of 1.0")
 
 
 def test_what_is_no_single_cause_has_no_name() -> None:

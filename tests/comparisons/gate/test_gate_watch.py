@@ -1,6 +1,7 @@
 """`gate --watch`: judges again when a candidate was written, and leaves whole outputs."""
 
 import json
+import signal
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typer.testing import Result
 
 from comparisons.gate.request import Request
 from reference_rt.cli import watching
+from reference_rt.util.processes import Terminated
 
 RIGHT = np.random.default_rng(1).uniform(0.2, 1.0, (8, 12, 3))
 ASKED = ("gate", "c.exr", "--reference", "right.exr", "--noise-free", "--watch")
@@ -40,6 +42,28 @@ def gate(
         return invoke(*ASKED)
 
     return run
+
+
+@pytest.mark.parametrize(
+    ("interruption", "code"),
+    [
+        (KeyboardInterrupt(), 1),
+        (Terminated(signal.SIGINT), 1),
+        (Terminated(signal.SIGTERM), 143),
+        (Terminated(signal.SIGHUP), 129),
+    ],
+)
+def test_only_ctrl_c_ends_it_with_the_last_verdict(
+    gate: Any, interruption: KeyboardInterrupt, code: int
+) -> None:
+    """Who ends it otherwise, such as a supervisor, is told so: by no verdict."""
+    write("c.exr", 1.25 * RIGHT)
+
+    def end() -> None:
+        raise interruption
+
+    assert gate([nothing, end]).exit_code == code
+    assert verdict() == "differ"
 
 
 def nothing() -> None:

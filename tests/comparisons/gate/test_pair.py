@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from command_line import invoke
 from gate_checks import SCENE
+from picture_writers import pfm
 from test_pytest_plugin import project as project  # a fixture
 from test_pytest_plugin import run
 
@@ -148,11 +149,86 @@ def test_the_command() -> None:
         assert len(list(Path(f"out/candidates/{name}").glob("*.npy"))) == 4
     result = invoke("gate", "--pair", "out/candidates/A", "out/candidates/A")
     assert result.exit_code == 0, result.output
+    assert "A and B are the same files" in result.output
+    # Renderers that make the same pictures are told apart by no number of further ones.
+    result = invoke("gate", "--pair", right, right, "--suffix", ".npy", "--replicates", "4")
+    assert result.exit_code == 0, result.output
+    assert "A's 4 pictures are, one by one, B's, bit for bit" in result.output
     still = drive("1", "-1")
     result = invoke("gate", "--pair", still, still, "--suffix", ".npy")
     assert result.exit_code == 0, result.output
     assert "there is no noise" in result.output
     assert len(list(Path("out/candidates/A").glob("*.npy"))) == 2
+
+
+@pytest.mark.parametrize("kind", ["gamma", "fireflies"])
+@pytest.mark.parametrize("count", [1, 2, 3, 8])
+def test_the_same_pictures_on_both_sides_are_unchanged(kind: str, count: int) -> None:
+    """Also where so few, or such rare light, would be too noisy to tell."""
+    a = pictures(1, count, kind)
+    for b in (a, a[::-1]):
+        case = comparisons.gate_pair(a, b)
+        assert case.verdict == "unchanged"
+        assert "bit for bit" in case.reason
+    other = a.copy()
+    other[-1, 3, 4, 1] *= 1.0 + 1e-15
+    assert comparisons.gate_pair(a, other).verdict != "unchanged"
+    if count > 2:  # a picture of B is twice in A
+        assert comparisons.gate_pair(a[[0, *range(count - 1)]], a).verdict != "unchanged"
+    for nothing in (np.full_like(a, np.nan), np.zeros_like(a)):
+        assert comparisons.gate_pair(nothing, nothing).verdict != "unchanged"
+
+
+def test_ours_judges_the_same_pictures_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from gate_checks import pictures as rendered
+
+    monkeypatch.chdir(tmp_path)
+    Path("ball.yaml").write_text(SCENE)
+    wrong = 1.05 * rendered(count=8)
+    case = comparisons.gate_pair(wrong, wrong, scene="ball.yaml", judged=True, limit=0.01)
+    (vote,) = [rung for rung in case.rungs if rung.name == "witness"]
+    assert vote.numbers["alone"] == "reference_rt's"
+    assert case.verdict == "differ"
+
+
+@pytest.mark.usefixtures("gate_folder")
+def test_pictures_of_two_folders_belong_together_by_name() -> None:
+    a = pictures(1).astype(np.float32)
+    for name, gain in (("A", 1.0), ("B", 1.0003)):
+        Path(name).mkdir()
+        for k, picture in enumerate(a):
+            np.save(f"{name}/{k}.npy", np.float32(gain) * picture)
+    assert "paired: " in invoke("gate", "--pair", "A", "B").output
+    Path("B/._0.npy").write_bytes(b"of another system")
+    Path("A/notes.txt").touch()
+    assert "paired: " in invoke("gate", "--pair", "A", "B").output
+    # One more at the beginning: by position none would belong together.
+    Path("B/7.npy").rename("B/-1.npy")
+    result = invoke("gate", "--pair", "A", "B")
+    assert result.exit_code == 2
+    assert "--pair: A has no -1.npy; B has no 7.npy; expected pictures of the same" in result.stderr
+    for path in Path("B").glob("*.npy"):
+        path.unlink()
+    Path("B/x.npy").touch()
+    assert "A has no x.npy; B has no 0.npy, 1.npy, 2.npy, 3.npy, 4.npy, ..." in (
+        invoke("gate", "--pair", "A", "B").stderr
+    )
+
+
+@pytest.mark.usefixtures("gate_folder")
+def test_folders_of_two_formats_are_matched_without_suffixes() -> None:
+    """In any order of their names as texts: 10 is before 9."""
+    a = pictures(1).astype(np.float32)
+    for name in "AB":
+        Path(name).mkdir()
+    for k, picture in enumerate(a):
+        np.save(f"A/{k + 5}.npy", picture)
+        Path(f"B/{k + 5}.pfm").write_bytes(pfm(picture, "-1"))
+    assert "one by one, B's, bit for bit" in invoke("gate", "--pair", "A", "B").output
+    np.save("B/5.npy", a[0])  # which of the two is meant?
+    result = invoke("gate", "--pair", "A", "B")
+    assert result.exit_code == 2
+    assert "A has no 10.pfm, 11.pfm, 12.pfm, 5.pfm, 6.pfm, ...; B has no 10.npy" in result.stderr
 
 
 BALL = """\
@@ -185,8 +261,8 @@ def test_one_start_makes_all_pictures_of_the_first_look() -> None:
     )
     body = RENDERER.replace("import sys\n", "")
     Path("renderer.py").write_text(several + "".join(f"    {line}\n" for line in body.splitlines()))
-    right = drive("1", "0").replace("{seed}", "{seeds}")
-    result = invoke("gate", "--pair", right, right, "--suffix", ".npy", "--replicates", "2")
+    right, too = (drive(gain, "0").replace("{seed}", "{seeds}") for gain in ("1", "1.000001"))
+    result = invoke("gate", "--pair", right, too, "--suffix", ".npy", "--replicates", "2")
     assert result.exit_code == 0, result.output
     assert "look 1, 2 replicates" in result.output
     assert "paired: replicate k" in result.output  # seen as soon as there are enough

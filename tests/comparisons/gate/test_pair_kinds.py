@@ -64,8 +64,10 @@ def seen(shape: int) -> tuple[npt.NDArray[np.bool_], FloatArray]:
     return hits.shape == shape, np.abs((hits.n * d).sum(axis=-1)) / np.linalg.norm(d, axis=-1)
 
 
-def judged(a: FloatArray, b: FloatArray, spp: int = 64, of: Scene | None = None) -> Case:
-    return pair_case(from_array(a), from_array(b), Asked(scene=of, spp=spp))
+def judged(
+    a: FloatArray, b: FloatArray, spp: int = 64, of: Scene | None = None, rim: int = 0
+) -> Case:
+    return pair_case(from_array(a), from_array(b), Asked(scene=of, spp=spp, rim=rim))
 
 
 def named(case: Case) -> str:
@@ -74,27 +76,41 @@ def named(case: Case) -> str:
     return case.cause.name
 
 
-def test_missing_plugin() -> None:
+with_a_rim = pytest.mark.parametrize("rim", [0, 3])
+"""Also pictures whose rim is left out: causes that need the scene lose theirs, too."""
+
+
+@with_a_rim
+def test_missing_plugin(rim: int) -> None:
     shapes = scene().shapes
     other = rendered(scene().changed(shapes=[shapes[0], *shapes[2:]]), 100)
-    name = named(judged(right(0), other, of=scene()))
+    name = named(judged(right(0), other, of=scene(), rim=rim))
     assert name == "B's pictures are without shape 1 (sphere of the material red)"
 
 
-def test_half_of_a_sphere_is_black() -> None:
+def test_what_is_left_out_is_told() -> None:
+    (note,) = [n for n in judged(right(0), right(100), rim=3).notes if "outermost" in n]
+    assert "outermost 3 pixels on each side are left out" in note
+
+
+@with_a_rim
+def test_half_of_a_sphere_is_black(rim: int) -> None:
     on, _ = seen(0)
     half = on & (np.arange(32) < 16)
-    name = named(judged(np.where(half[..., None], 0.0, right(0)), right(100), of=scene()))
+    name = named(judged(np.where(half[..., None], 0.0, right(0)), right(100), of=scene(), rim=rim))
     assert name == "shape 0 (sphere of the material grey): 50 % of it are black"
 
 
-def test_index_of_materials_is_off() -> None:
+@with_a_rim
+def test_index_of_materials_is_off(rim: int) -> None:
     names = list(scene().materials)
     moved = [
         s.model_copy(update={"material": names[(names.index(s.material) + 1) % 4]})
         for s in scene().shapes
     ]
-    name = named(judged(right(0), rendered(scene().changed(shapes=moved), 100), of=scene()))
+    name = named(
+        judged(right(0), rendered(scene().changed(shapes=moved), 100), of=scene(), rim=rim)
+    )
     assert name == "B's pictures are of materials whose index is off by +1"
 
 
@@ -103,9 +119,10 @@ def test_index_of_pixels_is_off() -> None:
     assert named(judged(moved, right(100))).startswith("shift")
 
 
-def test_one_sided_rectangle() -> None:
+@with_a_rim
+def test_one_sided_rectangle(rim: int) -> None:
     on, _ = seen(2)
-    name = named(judged(right(0), np.where(on[..., None], 0.0, right(100)), of=scene()))
+    name = named(judged(right(0), np.where(on[..., None], 0.0, right(100)), of=scene(), rim=rim))
     assert name == "shape 2 (rectangle of the material sheet): back sides are black"
 
 
@@ -116,10 +133,11 @@ def test_filter_at_the_border() -> None:
     assert named(judged(right(0), weights * right(0))) == "filter at the picture's border"
 
 
-def test_fast_fresnel() -> None:
+@with_a_rim
+def test_fast_fresnel(rim: int) -> None:
     on, cosine = seen(0)
     factor = np.where(on, 1.0 + 0.5 * (1.0 - cosine) ** 5, 1.0)[..., None]
-    name = named(judged(right(0), factor * right(100), of=scene()))
+    name = named(judged(right(0), factor * right(100), of=scene(), rim=rim))
     assert name == "shape 0 (sphere of the material grey): another Fresnel term"
 
 

@@ -13,7 +13,7 @@ from galleries import gallery_of_lights, gallery_of_shapes
 
 import reference_rt as rt
 from comparisons.rungs.rays.camera import camera_rays
-from comparisons.translator.resolved import FORMAT, is_closed, tessellated, write_resolved
+from comparisons.translator.resolved import is_closed, tessellated, write_resolved
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes.csg import Difference, Intersection, Union
@@ -91,7 +91,10 @@ def test_everything_is_there(tmp_path):
     (tmp_path / "out").mkdir()
     write_resolved(scene, tmp_path / "out" / "a.json")
     found = json.loads((tmp_path / "out" / "a.json").read_text())
-    assert found["format"] == FORMAT
+    assert found["format"] == "reference_rt resolved scene"
+    # It is for other renderers: given to us, it is told in a sentence.
+    with pytest.raises(rt.SceneError, match="1: is a reference_rt resolved scene, for other rende"):
+        Scene.parse(json.dumps(found))
     assert [light["type"] for light in found["lights"]] == [light.type for light in scene.lights]
     assert found["materials"].keys() == scene.materials.keys()
     files = [found["textures"][name]["file"] for name in found["textures"]]

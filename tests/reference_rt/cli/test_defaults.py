@@ -1,11 +1,18 @@
 """Defaults of commands from a project's pyproject.toml."""
 
+import inspect
+import re
 from pathlib import Path
+from typing import get_args
 
 import pytest
-from command_line import SCENE, invoke
+from command_line import COMMANDS, SCENE, invoke
+from typer.core import TyperGroup
+from typer.main import get_command
+from typer.models import OptionInfo
 
-from reference_rt.cli.defaults import find
+from reference_rt.cli.defaults import IN_TEXTS, NEVER, find, of_command
+from reference_rt.cli.main import app
 from reference_rt.util.errors import MOST_TOLD
 
 
@@ -90,6 +97,94 @@ def test_the_file_of_a_named_picture_is_a_path_too(
     assert f"{Path('..', 'none.exr')}: there is no such file" in invoke(*words).stderr
     file.write_text("[tool.reference_rt.gate]\nbeside = ['Cycles=/elsewhere/c.exr']\n")
     assert "expected a path within the file's folder" in invoke(*words).stderr
+
+
+@pytest.mark.parametrize(
+    ("table", "option", "value", "seen"),
+    [
+        ("gate", "tone_curve", "curve.txt", "../curve.txt"),
+        ("gate", "tone-curve", "curve.txt:0.5", "../curve.txt:0.5"),
+        ("gate", "tone-curve", "here", "../here"),  # no suffix, but there is such a file
+        ("gate", "tone-curve", "here:2e-1", "../here:2e-1"),
+        ("gate", "tone-curve", "aces:0.5", "aces:0.5"),
+        ("gate", "beside", ["Cycles=c.exr", "b=a/here"], ["Cycles=../c.exr", "b=here"]),
+        ("preview", "to", "x.png", "../x.png"),
+        ("preview", "to", "sixel", "sixel"),
+        ("versions", "scene", ["my.yaml", "cornell_box"], ["../my.yaml", "cornell_box"]),
+        ("gate", "reference", ["r.exr"], ["../r.exr"]),
+    ],
+)
+def test_paths_in_texts_are_relative_to_the_file(
+    project: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    table: str,
+    option: str,
+    value: object,
+    seen: object,
+) -> None:
+    write(f"[tool.reference_rt.{table}]\n{option} = {value!r}\n")
+    Path("here").touch()
+    Path("a").mkdir()
+    monkeypatch.chdir("a")
+    group = get_command(app)
+    assert isinstance(group, TyperGroup)
+    file = find(Path.cwd())
+    assert file is not None
+    context = group.make_context("reference-rt", ["doctor"], resilient_parsing=True)
+    found = of_command(file, table, group.commands, context, complete=True)
+    assert [*found.values()] == [seen]
+
+
+def test_every_text_that_may_name_a_file_is_known() -> None:
+    """By what its help says."""
+    found = set()
+    for command in COMMANDS.values():
+        for parameter in inspect.signature(command, eval_str=True).parameters.values():
+            kind, *about = get_args(parameter.annotation)
+            is_text = bool(about) and isinstance(about[0], OptionInfo) and "str" in str(kind)
+            if is_text and re.search(r"\bfile\b", about[0].help or ""):
+                found.add(parameter.name.replace("_", "-"))
+    assert found >= {"tone-curve", "to", "scene"}
+    assert found <= NEVER | IN_TEXTS.keys() | {"define"}  # -D is no option of a table
+
+
+def test_what_a_text_names_stays_within_the_folder(project: Path) -> None:
+    for value in ("../curve.txt", "/curve.txt:2", "a/../../x", ".."):
+        write(f"[tool.reference_rt.gate]\ntone-curve = '{value}'\n")
+        result = invoke("gate", "a.npy", "--reference", "b.npy")
+        assert "expected a path within the file's folder" in result.stderr, value
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[tool]\nreference_rt = {check = {spp = 1}}",
+        "[tool]\nreference_rt.check.spp = 1",
+        "[ tool . reference_rt . check ]\nspp = 1",
+        "[tool.'reference_rt'.\"check\"]\nspp = 1",
+        "tool = {reference_rt = {check = {spp = 1}}}",
+        "tool.reference_rt.check.spp = 1",
+        "[tool.reference_rt]\ncheck.spp = 1",
+    ],
+)
+def test_a_section_is_found_in_any_notation_of_toml(project: Path, text: str) -> None:
+    write(text)
+    assert "tool.reference_rt.check.spp: is no option" in invoke("check", SCENE).stderr
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "tool = 1 # reference_rt",
+        "# [tool.reference_rt]\n",
+        "[project]\ndependencies = ['reference_rt']\n# see tool.reference_rt\n",
+        "[project]\ndependencies = ['reference_rt'\n",  # no TOML, but no section of ours either
+        "[tool.reference_rt_too]\ncheck = 1\n",
+    ],
+)
+def test_a_file_without_a_section_is_passed_by(project: Path, text: str) -> None:
+    write(text)
+    assert find(project) is None
 
 
 def test_a_file_that_may_not_be_read_is_passed_by(

@@ -31,6 +31,7 @@ from reference_rt.lights import (
 from reference_rt.lights.emitters import environment_map
 from reference_rt.lights.emitters.environment_map import EnvironmentMap, tabulate
 from reference_rt.sampling import distribution
+from reference_rt.util import memory
 
 U = 2.0**-53
 SIZES = [(2, 1), (2, 3), (3, 2), (5, 8), (16, 32)]
@@ -328,3 +329,16 @@ def test_bad_maps(tmp_path):
     }
     for step in steps.values():
         assert "rotations and reflections" in message(file="sky.png", transform=(step,))
+
+
+def test_what_does_not_fit_into_memory_is_refused_by_all_that_is_stored(tmp_path, monkeypatch):
+    """Sums and guides, too, and not the radiance alone."""
+    Image.new("RGB", (300, 200), (90, 90, 90)).save(tmp_path / "sky.png")
+    sky = EnvironmentMap(file="sky.png")
+    stored = sum(column.nbytes for column in sky.tabulate(tmp_path))
+    monkeypatch.setattr(memory, "machine_memory", lambda: stored)
+    sky.tabulate(tmp_path)
+    # Rows and columns have a few bytes more.
+    monkeypatch.setattr(memory, "machine_memory", lambda: 0.98 * stored)
+    with pytest.raises(ValueError, match=r"300 x 200 pixels, which take .* of memory"):
+        sky.tabulate(tmp_path)

@@ -53,7 +53,33 @@ MISTAKES = {
     "no shapes": (CAMERA + CAST, "", "no shapes"),
 }  # fmt: skip
 
+SMOKE = (
+    CAMERA + SKY + "materials: {n: {type: none}}\n"
+    "shapes: [{type: sphere, material: n, interior: m, center: [0, 0, 0]}]\n"
+    "media: {m: {type: homogeneous, sigma_t: 1e300, albedo: 1}}\n"
+)
+"""Whose light is scattered within 1e-300 of the boundary."""
+
+MISTAKES |= {
+    "too dense": (SMOKE, "media.m", "sigma_t"),
+    "too dense for its scale": (SMOKE.replace("1e300", "8, scale: 1e12"), "media.m", "sigma_t"),
+    "too dense for where it is": (
+        SMOKE.replace("1e300", "1e9").replace("center: [0, 0, 0]", "center: [0, 0, 1000]"),
+        "media.m",
+        "sigma_t",
+    ),
+    "too dense outside": (SMOKE.replace("interior", "exterior"), "media.m", "sigma_t"),
+    "too dense in one colour": (SMOKE.replace("1e300", "[0, 1e300, 1]"), "media.m", "sigma_t"),
+}
+
 MEANT = {
+    "dense": SMOKE.replace("1e300", "1e9"),
+    "soot": SMOKE.replace("albedo: 1", "albedo: 0"),
+    "soot of one colour": SMOKE.replace("1e300, albedo: 1", "[1e300, 1, 1], albedo: [0, 1, 1]"),
+    "an endless boundary": SMOKE.replace("type: sphere", "type: plane").replace(
+        ", center: [0, 0, 0]", ""
+    ),
+    "first surfaces of what is dense": SMOKE + CAST,
     "ray casting needs no light": CAMERA + BALL + CAST,
     "a sky and nothing else": CAMERA + SKY,
     "tele lens": fov(2) + BALL + SKY,
@@ -98,6 +124,27 @@ def test_scenes_of_the_project_have_none():
 def test_a_scene_of_python_has_the_default_camera():
     scene = rt.Scene(shapes=(rt.Sphere(),), lights=(rt.Constant(radiance=(1, 1, 1)),))
     assert likely_mistakes(scene, rt.build_tables(scene)) == []
+
+
+@pytest.mark.parametrize("z", [0, 1000])
+def test_light_is_lost_in_media_that_are_too_dense(z):
+    """Of dense media the light does not depend on the density: up to the one that is told nothing
+    is lost, and far beyond it much."""
+    text = SMOKE.replace("albedo: 1", "albedo: 0.9").replace(
+        "center: [0, 0, 0]", f"center: [0, 0, {z}]"
+    )
+    text = text.replace("eye: [0, 0, 5]", f"eye: [0, 0, {z + 5}], target: [0, 0, {z}]")
+    text += "film: {width: 4, height: 4}\nsampler: {type: independent, spp: 1024}\n"
+    (mistake,), _ = found(text)
+    most = float(mistake.message.split("at most ")[1].split(",")[0])
+
+    def light(density):
+        return rt.render(rt.Scene.parse(text.replace("1e300", f"{density:.17g}"))).colour.mean()
+
+    right = light(1e5)
+    assert light(most) == pytest.approx(right, rel=2e-3)
+    with pytest.warns(rt.SceneWarning, match="light that it scatters is lost"):
+        assert light(1e4 * most) < 0.95 * right
 
 
 def test_a_changed_scene_is_still_without_camera():

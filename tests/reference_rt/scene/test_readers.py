@@ -41,3 +41,10 @@ def test_a_reader_is_called_for_its_suffix(monkeypatch):
     assert Scene.load("x/a.ABC", {"n": "1"}).description == "a.ABC {'n': '1'} False"
     assert Scene.load("a.abc").description == "a.abc {} False"
     assert Scene.load("a.abc", allow_missing=True).description == "a.abc {} True"
+
+
+def test_gltf_under_another_name_is_told():
+    """One sentence, and not an error for each of its keys."""
+    with pytest.raises(SceneError, match=r"expected a file name that ends in \.gltf") as caught:
+        Scene.parse('{"asset": {"version": "2.0"}, "scenes": [], "nodes": []}')
+    assert not caught.value.others
