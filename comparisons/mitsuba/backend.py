@@ -23,7 +23,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
-from unittest import mock
 
 import platformdirs
 
@@ -271,10 +270,14 @@ def set_variant(mi: Any, name: str) -> None:
         made_of = getattr(common, "ADIntegrator", object)
         return module if issubclass(made_of, getattr(mi, "CppADIntegrator", ())) else reload(module)
 
-    with warnings.catch_warnings(), mock.patch.object(importlib, "reload", reloaded):
-        # After a thousand definitions Dr.Jit warns each time that this is slow.
-        warnings.simplefilter("ignore", RuntimeWarning)
-        mi.set_variant(name)
+    importlib.reload = reloaded  # what Mitsuba calls; of any other module it is the usual one
+    try:
+        with warnings.catch_warnings():
+            # After a thousand definitions Dr.Jit warns each time that this is slow.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            mi.set_variant(name)
+    finally:
+        importlib.reload = reload
 
 
 @functools.cache
