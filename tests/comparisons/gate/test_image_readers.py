@@ -295,7 +295,7 @@ def test_what_would_not_fit_into_memory_is_refused_by_its_header(tmp_path, consu
     said = {
         gate_of: "declares 524288 x 524288",
         bitmap_of: "which take 2816.0 GiB of memory",  # three bytes a pixel, and eight to read it
-        environment_of: "which take 8192.0 GiB of memory",
+        environment_of: "which take 9216.0 GiB of memory",
     }[consumer]
     with pytest.raises((rt.SceneError, ImageError), match=said):
         consumer(tmp_path / "a.png")

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import HELPERS, SCENES, every_law, every_light, every_shape
+from builders import HELPERS, SCENES
+from galleries import GALLERIES
 
 import reference_rt as rt
 
@@ -25,20 +26,22 @@ np.savez(sys.argv[3], **here.pictures(Path(sys.argv[2]), sys.argv[4] == "True"))
 def scenes(folder, more):
     """Every shape, material, texture, light, integrator and sampler, and two of the usual scenes,
     which lack most of them; `more`: also shapes by paths, and materials and lights by Whitted."""
-    shapes = rt.Scene.load(every_shape(folder))
-    laws = rt.Scene.load(every_law(folder))
-    lights = rt.Scene.load(every_light(folder))
+    layers = ((), ("albedo", "normal", "position"), ("depth", "id", "variance"))
+    shapes, materials, lights = (
+        gallery(folder).changed(film=SMALL.model_copy(update={"layers": some}))
+        for gallery, some in zip(GALLERIES, layers, strict=True)
+    )
     whitted = {"integrator": rt.Whitted(), "sampler": rt.Grid(spp=4)}
     box = rt.Scene.load(SCENES / "cornell_box.yaml")
     spheres = rt.Scene.load(SCENES / "spheres_whitted.yaml")
     others = {
         "shapes": shapes,
-        "laws, whitted": laws.changed(**whitted),
+        "materials, whitted": materials.changed(**whitted),
         "lights, whitted": lights.changed(**whitted),
     }
     return (others if more else {}) | {
         "shapes, ray cast": shapes.changed(integrator=rt.RayCast(), sampler=None),
-        "laws": laws,
+        "materials": materials,
         "lights": lights,
         "lights, direct": lights.changed(integrator=rt.Direct(light_samples=2, bsdf_samples=2)),
         "cornell box": box.changed(film=SMALL, sampler=rt.Sobol(spp=2)),
