@@ -1,6 +1,7 @@
 """A run: processes that crash, results that are resumed, distinct findings, outputs, exit codes."""
 
 import json
+import os
 import shlex
 import sys
 from dataclasses import replace
@@ -11,14 +12,16 @@ from builders import HELPERS
 from command_line import invoke
 from junitparser import JUnitXml
 
-from comparisons.experiments.fuzz import results, summary
+from comparisons.experiments.fuzz import results, summary, worker
 from comparisons.experiments.fuzz import run as running
-from comparisons.experiments.fuzz.finding import Checked, Effort
+from comparisons.experiments.fuzz.finding import Checked, Effort, Request
 from comparisons.experiments.fuzz.planted import Planted, feature_of, source_faults
 from comparisons.experiments.fuzz.planted import summary as planted_summary
 from comparisons.experiments.fuzz.run import Plan, run
 from comparisons.experiments.fuzz.schema import features as known
 from comparisons.experiments.fuzz.summary import write_page
+from comparisons.mitsuba.backend import FORCE, choose
+from comparisons.runs import provenance
 from reference_rt.scene.model import SceneModel
 from reference_rt.util.errors import UsageError
 from reference_rt.util.workers import Threads
@@ -95,6 +98,27 @@ def test_findings_of_one_cause_are_one(tmp_path, fake_workers):
     assert "geometry: ours wrong: t" in page
     assert "&lt;a test&gt;" in page
     assert "{type: sphere}" in page
+
+
+@pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_rgb"])
+def test_the_variant_is_handed_on_and_told(variant, tmp_path, fake_workers, monkeypatch):
+    """To the processes, to the command that repeats a finding, and on the page."""
+    monkeypatch.setattr(provenance, "backend", choose)  # this process may have one already
+    invoke("fuzz", "--variant", variant, "--count", 5, "--first", 4, "--reduce", 0, "-o", tmp_path)
+    document = json.loads((tmp_path / "fuzz.json").read_text())
+    assert variant in document["provenance"]["mitsuba"]
+    assert document["settings"]["effort"]["variant"] == variant
+    (listed,) = document["findings"]
+    assert (f"--variant {variant}" in listed["again"]) == (variant != "scalar_rgb")
+
+
+@pytest.mark.parametrize("asked", ["scalar_rgb", "llvm_ad_rgb"])
+def test_a_process_takes_the_variant(asked, tmp_path, monkeypatch):
+    monkeypatch.delenv(FORCE, raising=False)
+    monkeypatch.setattr(worker, "do_scene", lambda request: None)
+    effort = Effort(variant=asked)
+    worker.carry_out(Request(number=0, out=tmp_path, files=tmp_path, effort=effort))
+    assert os.environ[FORCE] == asked
 
 
 def test_the_page_can_be_read_by_everybody(tmp_path, fake_workers, check_page):

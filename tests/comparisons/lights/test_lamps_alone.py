@@ -15,6 +15,7 @@ from reference_rt.scene.examples import examples
 from reference_rt.shapes import Plane, Primitive
 from reference_rt.shapes.csg import Difference
 
+SPP = 256
 LAMPS = [
     *(examples(of)[0] for of in types_of(Primitive) if of is not Plane),
     rt.Sphere(transform=({"scale": (1, 0.4, 1)},)),
@@ -37,9 +38,11 @@ def test_a_lamp_of_which_no_light_is_drawn(lamp: Any, radiance: Any) -> None:
     )
     with scalar(), coarser(0.35):
         counterpart = load(scene)
-        if counterpart.no_pictures_reason or counterpart.solids:
-            return  # our integrator renders it
-        seen = picture(counterpart.mi_scene, 64, 1)
-    ours = rt.render(scene.changed(sampler=rt.Independent(spp=256))).colour
+        if counterpart.solids:
+            return  # no emitter of Mitsuba's scene, which loads
+        seen = picture(counterpart.mi_scene, SPP, 1)
+    ours = rt.render(scene.changed(sampler=rt.Independent(spp=SPP))).colour
     assert seen.any() == ours.any()  # a polygon may show its back
-    assert np.abs(seen.mean(axis=(0, 1)) - ours.mean(axis=(0, 1))).max() < 0.06
+    # Samples are 0, or at most the brightest: their deviation is half of it at most.
+    error = 0.5 * ours.max() * (2.0 / (48 * SPP)) ** 0.5
+    assert np.abs(seen.mean(axis=(0, 1)) - ours.mean(axis=(0, 1))).max() <= 5.0 * error
