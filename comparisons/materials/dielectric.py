@@ -1,6 +1,6 @@
 """Smooth glass."""
 
-from comparisons.materials.glass import GLASS, look_of_glass, pbrt_glass, relative_index
+from comparisons.materials.glass import GLASS, OF_FRESNEL, look_of_glass, pbrt_glass, relative_index
 from comparisons.materials.material import Gltf, MaterialType
 from comparisons.mitsuba.plugin_table import PluginTable
 from comparisons.renderers import NoCounterpartError
@@ -28,7 +28,7 @@ DIELECTRIC = MaterialType(
     to_mitsuba=TABLE.write,
     from_mitsuba={"dielectric": TABLE.reader(Dielectric)},
     note=None,
-    errors=None,
+    errors=OF_FRESNEL,
     to_cycles=_to_cycles,
     to_gltf=Gltf(look_of_glass, nearly="KHR_materials_transmission"),
     to_pbrt=lambda material, writing, both_sides: pbrt_glass("dielectric", material),

@@ -10,7 +10,7 @@ from comparisons.materials.coat import (
     of_vertices,
     write_coated,
 )
-from comparisons.materials.glass import relative_index
+from comparisons.materials.glass import OF_FRESNEL, relative_index
 from comparisons.materials.material import Errors, Gltf, MaterialType
 from comparisons.mitsuba.context import TranslationContext
 from comparisons.mitsuba.plugin_table import PluginTable
@@ -38,7 +38,7 @@ PLASTIC = MaterialType(
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"plastic": TABLE.reader(Plastic)},
     note=_note,
-    errors=Errors(relative=lambda material: 0.0, absolute=lambda material: PASSED),
+    errors=Errors(relative=OF_FRESNEL.relative, absolute=lambda material: PASSED),
     to_cycles=None,
     to_gltf=Gltf(look_of_coat, nearly="a diffuse base below a highlight"),
     to_pbrt=None,

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.geometry.frame import UNIT_ROUNDOFF
+from comparisons.materials.glass import fresnel_error
 from comparisons.materials.material import MOST, Errors, Gltf, MaterialType
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.context import TranslationContext, UntranslatableError
@@ -100,7 +101,8 @@ def tint_error(material: Any) -> float:
 
 def errors_of_shares(material: Any) -> float:
     """The relative error of a principled material but for its clear coat."""
-    return tint_error(material) + min(MOST, rest_error(material))
+    index = material.relative_ior if isinstance(material, Principled) else material.eta
+    return tint_error(material) + min(MOST, rest_error(material)) + fresnel_error(index)
 
 
 def _relative(material: Principled) -> float:

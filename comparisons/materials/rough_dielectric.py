@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from comparisons.materials.glass import GLASS, look_of_glass, pbrt_glass
+from comparisons.materials.glass import GLASS, OF_FRESNEL, look_of_glass, pbrt_glass
 from comparisons.materials.material import Gltf, MaterialType
 from comparisons.materials.microfacets import (
     DISTRIBUTION,
@@ -39,7 +39,7 @@ ROUGH_DIELECTRIC = MaterialType(
     to_mitsuba=_to_mitsuba,
     from_mitsuba={"roughdielectric": _from_mitsuba},
     note=note_of_beckmann,
-    errors=None,
+    errors=OF_FRESNEL,
     to_cycles=None,
     to_gltf=Gltf(look_of_glass, nearly="KHR_materials_transmission"),
     to_pbrt=_to_pbrt,

@@ -15,7 +15,7 @@ from comparisons.materials.coat import (
     of_vertices,
     write_coated,
 )
-from comparisons.materials.glass import relative_index
+from comparisons.materials.glass import OF_FRESNEL, relative_index
 from comparisons.materials.material import MOST, Errors, Gltf, MaterialType
 from comparisons.materials.microfacets import ALPHA, DISTRIBUTION, SAMPLING, read_alpha
 from comparisons.mitsuba.context import TranslationContext
@@ -80,9 +80,11 @@ def table_error(material: RoughPlastic) -> float:
 
 
 def _relative(material: RoughPlastic) -> float:
-    """Only the base is tabulated.  White maximises interreflection between base and coat."""
+    """But for the Fresnel factor: of the base alone, which is tabulated.  White maximises
+    interreflection between base and coat."""
     white = {"reflectance": (1.0, 1.0, 1.0), "specular": (0.0, 0.0, 0.0)}
-    return min(MOST, MARGIN * table_error(material.model_copy(update=white)))
+    base = min(MOST, MARGIN * table_error(material.model_copy(update=white)))
+    return base + OF_FRESNEL.relative(material)
 
 
 COARSE = 0.03

@@ -137,6 +137,12 @@ class ShapeSizes:
             found[rows] = self._least[copy[rows]] * feature
         return found
 
+    def bend_of(self, hits: Intersections) -> FloatArray:
+        """(n,): the smallest length over which the normal changes at each hit: `feature_of`, whose
+        planes have the unit of their uv, but no normal that changes.  Infinite for a miss."""
+        is_finite = np.array([*(leaf.is_finite for leaf in self.leaves), False])
+        return np.where(is_finite[self.leaf_of(hits)], self.feature_of(hits), np.inf)
+
     def slip_of(self, o: FloatArray, hits: Intersections) -> FloatArray:
         """(n,): how far float32 moves points of ellipsoids along them, by the rounding of the rays'
         origins o (n, 3) in the coordinates of the unit sphere; 0 elsewhere.

@@ -160,7 +160,7 @@ class _Seen(NamedTuple):
         near = np.linalg.norm(self.p - ours.p, axis=1) <= tolerance
         same_hit = np.where(is_hit & self.hit, near, is_hit == self.hit)
         turned = np.linalg.norm(self.n - ours.n, axis=1)
-        bend = tolerance / np.maximum(sizes.feature_of(ours), tolerance)
+        bend = tolerance / np.maximum(sizes.bend_of(ours), tolerance)
         from_front = np.einsum("ni,ni->n", ours.n, d) < 0.0
         alike = np.where(from_front, self.front & (turned <= NORMAL + 2.0 * bend), ~self.front)
         return np.asarray(same_hit, bool), np.asarray(alike | ~is_hit, bool)

@@ -116,8 +116,8 @@ def _errors(
             e = slide(comparer.sizes, rays.o, rays.d, ours, theirs.sag)
             if name == "normal":
                 n = np.where(theirs.stands_in[:, None], theirs.ns, theirs.n)
-                feature = np.minimum(comparer.sizes.feature_of(ours), theirs.height)
-                bound = e / feature + theirs.turn
+                bend = np.minimum(comparer.sizes.bend_of(ours), theirs.height)
+                bound = e / bend + theirs.turn
                 ratio = np.linalg.norm(values - n, axis=1) / bound
             else:
                 ratio = np.abs(column - theirs.t) / e  # directions are unit vectors

@@ -54,13 +54,14 @@ class Comparer:
         normal = np.where(theirs.stands_in[:, None], theirs.ns, theirs.n)
         with np.errstate(divide="ignore", invalid="ignore"):
             e = slide(self.sizes, rays.o, rays.d, ours, theirs.sag)
-            turn = e / np.minimum(self.sizes.feature_of(ours), theirs.height)
+            turn = e / np.minimum(self.sizes.bend_of(ours), theirs.height)
+            moved = e / np.minimum(self.sizes.feature_of(ours), theirs.height)
             error_t = np.abs(theirs.t - ours.t) * length / e
             error_n = np.linalg.norm(normal - ours.n, axis=1) / (turn + theirs.turn)
             bent = 2.0 * turn / self.sizes.straightness_of(ours)
             error_ns = np.linalg.norm(theirs.ns - ours.ns, axis=1) / (bent + theirs.turn)
             error_uv = (
-                np.linalg.norm(self._spot(theirs, ours) - self._spot(ours, ours), axis=1) / turn
+                np.linalg.norm(self._spot(theirs, ours) - self._spot(ours, ours), axis=1) / moved
             )
         error_uv[~theirs.has_uv] = 0.0
         errors = np.column_stack([error_t, error_n, error_ns, error_uv])

@@ -115,7 +115,7 @@ def of_direct_light(context: LightContext) -> FloatArray:
 def _feature(context: LightContext) -> FloatArray:
     """(n,): the smallest length on which the normals of the hit shapes change, in either
     renderer."""
-    return np.minimum(context.sizes.feature_of(context.hits), context.theirs.height)
+    return np.minimum(context.sizes.bend_of(context.hits), context.theirs.height)
 
 
 def cut_off(scene: Scene) -> float:
@@ -142,8 +142,9 @@ def _of_critical(context: LightContext, d: FloatArray, w: FloatArray, n: FloatAr
     """(n,): the relative error, at most 1, of light from w that rough glass refracts into -d.
 
     Next to the critical angle Mitsuba loses digits: it computes the cosine c behind the microfacet
-    as a root of 1 - (eta sin)², of which a share of c² / eta² is left.  Where the scene has several
-    glasses, the largest error of any counts.
+    as a root of 1 - (eta sin)², of which a share of c² / eta² is left.  And where the index is
+    nearly 1, the half vector -d + eta w nearly vanishes, and with it the sum of cosines that it
+    divides by, squared.  Where the scene has several glasses, the largest error of any counts.
     """
     leaves = context.tables.materials.leaves
     tables = [table for table in (leaves.rough_dielectrics, leaves.principleds) if table]
@@ -155,7 +156,8 @@ def _of_critical(context: LightContext, d: FloatArray, w: FloatArray, n: FloatAr
         length = np.linalg.norm(half, axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
             cosines = [np.abs(np.sum(v * half, axis=1)) / length for v in (wo, wi)]
-            error = ROUNDED * max(index, 1.0 / index) ** 2 / np.minimum(*cosines) ** 2
+            ratio = max(index, 1.0 / index)
+            error = ROUNDED * ((ratio / np.minimum(*cosines)) ** 2 + 2.0 * ratio / length)
         largest = np.maximum(largest, np.nan_to_num(error, nan=1.0))
     return np.minimum(largest, 1.0)
 
