@@ -41,9 +41,10 @@ FAINT, DARK = 1e-3, 1e-5
 OFF_MEAN = 1e-9
 """A pixel's own value against the mean of its trees, over the picture's white: both are float64."""
 
-SIDE = 2
-"""Rays along each side of a pixel of a noisy picture that are asked whether they are beyond
-precision."""
+SIDES, RAYS = (2, 16), 1 << 18
+"""Least and most rays along each side of a pixel of a noisy picture that are asked whether they are
+beyond precision, and how many there may be in all where that allows for more: a sheet seen edge-on
+lies between the rays of a coarse grid."""
 
 OFTEN = 2.0
 """How much light indirect effects change, over the chance of a wrong hit: surfaces that reflect
@@ -127,10 +128,7 @@ def _noisy(
     share: float,
 ) -> Rest:
     """Of noisy pictures."""
-    film = scene.film
-    every = np.arange(film.width * film.height)
-    beyond = beyond_precision(scene, tables, counterpart, _rays(scene, every, SIDE))
-    keep = ~beyond.reshape(len(every), -1).any(axis=1).reshape(film.height, film.width, 1)
+    keep = ~pixels_beyond(scene, tables, counterpart)[..., np.newaxis]
     assert rendered.replicates is not None
     candidate, reference = rendered.replicates
     more, usual = OFTEN * share, Margins()
@@ -152,6 +150,15 @@ def _noisy(
     return _of_what_is_left(text, float((mean * keep).sum()), float(mean.sum()))
 
 
+def pixels_beyond(scene: Scene, tables: SceneTables, counterpart: Counterpart) -> BoolArray:
+    """(height, width): in which pixels a ray is beyond precision."""
+    film = scene.film
+    every = np.arange(film.width * film.height)
+    side = int(np.clip(np.sqrt(RAYS / len(every)), *SIDES))
+    beyond = beyond_precision(scene, tables, counterpart, _rays(scene, every, side))
+    return np.asarray(beyond.reshape(film.height, film.width, -1).any(axis=2))
+
+
 def _rays(scene: Scene, pixels: IntArray, side: int) -> Rays:
     """side x side rays of each of the pixels, by number, row by row: those of a grid of samples."""
     row, column = np.divmod(pixels, scene.film.width)
@@ -160,4 +167,4 @@ def _rays(scene: Scene, pixels: IntArray, side: int) -> Rays:
     return Rays(*camera_rays(scene, x.ravel(), y.ravel()))
 
 
-__all__ = ["rest_of"]
+__all__ = ["pixels_beyond", "rest_of"]

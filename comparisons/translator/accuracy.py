@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from comparisons.materials import type_of
 from comparisons.materials.material import Errors
-from reference_rt.materials import Bump, Emissive, Material, NormalMap, Wrapper
+from reference_rt.materials import Bump, Emissive, Mask, Material, NormalMap, Wrapper
 from reference_rt.rendering.scene import Scene
 
 
@@ -38,14 +38,31 @@ def is_tilted(scene: Scene, name: str | None) -> bool:
     return any(is_tilted(scene, getattr(material, field, None)) for field in fields)
 
 
+def lets_pass(scene: Scene, name: str | None) -> bool:
+    """Whether material `name` may let light pass to the other side: refracted, straight, or through
+    a mask."""
+    if name is None:
+        return False
+    material = scene.materials[name]
+    if isinstance(material, Mask):
+        return True
+    if isinstance(material, Wrapper | Emissive):
+        return any(lets_pass(scene, getattr(material, field)) for field in _fields(material))
+    return material.transmits
+
+
+def _fields(material: Wrapper | Emissive) -> tuple[str, ...]:
+    """The fields that name the materials that it is made of."""
+    return material.bases if isinstance(material, Wrapper) else ("base",)
+
+
 def _leaves(scene: Scene, name: str | None) -> Iterator[Material]:
     """The materials that material `name` is made of."""
     if name is None:
         return
     material: Material = scene.materials[name]
     if isinstance(material, Wrapper | Emissive):
-        fields = material.bases if isinstance(material, Wrapper) else ("base",)
-        for field in fields:
+        for field in _fields(material):
             yield from _leaves(scene, getattr(material, field))
     else:
         yield material

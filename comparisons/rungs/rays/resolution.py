@@ -19,10 +19,10 @@ from comparisons.mitsuba.hits import BoolArray, rows_of
 from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.rays import Rays, mixed_rays
+from comparisons.translator.accuracy import lets_pass
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.ray import UNIT_ROUNDOFF
 from reference_rt.integrators.scene_tables import SceneTables
-from reference_rt.materials import Dielectric, RoughDielectric, ThinDielectric
 from reference_rt.rendering import query
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
@@ -334,11 +334,6 @@ def _ways(
 
 
 def _is_clear(scene: Scene, sizes: ShapeSizes, hits: Intersections) -> BoolArray:
-    """(n,): whether the hit surface is a transparent dielectric."""
-    names = [leaf.material for leaf in sizes.leaves]
-    clear = [
-        name is not None
-        and isinstance(scene.materials[name], Dielectric | RoughDielectric | ThinDielectric)
-        for name in names
-    ]
+    """(n,): whether the hit surface lets light pass."""
+    clear = [lets_pass(scene, leaf.material) for leaf in sizes.leaves]
     return np.array([*clear, False])[sizes.leaf_of(hits)]

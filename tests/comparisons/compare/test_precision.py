@@ -10,7 +10,7 @@ from comparisons.compare import pictures
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, compare_scene
 from comparisons.compare.judge import Rendered, of_replicates
-from comparisons.compare.precision import rest_of
+from comparisons.compare.precision import pixels_beyond, rest_of
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.results.case import FloatArray, Images
 from comparisons.rungs.limited import Rest
@@ -140,6 +140,26 @@ def test_light_that_is_scattered_may_differ_as_often_as_rays_go_wrong(paths: Cas
     """By twice the share: 0.3 with a share of 0.2, not with one of 0.1."""
     assert paths.rest(_right_half(1.3), 0.2).status == "agree"
     assert paths.rest(_right_half(1.3), 0.1).status == "differ"
+
+
+EDGE_ON = """
+camera: {type: perspective, eye: [0, 0, 4], target: [0, 0, 0], up: [0, 1, 0], fov: 20}
+film: {width: 15, height: 11}
+integrator: {type: direct}
+materials: {glass: {type: principled, spec_trans: 0.9}}
+shapes:
+  - {type: box, material: glass,
+     transform: [{scale: [1, 0.4, 2e-5]}, {rotate: {axis: [0, 1, 0], degrees: 89.7}}]}
+lights: [{type: constant, radiance: 1}]
+"""
+"""A sheet of glass thinner than Mitsuba's ray epsilon, a tenth of a pixel wide in the middle."""
+
+
+def test_a_sheet_seen_edge_on_is_found() -> None:
+    scene = Scene.parse(EDGE_ON)
+    found = pixels_beyond(scene, scene.tables, load(scene))
+    assert found[2:9, 7].all()
+    assert not np.delete(found, 7, axis=1).any()
 
 
 @pytest.mark.parametrize("kind", [TREES, PATHS])

@@ -165,6 +165,45 @@ def test_which_rays_are_beyond_precision_is_a_matter_of_geometry() -> None:
         np.testing.assert_array_equal(again, found)
 
 
+SHEET = """
+camera: {{type: orthographic, eye: [0, 0, -3], target: [0, 0, 0], up: [0, 1, 0], width: 1.6}}
+film: {{width: 16, height: 12}}
+integrator: {{type: path}}
+materials:
+  grey: {{type: diffuse}}
+  glass: {{type: rough_dielectric}}
+  m: {material}
+shapes: [{{type: box, material: m, transform: [{{scale: [1, 1, 1e-5]}}]}}]
+lights: [{{type: constant, radiance: 1}}]
+"""
+"""A sheet that is thinner than Mitsuba's ray epsilon, seen face on."""
+
+
+@pytest.mark.parametrize(
+    ("material", "passes"),
+    [
+        ("{type: diffuse}", False),
+        ("{type: plastic}", False),
+        ("{type: principled}", False),
+        ("{type: two_sided, base: grey}", False),
+        ("{type: dielectric}", True),
+        ("{type: thin_dielectric}", True),
+        ("{type: rough_dielectric, alpha: 0.3}", True),
+        ("{type: principled, spec_trans: 0.5}", True),
+        ("{type: principled_thin, diff_trans: 1}", True),
+        ("{type: mask, base: grey}", True),
+        ("{type: blend, first: grey, second: glass}", True),
+        ("{type: emissive, radiance: 1, base: glass}", True),
+    ],
+)
+def test_rays_that_pass_a_sheet_miss_its_other_side(material: str, passes: bool) -> None:
+    """So that light which ours keeps inside goes on in Mitsuba; of what is opaque it does not."""
+    scene = Scene.parse(SHEET.format(material=material))
+    x, y = np.random.default_rng(5).uniform(-0.7, 0.7, (2, 40))
+    rays = Rays(np.column_stack([x, y, x - x - 3.0]), np.tile([0.0, 0.0, 1.0], (40, 1)))
+    assert (beyond_precision(scene, scene.tables, load(scene), rays) == passes).all()
+
+
 # ---- a fault of light does not make its own excuse ----------------------------------------------
 
 LIT = """
