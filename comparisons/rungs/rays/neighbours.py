@@ -20,9 +20,17 @@ from reference_rt.rendering import query
 from reference_rt.scene.build import build_tables
 from reference_rt.shapes import Cylinder
 
-MOST_OUTLIERS = (200, 32)
-"""Most pixels that are arbitrated by our tracer and by Mitsuba: each takes 193 ray trees for each
-radius, 30 ms in scalar variants of Mitsuba.  The rest count as differing."""
+AT_ONCE = (200, 32)
+"""Most pixels that are arbitrated at a time by our tracer and by Mitsuba: each takes 193 ray trees
+for each radius, 30 ms in scalar variants of Mitsuba.  Where these are not all explained, the rest
+count as differing."""
+
+FINER = (400, (1.0, 0.5, 0.2))
+"""Moves and radii of a last search for the few that are left: a gradient that bends has values
+between those of two moves that are no mixture of them, by the square of their distance."""
+
+MOST_FINE = 8
+"""Most pixels of that search."""
 
 BENT = 4.0
 """A normal that is off by an angle turns a mirrored ray by twice that; two surfaces that stand in
@@ -87,20 +95,40 @@ def explained_by_neighbours(
     Where Mitsuba's own value changes that much within its rounding, it is not resolved.  Rays are
     moved as `_radii` says, and next to meshes that stand in for shapes by their errors.
     """
+    settled, (ours, theirs) = np.zeros(len(bound), bool), sides
+    step = -(-len(bound) // AT_ONCE[0])
+    for first in range(step):
+        rows = np.arange(first, len(bound), step)
+        some = (ours[0][rows], ours[1]), (theirs[0][rows], theirs[1])
+        settled[rows] = _explained(context, rays.rows(rows), some, bound[rows])
+        if not settled[rows].all():
+            break
+    return settled
+
+
+def _explained(
+    context: TreeContext,
+    rays: Rays,
+    sides: tuple[tuple[FloatArray, Radiance], tuple[FloatArray, Radiance]],
+    bound: FloatArray,
+) -> BoolArray:
     settled = np.zeros(len(bound), bool)
-    if len(bound) == 0:
-        return settled
     angle = ROUNDINGS * UNIT_ROUNDOFF
     radii = _radii(context, rays)
 
-    def search(radius: FloatArray, angle: float, only: BoolArray | None = None) -> None:
+    def search(
+        radius: FloatArray,
+        angle: float,
+        only: BoolArray | None = None,
+        moves: tuple[int, tuple[float, ...]] = (NEIGHBOURS, RADII),
+    ) -> None:
         for k in (0, 1):
             radiance, wanted = sides[k][1], sides[1 - k][0]
             rows = np.flatnonzero(~settled if only is None else only & ~settled)
-            rows = rows[: MOST_OUTLIERS[k]]
+            rows = rows[: AT_ONCE[k]]
             if len(rows) == 0:
                 return
-            values = values_around(rays.rows(rows), radius[rows], angle, radiance)
+            values = values_around(rays.rows(rows), radius[rows], angle, radiance, moves)
             settled[rows] = [
                 is_mixture(*row) for row in zip(wanted[rows], values, bound[rows], strict=True)
             ]
@@ -114,12 +142,14 @@ def explained_by_neighbours(
         if context.tables.materials.oriented is not None:
             turn += max(error.twist for error in errors)
         radius, angle = radii[0] + sag, angle + BENT * turn
-        rows = np.flatnonzero(~settled)[: MOST_OUTLIERS[0]]
+        rows = np.flatnonzero(~settled)
         near = np.zeros(len(bound), bool)
         near[rows] = _near(
             context, set(stand_ins), rays.rows(rows), radius[rows], angle, sides[0][1]
         )
         search(radius, angle, near)
+        if np.count_nonzero(near & ~settled) <= MOST_FINE:
+            search(radius, angle, near, FINER)
     return settled
 
 
@@ -145,17 +175,24 @@ def _near(
     return np.asarray(~same.all(axis=(1, 2)))
 
 
-def values_around(rays: Rays, radius: FloatArray, turn: float, value: Radiance) -> FloatArray:
+def values_around(
+    rays: Rays,
+    radius: FloatArray,
+    turn: float,
+    value: Radiance,
+    moves: tuple[int, tuple[float, ...]] = (NEIGHBOURS, RADII),
+) -> FloatArray:
     """The values `value(origins, directions)` next to m rays: (m, k, 3).
 
     Origins move by up to `radius` (m,); unit directions stay, or turn by `turn` radians, on the
-    opposite side of the sphere.  All moves of all rays are evaluated in one call.
+    opposite side of the sphere.  moves: how many, and by which parts of the radius.  All moves of
+    all rays are evaluated in one call.
     """
-    moves = directions(NEIGHBOURS)
-    ways = np.roll(moves, NEIGHBOURS // 2, axis=0)
-    still = np.zeros((1, 3))
-    move = np.concatenate([still, *(factor * moves for factor in RADII for _ in (0, 1))])
-    way = np.concatenate([still, *(size * ways for _ in RADII for size in (0.0, turn))])
+    count, radii = moves
+    spread, still = directions(count), np.zeros((1, 3))
+    ways = np.roll(spread, count // 2, axis=0)
+    move = np.concatenate([still, *(factor * spread for factor in radii for _ in (0, 1))])
+    way = np.concatenate([still, *(size * ways for _ in radii for size in (0.0, turn))])
     origins = rays.o[:, None] + move * radius[:, None, None]
     turned = rays.d[:, None] + way
     turned /= np.linalg.norm(turned, axis=2, keepdims=True)
