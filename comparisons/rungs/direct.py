@@ -15,13 +15,17 @@ from comparisons.rungs.rays.lamp_images import is_beside, magnified, slopes_of_i
 from comparisons.rungs.rays.light_context import DISTANT, POINT_LIKE, LightContext, kind_of
 from comparisons.rungs.rays.light_context import described as described_light
 from comparisons.rungs.rays.light_error import bounds, slopes_of
-from comparisons.rungs.rays.mitsuba_light import _lamp, is_blocked, is_dark, lamp_at, mitsuba_direct
+from comparisons.rungs.rays.mitsuba_light import (
+    _lamp,
+    is_blocked,
+    is_dark,
+    leads_past,
+    mitsuba_direct,
+)
 from comparisons.rungs.rays.rays import described, mixed_rays
 from comparisons.rungs.rays.resolution import (
-    AROUND,
     NOT_BEYOND,
     elsewhere,
-    off_surface,
     too_many_elsewhere,
 )
 from reference_rt.core.arrays import FloatArray, IntArray
@@ -228,7 +232,7 @@ def _compare(
     allowed = 2.0 * bound[wrong]
     some = context.of(wrong)
     settled |= is_beside(some, light, u, theirs[wrong], allowed, scale[wrong])
-    past = _leads_past(some, target[wrong], lamp[wrong], radius[wrong])
+    past = leads_past(some, target[wrong], lamp[wrong], radius[wrong])
     if kind_of(context, light) == AREA:
         doubled = is_doubled(context.sizes, tables, some.hits.p, target[wrong])
         settled, past = settled | doubled, past | doubled
@@ -251,21 +255,6 @@ def _compare(
         ratio=value[lit].sum(axis=1) / theirs[lit].sum(axis=1),
         cosine=np.abs(their_cosine[lit]),
     )
-
-
-def _leads_past(
-    context: LightContext, target: FloatArray, lamp: IntArray, radius: FloatArray
-) -> arbiter.BoolArray:
-    """(n,): whether a shadow ray towards a point on a lamp meets another shape, another face, or
-    none, for a move of the point by float32's error, (n,): the lamp is narrower than that, or the
-    point at its rim or at an edge of its faces.  No light is asked."""
-    o = off_surface(context.sizes, context.hits, target - context.hits.p)
-    face = lamp_at(context, target).primitive
-    past = np.zeros(len(target), bool)
-    for move in arbiter.directions(AROUND):
-        met = query.intersect(context.tables, o, target + radius[:, None] * move - o)
-        past |= (met.shape != lamp) | (met.primitive != face)
-    return past & (lamp >= 0)
 
 
 def _in_plane(context: LightContext, target: FloatArray) -> arbiter.BoolArray:

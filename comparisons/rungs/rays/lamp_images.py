@@ -8,7 +8,8 @@ import numpy as np
 
 from comparisons.rungs.rays.arbiter import BoolArray
 from comparisons.rungs.rays.light_context import LightContext, kind_of
-from comparisons.rungs.rays.light_error import MIDDLE
+from comparisons.rungs.rays.light_error import MIDDLE, of_area
+from comparisons.rungs.rays.mitsuba_light import lamp_at, leads_past
 from comparisons.rungs.rays.slopes import NEAR, slopes
 from comparisons.rungs.rays.tree_error import Nodes
 from reference_rt.core.arrays import FloatArray, IntArray
@@ -83,8 +84,9 @@ def changes_of_lamps(
     context: LightContext, nodes: Nodes, n: int, setup: WhittedSetup
 ) -> tuple[FloatArray, FloatArray]:
     """The least and the greatest change, (n, 3) each, of the light that Whitted's ray tracing takes
-    from the middles of textured lamps, within float32's error of (u, v) at each node of the trees
-    of n rays: a mirror may show a surface from which a lamp is far, or seen edge-on.
+    from the middles of lamps, within float32's error of the point at each node of the trees of n
+    rays: a texture may have another colour there, and rays pass a lamp that is narrower than that
+    error.  A mirror may show a surface from which a lamp is far, or seen edge-on.
 
     Each lamp is moved alone, with all others off, so that the changes of several add up.
     context: of the nodes' rays.
@@ -96,9 +98,11 @@ def changes_of_lamps(
         return low, high
     for light in np.flatnonzero((choice.kind == AREA) & (choice.probability > 0.0)).tolist():
         ours = query.direct_light(tables, rays.o, rays.d, light, MIDDLE)
+        for total, change in zip((low, high), _of_narrow(context, ours), strict=True):
+            np.add.at(total, nodes.row, nodes.weight * change)
         scale = magnified(context, light, ours.target, ours.pdf)
         if not scale.any():
-            break  # no lamp has a texture
+            continue  # it has no texture
         alone = np.where(np.arange(len(choice.kind)) == light, choice.probability, 0.0)
         lights = tables.lights._replace(choice=choice._replace(probability=alone))
         lit = dataclasses.replace(tables, lights=lights)
@@ -115,6 +119,24 @@ def changes_of_lamps(
             most[some] = np.maximum(most[some], changes.max(axis=0))
         for total, change in ((low, least), (high, most)):
             np.add.at(total, nodes.row, nodes.weight * change)
+    return low, high
+
+
+def _of_narrow(context: LightContext, ours: query.DirectLight) -> tuple[FloatArray, FloatArray]:
+    """(n, 3) each: the least and the greatest change of the light of a lamp, of which float32 moves
+    the corners: all its light is lost where that is more than its width."""
+    low, high = np.zeros((2, *ours.contribution.shape))
+    lit = np.flatnonzero(ours.contribution.any(axis=1) & (ours.pdf > 0.0))
+    if len(lit) == 0:
+        return low, high
+    some, target = context.of(lit), ours.target[lit]
+    p, sizes = some.hits.p, context.sizes
+    lamp = lamp_at(some, target).shape.astype(np.int64)
+    radius = sizes.frame.delta(p, target, sizes.reach_of(lamp))
+    value, relative = ours.contribution[lit] / ours.pdf[lit, None], of_area(some, target)
+    missed = leads_past(some, target, lamp, radius)
+    low[lit] = -value * np.where(missed, 1.0, np.minimum(relative, 1.0))[:, None]
+    high[lit] = value * relative[:, None]
     return low, high
 
 

@@ -15,12 +15,13 @@ from comparisons.rungs.rays.light_context import (
     described,
     kind_of,
 )
+from comparisons.rungs.rays.mitsuba_light import lamp_at
 from comparisons.rungs.rays.rays import Rays
 from comparisons.rungs.rays.slide import slide
 from comparisons.rungs.rays.slopes import is_steep, moved, slopes, turned
 from comparisons.translator.accuracy import accuracy, coat_error, is_tilted
 from reference_rt.core.arrays import FloatArray
-from reference_rt.lights import ENVIRONMENT
+from reference_rt.lights import AREA, ENVIRONMENT
 from reference_rt.materials import Emissive
 from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
@@ -109,7 +110,17 @@ def of_direct_light(context: LightContext) -> FloatArray:
         cosine = np.sum(w * hits.ns[lit], axis=1) / np.linalg.norm(w, axis=1)
         some = context.of(lit)
         total[lit] += bounds(some, light, target, (value, value, cosine), 0.0)
+        if kind_of(context, light) == AREA:
+            total[lit] += value.max(axis=1) * of_area(some, target)
     return total
+
+
+def of_area(context: LightContext, target: FloatArray) -> FloatArray:
+    """(n,): the relative error of the area of the lamps that points (n, 3) lie on: float32 rounds
+    their vertices by u of their largest coordinate along either end of their smallest length."""
+    lamp, sizes = lamp_at(context, target), context.sizes
+    largest = np.maximum(sizes.frame.largest(target), sizes.reach_of(lamp.shape))
+    return np.asarray(4.0 * UNIT_ROUNDOFF * largest / sizes.feature_of(lamp))
 
 
 def _feature(context: LightContext) -> FloatArray:

@@ -17,7 +17,7 @@ from comparisons.rungs.rays.light_context import (
     number_of,
 )
 from comparisons.rungs.rays.rays import Rays
-from comparisons.rungs.rays.resolution import off_surface, own_error
+from comparisons.rungs.rays.resolution import AROUND, off_surface, own_error
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.lights import AREA
 from reference_rt.rendering import query
@@ -47,9 +47,11 @@ def mitsuba_direct(
             wi = sample.d
         else:
             ray.maxt = dr.inf
-            # The first hit along the unshortened shadow ray must be the front of the light itself.
+            # The first hit along the unshortened shadow ray must be the front of the light itself;
+            # one that passes a lamp by sees the sky, whose light is not the lamp's.
             found = scene.ray_intersect(ray, visible)
             radiance = scene.emitted(found, visible)
+            visible = visible & found.is_valid() if kind == AREA else visible
         local = si.to_local(wi)
         f_cos = si.bsdf().eval(mi.BSDFContext(), si, local, visible)
         return dr.select(visible, f_cos * radiance, 0.0), local.z
@@ -119,6 +121,21 @@ def lamp_at(context: LightContext, target: FloatArray) -> query.Intersections:
     """What lies at the points (n, 3) on an area light: the light's own surface."""
     step = JUST_BEFORE * (target - context.hits.p)
     return query.intersect(context.tables, target - step, 2.0 * step)
+
+
+def leads_past(
+    context: LightContext, target: FloatArray, lamp: IntArray, radius: FloatArray
+) -> arbiter.BoolArray:
+    """(n,): whether a shadow ray towards a point on a lamp meets another shape, another face, or
+    none, for a move of the point by float32's error, (n,): the lamp is narrower than that, or the
+    point at its rim or at an edge of its faces.  No light is asked."""
+    o = off_surface(context.sizes, context.hits, target - context.hits.p)
+    face = lamp_at(context, target).primitive
+    past = np.zeros(len(target), bool)
+    for move in arbiter.directions(AROUND):
+        met = query.intersect(context.tables, o, target + radius[:, None] * move - o)
+        past |= (met.shape != lamp) | (met.primitive != face)
+    return past & (lamp >= 0)
 
 
 def _lamp(context: LightContext, light: int, target: FloatArray) -> IntArray:
