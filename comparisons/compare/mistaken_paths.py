@@ -1,5 +1,5 @@
 """Hypotheses about paths that are traced wrongly: no shadow rays, light counted twice, a density
-that is not that of the directions, a factor that was forgotten.
+that is not that of the directions, a factor that was forgotten, or that each bounce has too much.
 
 A small path tracer of ours takes the scene's own answers (hits, values of materials, samples of
 lights) and keeps apart what each kind of light adds at each edge. A mistake is another sum of these
@@ -10,6 +10,7 @@ paths, so that the change has little noise.
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from comparisons.compare.diagnosis.misfit import REST
 from comparisons.results.case import FloatArray
 from reference_rt.core.arrays import IntArray
 from reference_rt.integrators import Path
+from reference_rt.integrators.path import ROULETTE_CAP as CAP
+from reference_rt.materials import Dielectric, ThinDielectric
 from reference_rt.rendering.query.hits import BoolArray
 from reference_rt.rendering.scene import Scene
 
@@ -55,6 +58,8 @@ class _Parts:
     open_lamps_later: FloatArray
     points_without_cosine: FloatArray
     points_times_distance: FloatArray
+    bounces: dict[str, FloatArray]
+    """By the name of a mistake of BOUNCES: how it changes the picture."""
 
     @property
     def points(self) -> FloatArray:
@@ -98,6 +103,57 @@ CHANGES: dict[str, Change] = {
 }
 """By the name of a mistake: how it changes the picture."""
 
+
+class _Bounce(NamedTuple):
+    """What n paths do at a surface.  cosine (n,): of the direction that they take;  is_delta,
+    passes (n,): whether it is mirrored or refracted, and whether it leads to the other side;
+    chance (n,): of that, where a dielectric chose, else 1;  survival (n,): the chance that Russian
+    roulette lets them go on, by what they carry;  edge: edges before it."""
+
+    cosine: FloatArray
+    is_delta: BoolArray
+    passes: BoolArray
+    chance: FloatArray
+    survival: FloatArray
+    edge: int
+
+
+def _without_fresnel(mirrored: float) -> Callable[[_Bounce], FloatArray]:
+    """Dielectrics that mirror this share of the light at all angles, but where all is mirrored."""
+
+    def factor(at: _Bounce) -> FloatArray:
+        share = np.where(at.passes, 1.0 - mirrored, mirrored)
+        return np.where(at.chance < 1.0, share / at.chance, 1.0)
+
+    return factor
+
+
+def _each(factor: float) -> Callable[[_Bounce], FloatArray]:
+    return lambda at: np.full_like(at.cosine, factor)
+
+
+def _roulette(first: int) -> Callable[[_Bounce], FloatArray]:
+    return lambda at: at.survival if at.edge + 1 >= first else np.ones_like(at.survival)
+
+
+FACTORS = {"1/2": 0.5, "0.8": 0.8, "0.9": 0.9, "2": 2.0, "pi": math.pi, "1/pi": 1.0 / math.pi}
+
+TWICE = "the cosine is multiplied twice"
+
+BOUNCES: dict[str, Callable[[_Bounce], FloatArray]] = {
+    TWICE: lambda at: np.where(at.is_delta, 1.0, at.cosine),
+    **{f"each bounce is multiplied by {name}": _each(of) for name, of in FACTORS.items()},
+    **{
+        f"Russian roulette from bounce {first} on does not compensate for the paths that it ends": (
+            _roulette(first)
+        )
+        for first in (1, 2, 3, 5)
+    },
+    "dielectrics mirror nothing, without Fresnel's formulas": _without_fresnel(0.0),
+    "dielectrics mirror half of the light, without Fresnel's formulas": _without_fresnel(0.5),
+}
+"""By the name of a mistake: by what it multiplies what paths carry on from a surface."""
+
 UNIFORM = "directions are uniform, and weighted as if they had the cosine's density"
 
 
@@ -112,6 +168,7 @@ def mistaken_paths(
     edges = LONGEST if own.max_depth is None else min(own.max_depth, LONGEST)
     right, uniform = (_traced(scene, edges, wrong, threads) for wrong in (False, True))
     changes = {name: [change(parts) for parts in right] for name, change in CHANGES.items()}
+    changes |= {name: [parts.bounces[name] for parts in right] for name in BOUNCES}
     changes[UNIFORM] = [
         b.points + b.met - a.points - a.met for a, b in zip(right, uniform, strict=True)
     ]
@@ -133,7 +190,8 @@ def _traced(scene: Scene, edges: int, uniform: bool, threads: int | None) -> lis
     for seed in range(BATCHES):
         sums = tracer.traced(spp, seed)
         pictures = {name: x.reshape(height, width, 3) / spp for name, x in sums.items()}
-        found.append(_Parts(**pictures))
+        bounces = {name: pictures.pop(name) for name in BOUNCES}
+        found.append(_Parts(**pictures, bounces=bounces))
     return found
 
 
@@ -146,6 +204,9 @@ class _Tracer:
         self._bsdfs = [scene.bsdf(name or None) for name in names]
         self._number = np.array([names.index(shape.material or "") for shape in scene.shapes])
         self._pixels = scene.film.height * scene.film.width
+        self._splits = np.array(
+            [isinstance(scene.materials.get(n), Dielectric | ThinDielectric) for n in names]
+        )
         self._is_lit = scene.light_sources().probability.any()
 
     def _add(self, name: str, pixel: IntArray, light: FloatArray) -> None:
@@ -154,7 +215,8 @@ class _Tracer:
 
     def traced(self, spp: int, seed: int) -> dict[str, FloatArray]:
         """`sums` of so many paths of each pixel."""
-        self.sums = {field.name: np.zeros((self._pixels, 3)) for field in fields(_Parts)}
+        names = [*(field.name for field in fields(_Parts) if field.name != "bounces"), *BOUNCES]
+        self.sums = {name: np.zeros((self._pixels, 3)) for name in names}
         self._rng = np.random.default_rng(seed)
         self._trace(spp)
         return self.sums
@@ -166,33 +228,55 @@ class _Tracer:
         o, d = (x.reshape(-1, 3) for x in rays)
         pixel = np.tile(np.arange(self._pixels), spp)
         weight, is_seen = np.ones_like(o), np.ones(len(o), dtype=bool)
+        # What paths of each mistake carry, over what they should, and the square of the index.
+        wrong, eta2 = dict.fromkeys(BOUNCES, np.ones(len(o))), np.ones(len(o))
         for edge in range(self._edges):
-            # What is seen, in mirrors too, does not change.
-            met = np.flatnonzero(~is_seen)
-            if len(met):
-                emitted = scene.radiance(
-                    o[met], d[met], 1, integrator=Path(max_depth=1), threads=self._threads
-                ).mean
-                self._add("met", pixel[met], weight[met] * emitted)
+            if edge > 0:
+                light = weight * self._emitted(o, d)
+                # What is seen, in mirrors too, does not change but by bounces.
+                self._add("met", pixel[~is_seen], light[~is_seen])
+                for name, factor in wrong.items():
+                    self._add(name, pixel, (factor - 1.0)[:, None] * light)
             hits = scene.intersect(o, d, threads=self._threads)
             alive = np.flatnonzero(hits.hit)
             if edge + 1 == self._edges or not len(alive):
                 return
-            pixel, weight = pixel[alive], weight[alive]
+            pixel, weight, eta2 = pixel[alive], weight[alive], eta2[alive]
+            wrong = {name: factor[alive] for name, factor in wrong.items()}
             at = _Surface(hits.p[alive], hits.ns[alive], hits.uv[alive], -d[alive])
             number = self._number[hits.shape[alive]]
             if self._is_lit:
-                self._add_direct(at, number, pixel, weight, "first" if edge == 0 else "later")
-            wi, factor, is_seen = self._scattered(at, number)
-            o, d, weight = at.p + _beginning(at.p)[:, None] * wi, wi, weight * factor
+                where = "first" if edge == 0 else "later"
+                self._add_direct(at, number, pixel, weight, where, wrong)
+            wi, factor, is_seen, chance, eta = self._scattered(at, number)
+            weight, eta2 = weight * factor, eta2 * eta * eta
+            survival = np.minimum(weight.max(axis=1) * eta2, CAP)
+            cosine = at.local(wi)[:, 2]
+            passes = cosine * at.wo[:, 2] < 0.0
+            bounce = _Bounce(np.abs(cosine), is_seen, passes, chance, survival, edge)
+            wrong = {name: factor * BOUNCES[name](bounce) for name, factor in wrong.items()}
+            o, d = at.p + _beginning(at.p)[:, None] * wi, wi
             goes_on = np.flatnonzero((weight > 0.0).any(axis=1))
             o, d, weight = o[goes_on], d[goes_on], weight[goes_on]
-            pixel, is_seen = pixel[goes_on], is_seen[goes_on]
+            pixel, is_seen, eta2 = pixel[goes_on], is_seen[goes_on], eta2[goes_on]
+            wrong = {name: factor[goes_on] for name, factor in wrong.items()}
+
+    def _emitted(self, o: FloatArray, d: FloatArray) -> FloatArray:
+        """The light (n, 3) that comes from what rays meet first."""
+        return self._scene.radiance(
+            o, d, 1, integrator=Path(max_depth=1), threads=self._threads
+        ).mean
 
     def _add_direct(
-        self, at: "_Surface", number: IntArray, pixel: IntArray, weight: FloatArray, where: str
+        self,
+        at: "_Surface",
+        number: IntArray,
+        pixel: IntArray,
+        weight: FloatArray,
+        where: str,
+        wrong: dict[str, FloatArray],
     ) -> None:
-        """Light of one sample of a light at each point."""
+        """Light of one sample of a light at each point.  wrong: see `_trace`."""
         light = self._scene.sample_lights(
             at.p, self._rng.random((len(at.p), 3)), threads=self._threads
         )
@@ -216,24 +300,32 @@ class _Tracer:
             self._add(f"open_{kind}_{where}", pixel[of], arriving[of])
         of = light.is_delta[lit]
         cosine = np.maximum(np.abs(wi[lit, 2]), 1e-6)[:, None]
+        # Lamps and skies count where paths meet them.
+        for name, factor in wrong.items():
+            times = factor[lit][:, None] * (cosine if name == TWICE else 1.0)
+            self._add(name, pixel[of], ((times - 1.0) * shown)[of])
         self._add("points_without_cosine", pixel[of], (shown / cosine)[of])
         distance = np.where(light.distance < FAR, light.distance, 1.0)[lit, None]
         self._add("points_times_distance", pixel[of], (shown * distance)[of])
 
     def _scattered(
         self, at: "_Surface", number: IntArray
-    ) -> tuple[FloatArray, FloatArray, BoolArray]:
-        """Directions in the world, the weights of the paths that follow them, and whether they are
-        mirrored or refracted, so that no sample of a light finds what they meet."""
+    ) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray, FloatArray]:
+        """Directions in the world, the weights of the paths that follow them, whether they are
+        mirrored or refracted, so that no sample of a light finds what they meet, the chance of
+        that where a dielectric chose, else 1, and the index behind over that before."""
         u = self._rng.random((len(at.p), 3))
         wi, factor = np.zeros_like(at.p), np.zeros_like(at.p)
         is_delta = np.zeros(len(at.p), dtype=bool)
+        chance, eta = np.ones((2, len(at.p)))
         for k, bsdf in enumerate(self._bsdfs):
             one = np.flatnonzero(number == k)
             if not len(one):
                 continue
             found = bsdf.sample(at.wo[one], u[one], at.uv[one], threads=self._threads)
-            wi[one], is_delta[one] = found.wi, found.is_delta
+            wi[one], is_delta[one], eta[one] = found.wi, found.is_delta, found.eta
+            if self._splits[k]:
+                chance[one] = np.where(found.pdf > 0.0, found.pdf, 1.0)
             factor[one] = np.where(found.pdf[:, None] > 0.0, found.weight, 0.0)
             if self._uniform:
                 of = one[~found.is_delta]
@@ -243,7 +335,7 @@ class _Tracer:
                 wi[of] = np.stack([side * np.cos(angle), side * np.sin(angle), up], axis=1)
                 value = bsdf.evaluate(at.wo[of], wi[of], at.uv[of], threads=self._threads)
                 factor[of] = math.pi * value / np.maximum(z, 1e-12)[:, None]
-        return at.world(wi), factor, is_delta
+        return at.world(wi), factor, is_delta, chance, eta
 
 
 def _beginning(p: FloatArray) -> FloatArray:

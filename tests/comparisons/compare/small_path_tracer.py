@@ -25,6 +25,9 @@ lights:
   - {type: point, position: [2, 4, 2], intensity: [20, 18, 15]}
 """
 
+GLASS = SCENE.replace("clay: {type: diffuse, reflectance: 0.7}", "clay: {type: dielectric}")
+"""With a ball of glass."""
+
 CENTRE, RADIUS = np.array([0.0, 0.6, 0.0]), 0.6
 LIGHT, INTENSITY = np.array([2.0, 4.0, 2.0]), np.array([20.0, 18.0, 15.0])
 SKY, EYE, TARGET = 0.5, np.array([0.0, 1.2, 4.0]), np.array([0.0, 0.6, 0.0])
@@ -59,6 +62,30 @@ def _around(n: FloatArray, rng: np.random.Generator, uniform: bool = False) -> F
     return d + np.cross(n, s) * (aside * np.sin(angle))[:, None]
 
 
+def _through_glass(
+    d: FloatArray, n: FloatArray, u: FloatArray, mistake: str
+) -> tuple[FloatArray, FloatArray]:
+    """Directions mirrored or refracted by glass with outward normals n, drawn by the numbers u, and
+    the factor of what they carry."""
+    cosine = -(d * n).sum(axis=1)
+    ratio = np.where(cosine > 0.0, 1.0 / 1.5, 1.5)  # of the indices, here over there
+    facing = n * np.sign(cosine)[:, None]
+    cosine = np.abs(cosine)
+    square = 1.0 - ratio**2 * (1.0 - cosine**2)
+    is_total = square <= 0.0
+    behind = np.sqrt(np.maximum(square, 0.0))
+    across = ((ratio * cosine - behind) / (ratio * cosine + behind)) ** 2
+    along = ((ratio * behind - cosine) / (ratio * behind + cosine)) ** 2
+    mirrored = 0.5 * (across + along)
+    if mistake.startswith("glass mirrors"):
+        mirrored = np.full(len(d), 0.0 if mistake == "glass mirrors nothing" else 0.5)
+    mirrored = np.where(is_total, 1.0, mirrored)
+    is_mirrored = (u < mirrored)[:, None]
+    back = d + 2.0 * cosine[:, None] * facing
+    on = ratio[:, None] * d + (ratio * cosine - behind)[:, None] * facing
+    return np.where(is_mirrored, back, on), np.where(is_mirrored[:, 0], 1.0, ratio**2)
+
+
 OF_ALL_LIGHTS = (
     "samples of the sky",
     "no shadows of any light",
@@ -69,9 +96,10 @@ OF_ALL_LIGHTS = (
 """With these, the first of which is no mistake, the sky's light is found by samples of it."""
 
 
-def picture(spp: int, seed: int, mistake: str = "") -> FloatArray:
-    """(height, width, 3).  mistake: "no shadows", "uniform", "no pi", "no cosine", "1 / d",
-    "twice", "one bounce less", one of OF_ALL_LIGHTS or none."""
+def picture(spp: int, seed: int, mistake: str = "", glass: bool = False) -> FloatArray:
+    """(height, width, 3), of GLASS or of SCENE.  mistake: "no shadows", "uniform", "no pi",
+    "no cosine", "1 / d", "twice", "one bounce less", "cosine twice", "0.8 a bounce", "roulette",
+    "glass mirrors nothing", "glass mirrors half", one of OF_ALL_LIGHTS or none."""
     rng = np.random.default_rng(seed)
     forward = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
     right = np.cross(forward, [0.0, 1.0, 0.0])
@@ -97,7 +125,8 @@ def picture(spp: int, seed: int, mistake: str = "") -> FloatArray:
             break
         p = p + np.where(alive, t, 0.0)[:, None] * d
         n = np.where(is_ball[:, None], (p - CENTRE) / RADIUS, [0.0, 1.0, 0.0])
-        alive &= (n * d).sum(axis=1) < 0.0
+        is_glass = is_ball & glass
+        alive &= is_glass | ((n * d).sum(axis=1) < 0.0)
         albedo = np.where(is_ball[:, None], 0.7, [0.5, 0.4, 0.3])
         to_light = LIGHT - p
         distance = np.linalg.norm(to_light, axis=1)
@@ -106,17 +135,28 @@ def picture(spp: int, seed: int, mistake: str = "") -> FloatArray:
         beyond, _ = _hit(p + 1e-5 * n, to_light)
         where = "the first surface" if edge == 0 else "later surfaces"
         no_shadows = mistake in ("no shadows of any light", f"no shadows at {where}")
-        lit = alive & (cosine > 0.0)
+        lit = alive & (cosine > 0.0) & ~is_glass
         lit &= (beyond > distance) | no_shadows | (mistake == "no shadows")
         factor = np.ones_like(cosine) if mistake == "no cosine" else cosine
         factor = factor / distance ** (1.0 if mistake == "1 / d" else 2.0)
         factor = factor / (1.0 if mistake.startswith("no pi") else np.pi)
+        factor = factor * (cosine if mistake == "cosine twice" else 1.0)
         colour[lit] += (weight * albedo * factor[:, None] * INTENSITY)[lit]
         if mistake in OF_ALL_LIGHTS:
             beyond, _ = _hit(p + 1e-5 * n, _around(n, rng))
             seen = alive & (~np.isfinite(beyond) | no_shadows)
             times = np.pi if mistake == "no pi for any light" else 1.0
             colour[seen] += times * SKY * (weight * albedo)[seen]
-        d = _around(n, rng, mistake == "uniform")
-        weight, p = weight * albedo, p + 1e-5 * n
+        carried = albedo * (0.8 if mistake == "0.8 a bounce" else 1.0)
+        following = _around(n, rng, mistake == "uniform")
+        if mistake == "cosine twice":
+            carried = carried * (following * n).sum(axis=1)[:, None]
+        if glass:
+            through, radiance = _through_glass(d, n, rng.random(count), mistake)
+            following = np.where(is_glass[:, None], through, following)
+            carried = np.where(is_glass[:, None], radiance[:, None], carried)
+        d, weight = following, weight * carried
+        p = p + 1e-5 * n * np.sign((n * d).sum(axis=1))[:, None]
+        if mistake == "roulette" and edge >= 1:
+            alive &= rng.random(count) < np.minimum(weight.max(axis=1), 0.95)
     return colour.reshape(spp, HEIGHT, WIDTH, 3).mean(axis=0)

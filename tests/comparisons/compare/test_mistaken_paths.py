@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from small_path_tracer import SCENE, picture
+from small_path_tracer import GLASS, SCENE, picture
 
 from comparisons.compare import diagnosis, mistaken_paths
 from comparisons.compare.judge import of_replicates
@@ -25,36 +25,44 @@ NAMES = {
     "no shadows at the first surface": "without shadows at the first surface",
     "no shadows at later surfaces": "without shadows at later surfaces",
     "no pi for any light": "direct light is not divided by pi",
+    "cosine twice": mistaken_paths.TWICE,
+    "0.8 a bounce": "each bounce is multiplied by 0.8",
+    "roulette": "Russian roulette from bounce 2 on does not compensate for the paths that it ends",
+    "glass mirrors nothing": "dielectrics mirror nothing, without Fresnel's formulas",
+    "glass mirrors half": "dielectrics mirror half of the light, without Fresnel's formulas",
 }
 
 
 def test_each_mistake_is_tried() -> None:
     assert {*mistaken_paths.CHANGES, mistaken_paths.UNIFORM} <= {*NAMES.values()}
+    kinds = {name.split(" by ")[0].split(" from ")[0] for name in mistaken_paths.BOUNCES}
+    assert kinds <= {name.split(" by ")[0].split(" from ")[0] for name in NAMES.values()}
 
 
 @cache
-def right() -> np.ndarray:
-    scene = Scene.parse(SCENE)
+def right(text: str) -> np.ndarray:
+    scene = Scene.parse(text)
     return np.stack([render(scene, spp=128, seed=100 + seed).colour for seed in range(8)])
 
 
-def images(mistake: str) -> Images:
-    wrong = np.stack([picture(32, seed, mistake) for seed in range(8)])
-    return of_replicates(wrong, right(), {}).images
+def images(mistake: str, text: str = SCENE) -> Images:
+    wrong = np.stack([picture(32, seed, mistake, text is GLASS) for seed in range(8)])
+    return of_replicates(wrong, right(text), {}).images
 
 
 @pytest.mark.cases(1)
 @pytest.mark.parametrize("mistake", NAMES)
 def test_a_mistake_is_named(mistake: str) -> None:
-    found = diagnosis.likeliest(images(mistake), {}, path_lengths(Scene.parse(SCENE)))
+    text = GLASS if mistake.startswith("glass") else SCENE
+    found = diagnosis.likeliest(images(mistake, text), {}, path_lengths(Scene.parse(text)))
     assert found is not None
     assert found.name == NAMES[mistake]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sky", ["", "samples of the sky"])
-def test_a_right_path_tracer_has_none(sky: str) -> None:
-    assert diagnosis.likeliest(images(sky), {}, path_lengths(Scene.parse(SCENE))) is None
+@pytest.mark.parametrize(("sky", "text"), [("", SCENE), ("samples of the sky", SCENE), ("", GLASS)])
+def test_a_right_path_tracer_has_none(sky: str, text: str) -> None:
+    assert diagnosis.likeliest(images(sky, text), {}, path_lengths(Scene.parse(text))) is None
 
 
 def test_the_parts_are_those_of_our_picture() -> None:
@@ -62,7 +70,7 @@ def test_the_parts_are_those_of_our_picture() -> None:
     scene = Scene.parse(SCENE)
     parts = mistaken_paths._traced(scene, 4, False, None)
     seen = render(scene.changed(integrator={"type": "path", "max_depth": 1}), spp=256).colour
-    means = right().mean(axis=(0, 1, 2))
+    means = right(SCENE).mean(axis=(0, 1, 2))
     for light in (
         [p.points + p.met for p in parts],
         [p.points + p.lamps for p in parts],
