@@ -18,7 +18,7 @@ from comparisons.compare.diagnosis.hypothesis import Hypothesis
 from comparisons.compare.diagnosis.misfit import REST
 from comparisons.results.case import FloatArray
 from reference_rt.core.arrays import IntArray
-from reference_rt.integrators import Path
+from reference_rt.integrators import AnyIntegrator, Direct, Path, Whitted
 from reference_rt.integrators.path import ROULETTE_CAP as CAP
 from reference_rt.materials import Dielectric, ThinDielectric
 from reference_rt.rendering.query.hits import BoolArray
@@ -160,12 +160,12 @@ UNIFORM = "directions are uniform, and weighted as if they had the cosine's dens
 def mistaken_paths(
     scene: Scene, reference: FloatArray, threads: int | None = None
 ) -> Iterator[Hypothesis]:
-    """Hypotheses about a scene; none unless it is rendered by path tracing, and each of its shapes
-    has one material."""
-    own = scene.integrator
-    if not isinstance(own, Path) or not all(hasattr(shape, "material") for shape in scene.shapes):
+    """Hypotheses about a scene; none unless its paths are traced, by path tracing, for direct light
+    or, along mirrored and refracted rays, by Whitted's ray tracing, and each of its shapes has one
+    material."""
+    edges = _edges(scene.integrator)
+    if edges is None or not all(hasattr(shape, "material") for shape in scene.shapes):
         return
-    edges = LONGEST if own.max_depth is None else min(own.max_depth, LONGEST)
     right, uniform = (_traced(scene, edges, wrong, threads) for wrong in (False, True))
     changes = {name: [change(parts) for parts in right] for name, change in CHANGES.items()}
     changes |= {name: [parts.bounces[name] for parts in right] for name in BOUNCES}
@@ -179,6 +179,15 @@ def mistaken_paths(
             picture = reference + found.mean(axis=0)
             noise = found.var(axis=0, ddof=1) / len(found)
             yield Hypothesis("mistaken paths", name, evidence, picture, 0, REST, None, noise)
+
+
+def _edges(own: AnyIntegrator) -> int | None:
+    """The most edges of the paths of an integrator; None where it has no such paths."""
+    if isinstance(own, Path):
+        return LONGEST if own.max_depth is None else min(own.max_depth, LONGEST)
+    if isinstance(own, Direct):
+        return 2 if own.shadows else None
+    return min(own.max_depth + 2, LONGEST) if isinstance(own, Whitted) else None
 
 
 def _traced(scene: Scene, edges: int, uniform: bool, threads: int | None) -> list[_Parts]:
@@ -208,6 +217,8 @@ class _Tracer:
             [isinstance(scene.materials.get(n), Dielectric | ThinDielectric) for n in names]
         )
         self._is_lit = scene.light_sources().probability.any()
+        # Whitted's rays end where light is scattered, and lamps are points for it.
+        self._scatters = not isinstance(scene.integrator, Whitted)
 
     def _add(self, name: str, pixel: IntArray, light: FloatArray) -> None:
         for k in range(3):
@@ -250,6 +261,8 @@ class _Tracer:
                 self._add_direct(at, number, pixel, weight, where, wrong)
             wi, factor, is_seen, chance, eta = self._scattered(at, number)
             weight, eta2 = weight * factor, eta2 * eta * eta
+            if not self._scatters:
+                weight[~is_seen] = 0.0
             survival = np.minimum(weight.max(axis=1) * eta2, CAP)
             cosine = at.local(wi)[:, 2]
             passes = cosine * at.wo[:, 2] < 0.0
@@ -288,6 +301,8 @@ class _Tracer:
                 value[one] = bsdf.evaluate(at.wo[one], wi[one], at.uv[one], threads=self._threads)
         pdf = np.where(light.pdf > 0.0, light.pdf, np.inf)[:, None]
         arriving = weight * value * light.radiance / pdf
+        if not self._scatters:
+            arriving[~light.is_delta] = 0.0
         lit = np.flatnonzero((arriving > 0.0).any(axis=1))
         arriving, pixel = arriving[lit], pixel[lit]
         far = np.minimum(light.distance[lit], FAR)

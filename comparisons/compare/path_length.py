@@ -13,7 +13,7 @@ from comparisons.compare.diagnosis.misfit import REST
 from comparisons.compare.media_mistakes import media_mistakes
 from comparisons.compare.mistaken_paths import mistaken_paths
 from comparisons.results.case import FloatArray
-from reference_rt.integrators import Path
+from reference_rt.integrators import Direct, Path, Whitted
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 
@@ -32,9 +32,11 @@ Lengths = Callable[[FloatArray], Iterator[Hypothesis]]
 
 
 def path_lengths(scene: Scene, threads: int | None = None) -> Lengths | None:
-    """Hypotheses about a scene, and of mistakes on its paths; None unless it is rendered by path
-    tracing."""
+    """Hypotheses about a scene, of path tracing alone, and of mistakes on its paths; None where it
+    has none."""
     own = scene.integrator
+    if isinstance(own, Direct | Whitted):
+        return lambda reference: mistaken_paths(scene, reference, threads)
     if not isinstance(own, Path):
         return None
 

@@ -28,6 +28,10 @@ lights:
 GLASS = SCENE.replace("clay: {type: diffuse, reflectance: 0.7}", "clay: {type: dielectric}")
 """With a ball of glass."""
 
+DIRECT = SCENE.replace("{type: path, max_depth: 4}", "{type: direct}")
+WHITTED = GLASS.replace("{type: path, max_depth: 4}", "{type: whitted, max_depth: 4}")
+"""With direct light alone, and with mirrored and refracted rays alone."""
+
 CENTRE, RADIUS = np.array([0.0, 0.6, 0.0]), 0.6
 LIGHT, INTENSITY = np.array([2.0, 4.0, 2.0]), np.array([20.0, 18.0, 15.0])
 SKY, EYE, TARGET = 0.5, np.array([0.0, 1.2, 4.0]), np.array([0.0, 0.6, 0.0])
@@ -96,11 +100,12 @@ OF_ALL_LIGHTS = (
 """With these, the first of which is no mistake, the sky's light is found by samples of it."""
 
 
-def picture(spp: int, seed: int, mistake: str = "", glass: bool = False) -> FloatArray:
-    """(height, width, 3), of GLASS or of SCENE.  mistake: "no shadows", "uniform", "no pi",
+def picture(spp: int, seed: int, mistake: str = "", scene: str = SCENE) -> FloatArray:
+    """(height, width, 3), of one of the scenes.  mistake: "no shadows", "uniform", "no pi",
     "no cosine", "1 / d", "twice", "one bounce less", "cosine twice", "0.8 a bounce", "roulette",
     "glass mirrors nothing", "glass mirrors half", one of OF_ALL_LIGHTS or none."""
     rng = np.random.default_rng(seed)
+    glass, is_whitted = scene in (GLASS, WHITTED), scene is WHITTED
     forward = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
     right = np.cross(forward, [0.0, 1.0, 0.0])
     right /= np.linalg.norm(right)
@@ -114,7 +119,7 @@ def picture(spp: int, seed: int, mistake: str = "", glass: bool = False) -> Floa
     p = np.tile(EYE, (count, 1))
     colour, weight = np.zeros((count, 3)), np.ones((count, 3))
     alive = np.ones(count, dtype=bool)
-    edges = 3 if mistake == "one bounce less" else 4
+    edges = {DIRECT: 2, WHITTED: 6}.get(scene, 3 if mistake == "one bounce less" else 4)
     for edge in range(edges):
         t, is_ball = _hit(p, d)
         missed = alive & ~np.isfinite(t)
@@ -157,6 +162,8 @@ def picture(spp: int, seed: int, mistake: str = "", glass: bool = False) -> Floa
             carried = np.where(is_glass[:, None], radiance[:, None], carried)
         d, weight = following, weight * carried
         p = p + 1e-5 * n * np.sign((n * d).sum(axis=1))[:, None]
+        if is_whitted:
+            alive &= is_glass
         if mistake == "roulette" and edge >= 1:
             alive &= rng.random(count) < np.minimum(weight.max(axis=1), 0.95)
     return colour.reshape(spp, HEIGHT, WIDTH, 3).mean(axis=0)

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from small_path_tracer import GLASS, SCENE, picture
+from small_path_tracer import DIRECT, GLASS, SCENE, WHITTED, picture
 
 from comparisons.compare import diagnosis, mistaken_paths
 from comparisons.compare.judge import of_replicates
@@ -46,7 +46,7 @@ def right(text: str) -> np.ndarray:
 
 
 def images(mistake: str, text: str = SCENE) -> Images:
-    wrong = np.stack([picture(32, seed, mistake, text is GLASS) for seed in range(8)])
+    wrong = np.stack([picture(32, seed, mistake, text) for seed in range(8)])
     return of_replicates(wrong, right(text), {}).images
 
 
@@ -59,8 +59,29 @@ def test_a_mistake_is_named(mistake: str) -> None:
     assert found.name == NAMES[mistake]
 
 
+SIMPLER = [
+    (text, mistake)
+    for text, of_glass in ((WHITTED, ("glass mirrors half", "glass mirrors nothing")), (DIRECT, ()))
+    for mistake in ("cosine twice", "no cosine", "1 / d", "no pi", "no shadows", *of_glass)
+]
+
+
+@pytest.mark.cases(1)
+@pytest.mark.parametrize(("text", "mistake"), SIMPLER, ids=[mistake for _, mistake in SIMPLER])
+def test_a_mistake_of_simpler_integrators_is_named(text: str, mistake: str) -> None:
+    found = diagnosis.likeliest(images(mistake, text), {}, path_lengths(Scene.parse(text)))
+    assert found is not None
+    expected = NAMES[mistake]
+    if text is WHITTED:  # it has no others
+        expected = expected.replace(" of lights without extent", "")
+    assert found.name == expected
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(("sky", "text"), [("", SCENE), ("samples of the sky", SCENE), ("", GLASS)])
+@pytest.mark.parametrize(
+    ("sky", "text"),
+    [("", SCENE), ("samples of the sky", SCENE), ("", GLASS), ("", DIRECT), ("", WHITTED)],
+)
 def test_a_right_path_tracer_has_none(sky: str, text: str) -> None:
     assert diagnosis.likeliest(images(sky, text), {}, path_lengths(Scene.parse(text))) is None
 
