@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from comparisons.integrators import translate_integrator, type_of
+from comparisons.integrators.endless import left_in
 from comparisons.integrators.light import as_path
 from comparisons.lights import type_of as type_of_light
 from comparisons.shapes import type_of as type_of_shape
@@ -15,6 +16,7 @@ from reference_rt.core.transform import affine
 from reference_rt.integrators import Direct, Light, Path
 from reference_rt.lights import Directional
 from reference_rt.materials import Emissive, Mask, NoSurface, ThinDielectric
+from reference_rt.rendering.scene import Scene
 from reference_rt.scene.model import SceneModel
 from reference_rt.shapes import Mesh, Rectangle, Shape, Solid
 
@@ -103,8 +105,9 @@ def has_wrong_media(scene: SceneModel) -> bool:
 
 
 def has_endless_media(scene: SceneModel) -> bool:
-    """Whether rays may leave the scene in a medium, and not far away: it is around the camera, or
-    no closed shape has it within.  Meshes with a medium in them are taken for closed ones.
+    """Whether rays may leave the scene in a medium, and not far away: it is around the camera, no
+    closed shape has it within, or lines through the shapes leave the scene in it.  Meshes with a
+    medium in them are taken for closed ones.
 
     A medium is dark in Mitsuba, too, where it takes all light on the way to the edge of the scene,
     which is at least as far as that of its largest rectangle; copies may have another size.
@@ -118,7 +121,10 @@ def has_endless_media(scene: SceneModel) -> bool:
         if shape.interior is not None:
             (closed if _holds(shape) else others).add(shape.interior)
         others.add(shape.exterior)
-    media = [scene.media[name] for name in others - closed if name is not None]
+    endless = others - closed
+    if others & closed - {None} and isinstance(scene, Scene):
+        endless |= left_in(scene)
+    media = [scene.media[name] for name in endless if name is not None]
     lit = any(min(m.sigma_t) * m.scale * reach < DARK for m in media)
     return scene.camera.medium is not None or lit
 

@@ -19,8 +19,11 @@ from scipy import stats
 
 from comparisons.integrators import particles_of
 from comparisons.integrators.light import as_path
+from comparisons.referee.sizes import ShapeSizes
 from comparisons.renderers import NoCounterpartError
 from comparisons.results.case import RungResult
+from comparisons.rungs.rays.camera import camera_rays, pixel_centres
+from comparisons.rungs.rays.light_context import DISTANT
 from comparisons.statistics.cells import Margins
 from comparisons.statistics.decide import compare
 from comparisons.statistics.wording import percent
@@ -28,6 +31,7 @@ from reference_rt.cameras.film import BoxFilter
 from reference_rt.core.arrays import FloatArray
 from reference_rt.integrators import Direct, Light, Path
 from reference_rt.integrators.scene_tables import SceneTables
+from reference_rt.rendering import query
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 from reference_rt.sampling import Sobol
@@ -51,6 +55,14 @@ then more samples meet more of it, so that its noise hardly falls."""
 
 SELDOM = 1e-4
 """How seldom normal noise that falls as it must seems not to."""
+
+FEWEST = 1000.0
+"""Least particles of suns and skies that may fall on what the camera sees: they come through the
+disk of the whole scene, and where that is thousands of times as wide, next to none does."""
+
+ROUNDING = 1e-6
+"""Relative errors up to this are no noise: the statistics take none to be smaller than float32's
+rounding, as of a channel in which both sides are black."""
 
 EXACT = Margins(image=0.0, tile=0.0, pixel=0.0, stored=0.0, constant=1e-9)
 """Both sides compute in float64, and leave surfaces by some 1e-15 of the scene: the rays that this
@@ -80,6 +92,12 @@ def transport(scene: Scene, tables: SceneTables, threads: int | None = None) -> 
         return RungResult("transport", "not-applicable", str(error))
     if light.max_depth is not None and light.max_depth < 2:
         return RungResult("transport", "not-applicable", "no light falls on any surface")
+    if (count := _fall_on_view(paths, tables)) < FEWEST:
+        reason = (
+            f"of all particles of lights far away {count:.2g} fall on what the camera sees, in a "
+            f"scene that is much larger; expected {FEWEST:g}"
+        )
+        return RungResult("transport", "not-applicable", reason)
     sides = paths, paths.changed(integrator=light)
     try:
         found, reached = _look(sides, tables, SAMPLES, FIRST_SEED, threads)
@@ -108,6 +126,22 @@ def _small(scene: Scene) -> Scene:
         "layers": (),
     }
     return scene.changed(film=film.model_copy(update=small), integrator=integrator)
+
+
+def _fall_on_view(scene: Scene, tables: SceneTables) -> float:
+    """How many particles of lights far away, about, fall on a ball around the first hits of the
+    camera's rays, of those that come through the ball around the scene; inf without such lights."""
+    choice, sizes = tables.lights.choice, ShapeSizes(scene)
+    if choice is None or not np.isfinite([sizes.lower, sizes.upper]).all():
+        return math.inf
+    share = float(choice.probability[np.isin(choice.kind, [*DISTANT])].sum())
+    hits = query.intersect(tables, *camera_rays(scene, *pixel_centres(scene.film, LONGER**2)))
+    p = hits.p[hits.shape >= 0]
+    whole = float(np.linalg.norm(sizes.upper - sizes.lower))
+    if share == 0.0 or len(p) == 0 or whole == 0.0:
+        return math.inf
+    seen = float(np.linalg.norm(np.ptp(p, axis=0)))
+    return SAMPLES * REPLICATES * share * min(seen / whole, 1.0) ** 2
 
 
 def _look(
@@ -170,11 +204,16 @@ def _told_too_little(reached: float, numbers: dict[str, Any]) -> RungResult:
 
 
 def _noise_falls(few: RungResult, many: RungResult) -> bool:
-    """Whether it does in each channel of the image mean, as the root of the samples, but for what
-    variances of replicates scatter (F-test)."""
-    one, two = (look.numbers["standard_error_of_bias"] for look in (few, many))
+    """Whether it does in each channel of the image mean that has noise, as the root of the samples,
+    but for what variances of replicates scatter (F-test)."""
+    one, two = (
+        # None: without a bound, as of a channel in which there is no light.
+        {of: math.inf if x is None else x for of, x in errors.items()}
+        for errors in (look.numbers["standard_error_of_bias"] for look in (few, many))
+    )
     scatter = float(stats.f.isf(SELDOM, REPLICATES - 1, REPLICATES - 1))
-    return all(AGAIN * two[channel] ** 2 <= scatter * one[channel] ** 2 for channel in one)
+    noisy = [channel for channel, error in one.items() if error > ROUNDING]
+    return all(AGAIN * two[channel] ** 2 <= scatter * one[channel] ** 2 for channel in noisy)
 
 
 def _told(found: RungResult) -> list[str]:

@@ -46,6 +46,15 @@ scene, it would get most of them.  Measured in 14 scenes with a lamp or a sun: t
 of 1/2 fit the strata of the samples.
 """
 
+LEAST_SHARE = 0.125
+"""The least selection probability of a light, times their number.
+
+Power says nothing of where the light falls: a sun has that of the whole scene's disk, so that in a
+scene of a kilometre a lamp in a room would get one of a million samples, and be missing from most
+pictures.  The variance of scenes that power suits grows by an eighth of itself at most, and only of
+those that have a light below this share.  It counts lights that a tree picks as one.
+"""
+
 
 def light_tables(
     scene: SceneModel,
@@ -54,8 +63,8 @@ def light_tables(
     boundaries: Iterable[Boundary],
     environment: Any,
 ) -> Lights:
-    """All lights, selected in proportion to their power.  Writes the primitives' `light` columns.
-    boundaries: the rows of the materials;  environment: by `environment_of`."""
+    """All lights, selected in proportion to their power, but each sometimes.  Writes the
+    primitives' `light` columns.  boundaries: the rows of the materials;  environment: by `environment_of`."""
     radius = scene_radius(geometry)
     materials = [scene.materials.get(boundary.material or "") for boundary in boundaries]
     areas, powers = _area_lights(scene, geometry, palette, materials)
@@ -109,13 +118,30 @@ def scene_radius(geometry: Geometry) -> float:
 
 
 def _choice(kind: Any, row: Any, weight: FloatArray) -> LightSampler | None:
-    """The light sampler by power; None if no light that can be sampled has power."""
+    """The light sampler by power and LEAST_SHARE; None if no light that is sampled has power."""
     # Scaled by the largest, so that extreme values neither overflow nor vanish in the sum.
     largest = weight.max(initial=0.0)
     if largest == 0.0:
         return None
     weight = weight / largest
-    return _choice_by(kind, row, weight / weight.sum())
+    return _choice_by(kind, row, _at_least(kind, weight / weight.sum()))
+
+
+def _at_least(kind: Any, probability: FloatArray) -> FloatArray:
+    """The probabilities (n,), no share of those above 0 below LEAST_SHARE over their number."""
+    near = (probability > 0.0) & np.isin(kind, _PLACED)
+    shares, of_tree = probability, np.zeros(len(probability), bool)
+    if np.count_nonzero(near) > FEW:
+        of_tree = near
+        shares = np.append(np.where(near, 0.0, probability), probability[near].sum())
+    least = LEAST_SHARE / np.count_nonzero(shares)
+    if (shares[shares > 0.0] >= least).all():
+        return probability
+    raised = np.where(shares > 0.0, np.maximum(shares, least), 0.0)
+    raised /= raised.sum()
+    if not of_tree.any():
+        return np.asarray(raised)
+    return np.where(of_tree, probability * (raised[-1] / shares[-1]), raised[:-1])
 
 
 def _choice_by(kind: Any, row: Any, probability: FloatArray) -> LightSampler:

@@ -135,6 +135,37 @@ CLOSED = {
 }
 
 
+HOLDER = "{type: sphere, material: none, interior: ink, radius: 2, center: [PLACE, 0, 0]}"
+
+
+@pytest.mark.parametrize(
+    ("holder", "around", "endless"),
+    [
+        ("0", "exterior: ink", False),  # a bubble in a ball of ink
+        ("9", "exterior: ink", True),  # and beside one
+        ("9", "interior: ink, exterior: ink", True),
+        ("9", "interior: ink", False),
+        ("0", "interior: ink, exterior: ink", False),
+    ],
+)
+@pytest.mark.parametrize("is_copied", [False, True])
+def test_another_shape_may_hold_the_medium(
+    holder: str, around: str, endless: bool, is_copied: bool
+) -> None:
+    """A closed shape that has a medium within does not bound the same medium elsewhere."""
+    one = f"{{type: sphere, material: none, radius: 0.5, {around}}}"
+    other = HOLDER.replace("PLACE", holder)
+    shapes = f"groups: {{two: [{one}, {other}]}}\nshapes: [{{type: instance, group: two}}]"
+    if not is_copied:
+        shapes = f"shapes: [{one}, {other}]"
+    scene = Scene.parse(
+        "materials: {none: {type: none}}\nintegrator: {type: path, max_depth: 20}\n"
+        "media: {ink: {type: homogeneous, sigma_t: 1.0, albedo: 0.5}}\n"
+        f"lights: [{{type: constant, radiance: 1}}]\n{shapes}\n"
+    )
+    assert (in_place_of(scene) is not None) == endless
+
+
 @pytest.mark.parametrize(
     ("shape", "endless"),
     [(shape, True) for shape in ENDLESS.items()] + [(shape, False) for shape in CLOSED.items()],

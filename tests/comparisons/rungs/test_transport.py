@@ -106,6 +106,37 @@ def test_either_side_may_be_wrong(factor: float, of: type, monkeypatch: pytest.M
     assert result.status == ("invalid" if np.isnan(factor) else "differ")
 
 
+def test_light_of_one_channel_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The errors of the dark channels, over nothing, have no bound."""
+    of_lamp = rt.Emissive(radiance=(8.0, 0.0, 0.0), base="grey")
+    red = room(materials={**room().materials, "lamp": of_lamp})
+    assert found(red).status == "agree"
+
+    def wrong(scene: Any, **settings: Any) -> Any:
+        picture = rt.render(scene, **settings)
+        if isinstance(scene.integrator, rt.Light):
+            picture.colour[3:7, 4:] *= 1.3
+        return picture
+
+    monkeypatch.setattr(RUNG, "render", wrong)
+    assert found(red).status == "differ"
+
+
+@pytest.mark.parametrize("light", ["sun", "sky"])
+def test_particles_from_afar_must_fall_on_what_is_seen(light: str) -> None:
+    """A speck so far away that the disk of the scene is 1e10 times as large as what is seen."""
+    of = {
+        "sun": rt.Directional(direction=(0.1, -1.0, 0.1), irradiance=(1.0, 1.0, 1.0)),
+        "sky": rt.Constant(radiance=(1.0, 1.0, 1.0)),
+    }[light]
+    shapes = (FLOOR, rt.Sphere(material="grey", radius=0.5))
+    speck = rt.Sphere(center=(0.0, 0.0, -3e5), material="grey")
+    assert found(room(shapes=shapes, lights=(of,))).status == "agree"
+    result = found(room(shapes=(*shapes, speck), lights=(of,)))
+    assert result.status == "not-applicable"
+    assert "fall on what the camera sees" in result.reason
+
+
 def test_a_difference_that_other_samples_do_not_show_is_none(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -103,14 +103,15 @@ def test_whitteds_environment_is_seen_and_lights_nothing():
     [
         (rt.Path(max_depth=2), 0.125),
         (rt.Path(max_depth=2, sampling="bsdf"), 0.125),
-        (rt.Path(max_depth=2, sampling="lights"), 0.99),
+        (rt.Path(max_depth=2, sampling="lights"), 0.9),
         (rt.Direct(), 0.125),
-        (rt.Direct(bsdf_samples=0), 0.99),
+        (rt.Direct(bsdf_samples=0), 0.9),
     ],
     ids=["both", "bsdf", "lights", "direct", "direct lights"],
 )
 def test_a_lamp_under_a_sky(integrator, share):
-    """The sky is picked seldom where scattered rays find it too, and gives as much as ever."""
+    """The sky is picked seldom where scattered rays find it too, else by its power but for the
+    least share of the lamp, and gives as much as ever."""
     m = transform.affine(STEPS)
     square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
     seen = lambert(transform.apply_points(m, square))
