@@ -18,7 +18,6 @@ from comparisons.compare.path_length import path_lengths
 from comparisons.compare.single_lights import single_lights
 from comparisons.compare.watched import Say
 from comparisons.geometry.flatten import copies_of
-from comparisons.integrators.mistakes import in_place_of
 from comparisons.mitsuba.backend import scalar
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.parse import file_of
@@ -27,6 +26,7 @@ from comparisons.rungs.layers.rung import applies
 from comparisons.rungs.limited import Rest
 from comparisons.rungs.witness import witnesses_of
 from comparisons.translator import MOST_INSTANCES, UntranslatableError, load
+from comparisons.translator.mistakes import in_place_of
 from comparisons.translator.moved import with_float32_vertices
 from comparisons.translator.notes import notes_of
 from comparisons.translator.reference import changes_to, own_scene

@@ -21,13 +21,13 @@ import numpy as np
 from scipy import special
 
 from comparisons import statistics
-from comparisons.integrators.mistakes import in_place_of
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.counterpart import Counterpart
 from comparisons.mitsuba.lit_scene import LitScene
 from comparisons.mitsuba.plugins.base import is_wide
 from comparisons.mitsuba.scene import picture
 from comparisons.results.case import FloatArray, RungResult
+from comparisons.translator.mistakes import in_place_of
 from reference_rt.integrators import Path
 from reference_rt.materials import Dielectric, RoughDielectric
 from reference_rt.rendering.scene import Scene

@@ -19,13 +19,6 @@ from comparisons.geometry import affine
 from comparisons.geometry.flatten import Copy, Leaf, copies_of, place_of
 from comparisons.geometry.frame import Frame
 from comparisons.integrators import translate_integrator
-from comparisons.integrators.mistakes import (
-    BLACK,
-    by_paths,
-    counts_lights_often,
-    drops_light,
-    in_place_of,
-)
 from comparisons.lights import translate_light
 from comparisons.materials.translate import (
     coloured_parts_of,
@@ -44,6 +37,13 @@ from comparisons.mitsuba.scene import light_id, shape_id
 from comparisons.renderers import ReferenceSampler
 from comparisons.shapes import translate_shape, type_of
 from comparisons.shapes.site import MOST_INSTANCES, Site
+from comparisons.translator.mistakes import (
+    BLACK,
+    by_paths,
+    counts_lights_often,
+    drops_light,
+    in_place_of,
+)
 from comparisons.translator.moved import frame_of, moved
 from reference_rt.integrators import Direct
 from reference_rt.rendering.scene import Scene

@@ -1,9 +1,9 @@
 """Notes for the reader on what Mitsuba lacks or gets wrong: of materials and of integrators."""
 
-from comparisons.integrators.mistakes import ROULETTE, in_place_of, notes_of_integrator
 from comparisons.materials import type_of
 from comparisons.mitsuba.context import TranslationContext
 from comparisons.translator.accuracy import accuracy
+from comparisons.translator.mistakes import ROULETTE, in_place_of, notes_of_integrator
 from reference_rt.integrators import Path
 from reference_rt.materials import Material
 from reference_rt.rendering.scene import Scene

@@ -8,15 +8,6 @@ from collections.abc import Callable
 from typing import Any
 
 from comparisons.integrators import translate_integrator
-from comparisons.integrators.mistakes import (
-    BLACK,
-    ROULETTE,
-    by_paths,
-    counts_lights_often,
-    drops_light,
-    in_place_of,
-    notes_of_integrator,
-)
 from comparisons.materials import type_of
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.colours import index_of_refraction
@@ -26,6 +17,15 @@ from comparisons.mitsuba.parse import Parsed, file_of, parse_file
 from comparisons.mitsuba.plugins.exact_coat import COLOURS, SUBSTITUTE
 from comparisons.renderers import ReferenceSampler
 from comparisons.textures.texture import matrix_of
+from comparisons.translator.mistakes import (
+    BLACK,
+    ROULETTE,
+    by_paths,
+    counts_lights_often,
+    drops_light,
+    in_place_of,
+    notes_of_integrator,
+)
 from comparisons.translator.notes import note_of
 from comparisons.translator.reading import read_supported
 from reference_rt.rendering.scene import Scene

@@ -64,7 +64,8 @@ def light_tables(
     environment: Any,
 ) -> Lights:
     """All lights, selected in proportion to their power, but each sometimes.  Writes the
-    primitives' `light` columns.  boundaries: the rows of the materials;  environment: by `environment_of`."""
+    primitives' `light` columns.  boundaries: the rows of the materials;  environment: by
+    `environment_of`."""
     radius = scene_radius(geometry)
     materials = [scene.materials.get(boundary.material or "") for boundary in boundaries]
     areas, powers = _area_lights(scene, geometry, palette, materials)

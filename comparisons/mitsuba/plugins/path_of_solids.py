@@ -3,7 +3,7 @@ of those with masks: `{"type": "path_of_solids"}`.
 
 Mitsuba's own integrators trace Mitsuba's scene, in which there are no solids, and are wrong for
 masks and behind hidden lamps (`squares_opacity` and `misplaces` in
-`comparisons.integrators.mistakes`).  This one traces a `LitScene`, and takes all else from
+`comparisons.translator.mistakes`).  This one traces a `LitScene`, and takes all else from
 Mitsuba: the camera, the film, random numbers, BSDFs and emitters.  The estimator is the textbook's:
 at each surface one sample of a light and one of the BSDF, combined with the power heuristic (Veach
 1997).  Its mean is that of Mitsuba's `path` and `direct`.

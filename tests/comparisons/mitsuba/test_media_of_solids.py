@@ -7,11 +7,11 @@ import pytest
 import trimesh
 
 import reference_rt as rt
-from comparisons.integrators.mistakes import in_place_of, notes_of_integrator
 from comparisons.mitsuba.backend import mitsuba
 from comparisons.mitsuba.plugins.base import is_wide
 from comparisons.mitsuba.scene import picture
 from comparisons.translator import load
+from comparisons.translator.mistakes import in_place_of, notes_of_integrator
 from reference_rt.core.transform import Scale
 from reference_rt.rendering.scene import Scene
 

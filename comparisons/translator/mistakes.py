@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from comparisons.geometry import affine
 from comparisons.integrators import translate_integrator, type_of
-from comparisons.integrators.endless import left_in
 from comparisons.integrators.light import as_path
 from comparisons.lights import type_of as type_of_light
 from comparisons.shapes import type_of as type_of_shape
-from reference_rt.core.transform import affine
+from comparisons.translator.endless import left_in
 from reference_rt.integrators import Direct, Light, Path
 from reference_rt.lights import Directional
 from reference_rt.materials import Emissive, Mask, NoSurface, ThinDielectric
@@ -114,7 +114,9 @@ def has_endless_media(scene: SceneModel) -> bool:
     """
     closed: set[str | None] = {None}
     others: set[str | None] = set()
-    rectangles = [affine(one.transform) for one in scene.shapes if isinstance(one, Rectangle)]
+    rectangles = [
+        affine.of_steps(one.transform) for one in scene.shapes if isinstance(one, Rectangle)
+    ]
     edges = [float(np.linalg.norm(m[:, :2], axis=0).max()) for m in rectangles]
     reach = max(edges, default=0.0)
     for shape in (*scene.shapes, *(one for group in scene.groups.values() for one in group)):

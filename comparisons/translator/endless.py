@@ -9,7 +9,6 @@ import numpy as np
 from comparisons.mitsuba.hits import rows_of
 from comparisons.referee.sizes import ShapeSizes
 from reference_rt.core.arrays import FloatArray, IntArray
-from reference_rt.rendering import query
 from reference_rt.rendering.scene import Scene
 
 LINES = 64
@@ -55,7 +54,7 @@ def _behind_all(
     2): those within and around each leaf, -1 for a surface that is no boundary."""
     inside, found = np.zeros(len(o), np.int64), set()
     for _ in range(MOST):
-        hits = query.intersect(scene.tables, o, d)
+        hits = scene.intersect(o, d)
         found |= set(inside[hits.shape < 0].tolist())
         met = np.flatnonzero(hits.shape >= 0)
         if len(met) == 0:
