@@ -11,7 +11,8 @@ from comparisons.compare.path_length import USUAL, path_lengths
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.request import Request, gated
 from comparisons.results.case import FloatArray, Images
-from reference_rt.integrators import RayCast, Whitted
+from reference_rt.integrators import Light, RayCast, Whitted
+from reference_rt.lights import Point
 from reference_rt.rendering.render import render
 from reference_rt.rendering.scene import Scene
 
@@ -106,9 +107,19 @@ def test_other_causes_are_not_taken_for_it(scene: Scene, reference: FloatArray, 
     assert (cause is None) == (fault == "none")
 
 
-@pytest.mark.parametrize("integrator", [Whitted(), RayCast()])
+@pytest.mark.parametrize("integrator", [Light(), RayCast()])
 def test_other_integrators_have_no_such_lengths(scene: Scene, integrator: object) -> None:
     assert path_lengths(scene.changed(integrator=integrator, sampler=None)) is None
+
+
+def test_ray_trees_have_mistakes_but_no_lengths(scene: Scene, reference: FloatArray) -> None:
+    lit = scene.changed(
+        integrator=Whitted(), sampler=None, lights=(Point(position=(0, 0, 0.5), intensity=1),)
+    )
+    found = path_lengths(lit)
+    assert found is not None
+    families = {hypothesis.family for hypothesis in found(reference.mean(axis=0))}
+    assert families == {"mistaken paths"}
 
 
 @pytest.mark.slow
