@@ -124,9 +124,11 @@ def of_area(context: LightContext, target: FloatArray) -> FloatArray:
 
 
 def _feature(context: LightContext) -> FloatArray:
-    """(n,): the smallest length on which the normals of the hit shapes change, in either
-    renderer."""
-    return np.minimum(context.sizes.bend_of(context.hits), context.theirs.height)
+    """(n,): the smallest length on which the normals of the hit shapes change, in either renderer,
+    or, where the scene has textures, their uv."""
+    sizes, hits = context.sizes, context.hits
+    length = sizes.feature_of(hits) if context.scene.textures else sizes.bend_of(hits)
+    return np.minimum(length, context.theirs.height)
 
 
 def cut_off(scene: Scene) -> float:
