@@ -1,12 +1,14 @@
 """Direct light in Mitsuba: its value, and where its shadow-ray epsilons make it dark."""
 
+from functools import reduce
+from operator import or_
 from typing import Any
 
 import numpy as np
 
 from comparisons.geometry.frame import SHADOW_EPSILON
 from comparisons.mitsuba.backend import mitsuba
-from comparisons.mitsuba.plugins.whitted import without
+from comparisons.mitsuba.plugins.whitted import is_shape, without
 from comparisons.mitsuba.scene import for_rays, light_id
 from comparisons.rungs.rays import arbiter
 from comparisons.rungs.rays.light_context import (
@@ -32,6 +34,7 @@ def mitsuba_direct(
 
     mi, scene, kind = mitsuba(), context.counterpart.lit, kind_of(context, light)
     emitter = _point_emitter(context, light) if kind in POINT_LIKE else None
+    lamps = _lamps(context, target) if kind == AREA else []
     is_far = kind in DISTANT
 
     def value(o: Any, d: Any, at: Any) -> tuple[Any, ...]:
@@ -47,11 +50,14 @@ def mitsuba_direct(
             wi = sample.d
         else:
             ray.maxt = dr.inf
-            # The first hit along the unshortened shadow ray must be the front of the light itself;
-            # one that passes a lamp by sees the sky, whose light is not the lamp's.
+            # The first hit along the unshortened shadow ray must be the front of the light itself:
+            # not the sky that a ray sees which passes a lamp by, nor a lamp right in front.
             found = scene.ray_intersect(ray, visible)
             radiance = scene.emitted(found, visible)
-            visible = visible & found.is_valid() if kind == AREA else visible
+            if kind == AREA:
+                visible = visible & found.is_valid()
+                own = [is_shape(mi, found, lamp) for lamp in lamps]
+                visible = visible & reduce(or_, own) if own else visible
         local = si.to_local(wi)
         f_cos = si.bsdf().eval(mi.BSDFContext(), si, local, visible)
         return dr.select(visible, f_cos * radiance, 0.0), local.z
@@ -60,6 +66,18 @@ def mitsuba_direct(
     there = target if is_far else frame.into(target)
     contribution, cosine = for_rays(value, frame.into(rays.o), rays.d, there)
     return contribution, cosine
+
+
+def _lamps(context: LightContext, target: FloatArray) -> list[Any]:
+    """Mitsuba's shapes for the one on which points (n, 3) on an area light lie; none if that is
+    not known."""
+    shape = lamp_at(context, target).shape
+    if not (shape >= 0).any():
+        return []
+    most = int(np.bincount(shape[shape >= 0]).argmax())
+    counterpart = context.counterpart
+    names = {name for name, one in counterpart.mi_shapes.items() if one.shape == most}
+    return [one for one in counterpart.lit.shapes() if one.id() in names]
 
 
 def _point_emitter(context: LightContext, light: int) -> Any:

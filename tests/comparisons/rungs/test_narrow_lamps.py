@@ -1,5 +1,5 @@
 """Lamps that are narrower than float32's error: Mitsuba's shadow rays pass them by, and its corners
-are rounded."""
+are rounded.  And lamps right in front of another one, within its shadow epsilon."""
 
 import pytest
 
@@ -53,3 +53,25 @@ def test_a_lamp_that_is_wide_enough_is_judged(lamp: str) -> None:
     for rung, rays in ((direct, 200), (whitted, 96)):
         assert rung(scene, scene.tables, load(scene), rays).status == "agree"
         assert rung(scene, scene.tables, load(brighter), rays).status == "differ"
+
+
+BEFORE = """
+camera: {type: perspective, eye: [-300, 0, 40], target: [-200, 0, 0], fov: 30}
+film: {width: 12, height: 8}
+materials: {lamp: {type: emissive, radiance: 1}, other: {type: emissive, radiance: 5}}
+shapes:
+  - {type: plane}
+  - {type: rectangle, material: lamp,
+     transform: [{rotate: {axis: [0, 1, 0], degrees: -90}}, {translate: [0, 0, 2]}]}
+  - {type: SHAPE, material: other,
+     transform: [{scale: 3}, {rotate: {axis: [0, 1, 0], degrees: -90}}, {translate: [-GAP, 0, 2]}]}
+"""
+"""On the plane 250 units away a shadow ray ends 0.2 before the lamp, behind the other one."""
+
+
+@pytest.mark.parametrize("shape", ["rectangle", "disk"])
+@pytest.mark.parametrize("gap", [0.05, 2.0])
+def test_a_lamp_in_front_is_not_taken_for_the_one_behind(shape: str, gap: float) -> None:
+    scene = Scene.parse(BEFORE.replace("SHAPE", shape).replace("GAP", str(gap)))
+    found = direct(scene, scene.tables, load(scene), 200)
+    assert found.status in ("agree", "reference-limited"), found.reason
