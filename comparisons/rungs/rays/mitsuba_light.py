@@ -8,6 +8,7 @@ import numpy as np
 
 from comparisons.geometry.frame import SHADOW_EPSILON
 from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.plugins.base import is_wide
 from comparisons.mitsuba.plugins.whitted import is_shape, without
 from comparisons.mitsuba.scene import for_rays, light_id
 from comparisons.rungs.rays import arbiter
@@ -23,6 +24,7 @@ from comparisons.rungs.rays.resolution import AROUND, off_surface, own_error
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.lights import AREA
 from reference_rt.rendering import query
+from reference_rt.shapes import TABLES as SHAPE_TABLES
 
 
 def mitsuba_direct(
@@ -34,7 +36,7 @@ def mitsuba_direct(
 
     mi, scene, kind = mitsuba(), context.counterpart.lit, kind_of(context, light)
     emitter = _point_emitter(context, light) if kind in POINT_LIKE else None
-    lamps = _lamps(context, target) if kind == AREA else []
+    lamps = _lamps(context, light) if kind == AREA else []
     is_far = kind in DISTANT
 
     def value(o: Any, d: Any, at: Any) -> tuple[Any, ...]:
@@ -56,8 +58,10 @@ def mitsuba_direct(
             radiance = scene.emitted(found, visible)
             if kind == AREA:
                 visible = visible & found.is_valid()
-                own = [is_shape(mi, found, lamp) for lamp in lamps]
-                visible = visible & reduce(or_, own) if own else visible
+                if lamps and is_wide(mi):
+                    visible = visible & reduce(or_, (is_shape(mi, found, x) for x in lamps))
+                elif lamps and visible:
+                    visible = found.shape.id() in {lamp.id() for lamp in lamps}
         local = si.to_local(wi)
         f_cos = si.bsdf().eval(mi.BSDFContext(), si, local, visible)
         return dr.select(visible, f_cos * radiance, 0.0), local.z
@@ -68,15 +72,18 @@ def mitsuba_direct(
     return contribution, cosine
 
 
-def _lamps(context: LightContext, target: FloatArray) -> list[Any]:
-    """Mitsuba's shapes for the one on which points (n, 3) on an area light lie; none if that is
-    not known."""
-    shape = lamp_at(context, target).shape
-    if not (shape >= 0).any():
+def _lamps(context: LightContext, light: int) -> list[Any]:
+    """Mitsuba's shapes for the one that is an area light, or has it among its faces."""
+    choice, areas = context.tables.lights.choice, context.tables.lights.areas
+    if choice is None or areas is None:
         return []
-    most = int(np.bincount(shape[shape >= 0]).argmax())
+    row = int(choice.row[light])
+    field = next(field for code, field, _, _ in SHAPE_TABLES if code == areas.kind[row])
+    # A mesh alone has one number for all its triangles.
+    owners = getattr(context.tables.geometry.shapes, field).owner
+    owner = int(owners[areas.row[row] if len(owners) > 1 else 0])
     counterpart = context.counterpart
-    names = {name for name, one in counterpart.mi_shapes.items() if one.shape == most}
+    names = {name for name, one in counterpart.mi_shapes.items() if one.shape == owner}
     return [one for one in counterpart.lit.shapes() if one.id() in names]
 
 
