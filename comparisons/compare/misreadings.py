@@ -20,7 +20,7 @@ from comparisons.compare.path_length import Lengths
 from reference_rt.cameras import Orthographic
 from reference_rt.cameras.view_rectangle import CentralCamera
 from reference_rt.core.arrays import FloatArray
-from reference_rt.integrators import Direct, Light, Whitted
+from reference_rt.integrators import Light, Whitted
 from reference_rt.lights import Ambient, Directional, Projector
 from reference_rt.materials import GltfPbr, NormalMap, Phong
 from reference_rt.rendering.render import render
@@ -242,9 +242,6 @@ def misreadings(scene: Scene, threads: int | None = None) -> Lengths | None:
                 if change.shape == reference.shape and change.any():
                     noise = changes.var(axis=0, ddof=1) / PARTS if has_noise else None
                     found.append((name, change, noise))
-        change = _shadows(scene, threads)
-        if change is not None and change.shape == reference.shape and change.any():
-            found.append(("without shadows", change, None))
         while found:
             name, change, noise = found[0]
             same = [one for one in found if _alike(one[1], change)]
@@ -262,24 +259,6 @@ rounding at edges."""
 
 def _alike(one: FloatArray, other: FloatArray) -> bool:
     return float(np.abs(one - other).sum()) <= ALIKE * float(np.abs(other).sum())
-
-
-def _shadows(scene: Scene, threads: int | None) -> FloatArray | None:
-    """What shadows take from the direct light of Whitted's ray tracing; in mirrors they are left
-    out, and what is seen there without them is not known."""
-    if not isinstance(scene.integrator, Whitted):
-        return None
-    with suppress(SceneError), warnings.catch_warnings():
-        warnings.simplefilter("ignore", SceneWarning)
-        lit = scene.changed(lights=[one for one in scene.lights if not isinstance(one, Ambient)])
-        own = scene.resolved_sampler
-        both = [
-            lit.changed(integrator=Direct(shadows=shadows), sampler=own)
-            for shadows in (False, True)
-        ]
-        without, right = (render(one, threads=threads).colour for one in both)
-        return np.asarray(without - right)
-    return None
 
 
 def _pictures(scene: Scene, threads: int | None) -> FloatArray:

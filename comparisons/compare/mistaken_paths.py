@@ -20,7 +20,7 @@ from comparisons.results.case import FloatArray
 from reference_rt.core.arrays import IntArray
 from reference_rt.integrators import AnyIntegrator, Direct, Path, Whitted
 from reference_rt.integrators.path import ROULETTE_CAP as CAP
-from reference_rt.materials import Dielectric, ThinDielectric
+from reference_rt.materials import Dielectric, Diffuse, Phong, ThinDielectric
 from reference_rt.rendering.query.hits import BoolArray
 from reference_rt.rendering.scene import Scene
 
@@ -217,7 +217,10 @@ class _Tracer:
             [isinstance(scene.materials.get(n), Dielectric | ThinDielectric) for n in names]
         )
         self._is_lit = scene.light_sources().probability.any()
-        # Whitted's rays end where light is scattered, and lamps are points for it.
+        # Path tracing refuses Phong materials that create energy; what shines is the same without.
+        plain = {k: Diffuse() if isinstance(m, Phong) else m for k, m in scene.materials.items()}
+        self._shining = scene.changed(materials=plain, integrator=Path(max_depth=1), sampler=None)
+        # Whitted's rays end where light is scattered, and skies light nothing.
         self._scatters = not isinstance(scene.integrator, Whitted)
 
     def _add(self, name: str, pixel: IntArray, light: FloatArray) -> None:
@@ -276,9 +279,7 @@ class _Tracer:
 
     def _emitted(self, o: FloatArray, d: FloatArray) -> FloatArray:
         """The light (n, 3) that comes from what rays meet first."""
-        return self._scene.radiance(
-            o, d, 1, integrator=Path(max_depth=1), threads=self._threads
-        ).mean
+        return self._shining.radiance(o, d, 1, threads=self._threads).mean
 
     def _add_direct(
         self,
@@ -302,7 +303,7 @@ class _Tracer:
         pdf = np.where(light.pdf > 0.0, light.pdf, np.inf)[:, None]
         arriving = weight * value * light.radiance / pdf
         if not self._scatters:
-            arriving[~light.is_delta] = 0.0
+            arriving[~light.is_delta & np.isinf(light.distance)] = 0.0
         lit = np.flatnonzero((arriving > 0.0).any(axis=1))
         arriving, pixel = arriving[lit], pixel[lit]
         far = np.minimum(light.distance[lit], FAR)

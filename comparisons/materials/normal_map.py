@@ -28,16 +28,17 @@ def _to_mitsuba(material: NormalMap, context: TranslationContext) -> dict[str, A
     if context.files is not None and (material.follow_v or material.scale != 1.0):
         raise UntranslatableError("NormalMap with 'scale' or 'follow_v'", "material")
     normals = colour(material.normals, context)
-    texels = texels_of(texture, context)
-    undirected = np.all(texels == 0.5, axis=-1)
-    # Mitsuba has NaN for a grey of 1/2, and no light; ours keeps the surface's normal.
-    is_replaced = undirected.all() or (texture.filter == "nearest" and undirected.any())
-    if context.files is None and (material.scale != 1.0 or is_replaced):
-        factors = np.array([material.scale, material.scale, 1.0])
-        texels = texels * factors + 0.5 * (1.0 - factors)
-        if is_replaced:
-            texels[undirected] = (0.5, 0.5, 1.0)
-        normals |= context.image(material.normals, texels)
+    if context.files is None:
+        texels = texels_of(texture, context)
+        undirected = np.all(texels == 0.5, axis=-1)
+        # Mitsuba has NaN for a grey of 1/2, and no light; ours keeps the surface's normal.
+        is_replaced = undirected.all() or (texture.filter == "nearest" and undirected.any())
+        if material.scale != 1.0 or is_replaced:
+            factors = np.array([material.scale, material.scale, 1.0])
+            texels = texels * factors + 0.5 * (1.0 - factors)
+            if is_replaced:
+                texels[undirected] = (0.5, 0.5, 1.0)
+            normals |= context.image(material.normals, texels)
     if material.follow_v:
         normals = product([normals], follow_v=True)
     more = {"normalmap": normals, "bsdf": Nested(material.base)}

@@ -24,7 +24,7 @@ from comparisons.renderers import NoCounterpartError
 from comparisons.results.case import RungResult
 from comparisons.rungs.rays.camera import camera_rays, pixel_centres
 from comparisons.rungs.rays.light_context import DISTANT
-from comparisons.statistics.cells import Margins
+from comparisons.statistics.cells import ROUNDING, Margins
 from comparisons.statistics.decide import compare
 from comparisons.statistics.wording import percent
 from reference_rt.cameras.film import BoxFilter
@@ -57,12 +57,9 @@ SELDOM = 1e-4
 """How seldom normal noise that falls as it must seems not to."""
 
 FEWEST = 1000.0
-"""Least particles of suns and skies that may fall on what the camera sees: they come through the
-disk of the whole scene, and where that is thousands of times as wide, next to none does."""
-
-ROUNDING = 1e-6
-"""Relative errors up to this are no noise: the statistics take none to be smaller than float32's
-rounding, as of a channel in which both sides are black."""
+"""Least particles of suns and skies that may fall on what the camera sees, about two a pixel: they
+come through the disk of the whole scene, and where that is thousands of times as wide, next to none
+does."""
 
 EXACT = Margins(image=0.0, tile=0.0, pixel=0.0, stored=0.0, constant=1e-9)
 """Both sides compute in float64, and leave surfaces by some 1e-15 of the scene: the rays that this
@@ -205,14 +202,15 @@ def _told_too_little(reached: float, numbers: dict[str, Any]) -> RungResult:
 
 def _noise_falls(few: RungResult, many: RungResult) -> bool:
     """Whether it does in each channel of the image mean that has noise, as the root of the samples,
-    but for what variances of replicates scatter (F-test)."""
+    but for what variances of replicates scatter (F-test).  Of a channel in which both sides are
+    black the statistics believe no error below ROUNDING, which does not fall."""
     one, two = (
         # None: without a bound, as of a channel in which there is no light.
         {of: math.inf if x is None else x for of, x in errors.items()}
         for errors in (look.numbers["standard_error_of_bias"] for look in (few, many))
     )
     scatter = float(stats.f.isf(SELDOM, REPLICATES - 1, REPLICATES - 1))
-    noisy = [channel for channel, error in one.items() if error > ROUNDING]
+    noisy = [channel for channel, error in one.items() if error > 2.0 * ROUNDING]
     return all(AGAIN * two[channel] ** 2 <= scatter * one[channel] ** 2 for channel in noisy)
 
 

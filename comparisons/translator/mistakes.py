@@ -12,13 +12,14 @@ from comparisons.integrators import translate_integrator, type_of
 from comparisons.integrators.light import as_path
 from comparisons.lights import type_of as type_of_light
 from comparisons.shapes import type_of as type_of_shape
+from comparisons.shapes.plane import RINGS
 from comparisons.translator.endless import left_in
 from reference_rt.integrators import Direct, Light, Path
 from reference_rt.lights import Directional
 from reference_rt.materials import Emissive, Mask, NoSurface, ThinDielectric
 from reference_rt.rendering.scene import Scene
 from reference_rt.scene.model import SceneModel
-from reference_rt.shapes import Mesh, Rectangle, Shape, Solid
+from reference_rt.shapes import Mesh, Plane, Rectangle, Shape, Solid
 
 
 def in_place_of(scene: SceneModel, has_solids: bool = False) -> dict[str, Any] | None:
@@ -110,7 +111,8 @@ def has_endless_media(scene: SceneModel) -> bool:
     medium in them are taken for closed ones.
 
     A medium is dark in Mitsuba, too, where it takes all light on the way to the edge of the scene,
-    which is at least as far as that of its largest rectangle; copies may have another size.
+    which is at least as far as that of its largest rectangle, or of the mesh of a plane; copies may
+    have another size.
     """
     closed: set[str | None] = {None}
     others: set[str | None] = set()
@@ -118,6 +120,7 @@ def has_endless_media(scene: SceneModel) -> bool:
         affine.of_steps(one.transform) for one in scene.shapes if isinstance(one, Rectangle)
     ]
     edges = [float(np.linalg.norm(m[:, :2], axis=0).max()) for m in rectangles]
+    edges += [2.0 ** RINGS[1] for one in scene.shapes if isinstance(one, Plane)]
     reach = max(edges, default=0.0)
     for shape in (*scene.shapes, *(one for group in scene.groups.values() for one in group)):
         if shape.interior is not None:

@@ -47,12 +47,14 @@ of 1/2 fit the strata of the samples.
 """
 
 LEAST_SHARE = 0.125
-"""The least selection probability of a light, times their number.
+"""The least selection probability of a light, times their number, before all are divided by their
+sum, at most 1 + LEAST_SHARE.
 
 Power says nothing of where the light falls: a sun has that of the whole scene's disk, so that in a
-scene of a kilometre a lamp in a room would get one of a million samples, and be missing from most
-pictures.  The variance of scenes that power suits grows by an eighth of itself at most, and only of
-those that have a light below this share.  It counts lights that a tree picks as one.
+scene of a kilometre a lamp of a watt would get one of a million samples beside a sun of 1 W/m², and
+be missing from most pictures.  The variance of scenes that power suits grows by an eighth of itself
+at most, and only of those that have a light below this share.  Lights that a tree picks count as
+one.
 """
 
 
@@ -129,7 +131,8 @@ def _choice(kind: Any, row: Any, weight: FloatArray) -> LightSampler | None:
 
 
 def _at_least(kind: Any, probability: FloatArray) -> FloatArray:
-    """The probabilities (n,), no share of those above 0 below LEAST_SHARE over their number."""
+    """The probabilities (n,), those above 0 raised to LEAST_SHARE over their number at least, and
+    divided by their sum."""
     near = (probability > 0.0) & np.isin(kind, _PLACED)
     shares, of_tree = probability, np.zeros(len(probability), bool)
     if np.count_nonzero(near) > FEW:

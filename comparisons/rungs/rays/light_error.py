@@ -116,8 +116,10 @@ def of_direct_light(context: LightContext) -> FloatArray:
 
 
 def of_area(context: LightContext, target: FloatArray) -> FloatArray:
-    """(n,): the relative error of the area of the lamps that points (n, 3) lie on: float32 rounds
-    their vertices by u of their largest coordinate along either end of their smallest length."""
+    """(n,): the relative error of the area of the lamps that points (n, 3) lie on.
+
+    float32 rounds each corner by u of its largest coordinate, so that a length between two corners
+    is off by 2 u of it, and an area, of two lengths, by 4 u over the smaller one."""
     lamp, sizes = lamp_at(context, target), context.sizes
     largest = np.maximum(sizes.frame.largest(target), sizes.reach_of(lamp.shape))
     return np.asarray(4.0 * UNIT_ROUNDOFF * largest / sizes.feature_of(lamp))

@@ -8,6 +8,7 @@ import pytest
 import comparisons
 from comparisons.compare import diagnosis
 from comparisons.compare.misreadings import misreadings
+from comparisons.compare.path_length import path_lengths
 from comparisons.results.case import Images
 from reference_rt.core.arrays import FloatArray
 from reference_rt.rendering.render import render
@@ -143,7 +144,7 @@ def test_whitted_without_shadows() -> None:
     o, d, *_ = scene.camera_rays()
     candidate = np.where((scene.intersect(o, d).shape == 0)[..., None], alone, reference)
     assert (candidate != reference).any()
-    cause = diagnosis.likeliest(Images(candidate, reference), {}, misreadings(scene))
+    cause = diagnosis.likeliest(Images(candidate, reference), {}, path_lengths(scene))
     assert cause is not None
     assert cause.name == "without shadows"
 

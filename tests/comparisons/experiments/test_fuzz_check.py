@@ -8,6 +8,7 @@ from comparisons.experiments.fuzz.finding import DETERMINISTIC, Effort, Finding,
 from comparisons.experiments.fuzz.generate import parse
 from comparisons.experiments.fuzz.worker import alike, effort_for
 from reference_rt.rendering.render import render
+from reference_rt.rendering.scene import Scene
 from reference_rt.util.errors import ReferenceUnavailableError
 
 BALL = {
@@ -165,3 +166,24 @@ def test_a_reduction_keeps_rung_and_who_is_wrong():
     assert effort_for(FEW, one).pixels > FEW.pixels
     broken = one.model_copy(update={"rung": "identity moved"})
     assert effort_for(FEW, broken).rungs == ("identities",)
+
+
+NEARLY_ON_THE_FLOOR = """
+camera: {type: perspective, eye: [0.3, -1, 4], target: [0, 0, 0], up: [0, 1, 0], fov: 40}
+film: {width: 16, height: 12}
+sampler: {type: sobol, spp: 16}
+integrator: {type: path, max_depth: 4}
+materials: {pane: {type: principled, spec_trans: 1, roughness: 0.3}}
+shapes:
+  - {type: rectangle, transform: [{scale: 3}]}
+  - {type: rectangle, material: pane, transform: [{scale: [1.5, 4, 1]}, {translate: [-2, 0, 2e-5]}]}
+lights: [{type: point, position: [1, 1, 3], intensity: 10}]
+"""
+
+
+def test_pictures_that_mitsuba_does_not_resolve_are_no_finding() -> None:
+    """Its shadow rays from the floor begin above the pane: the second look asks for that."""
+    scene = Scene.parse(NEARLY_ON_THE_FLOOR)
+    first, second = (check.pictures(scene, Effort(), below) for below in ((), ("geometry",)))
+    found = [{rung.name: rung.status for rung in case.rungs} for case in (first, second)]
+    assert [rungs["statistics"] for rungs in found] == ["differ", "reference-limited"]

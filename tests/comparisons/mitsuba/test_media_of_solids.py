@@ -166,6 +166,23 @@ def test_another_shape_may_hold_the_medium(
     assert (in_place_of(scene) is not None) == endless
 
 
+@pytest.mark.parametrize("around", ["exterior: ink", "interior: ink, exterior: ink"])
+def test_behind_a_plane_a_medium_is_as_dark_as_without_end(around: str) -> None:
+    """Mitsuba's own integrator stays: the edge of its scene, the plane's mesh, is far away."""
+    scene = Scene.parse(
+        "materials: {none: {type: none}}\nintegrator: {type: path, max_depth: 20}\n"
+        "camera: {type: perspective, eye: [0, 0, 4], target: [0, 0, 0], fov: 30}\n"
+        "film: {width: 8, height: 6}\n"
+        "media: {ink: {type: homogeneous, sigma_t: 1.0, albedo: 0.5}}\n"
+        "lights: [{type: directional, direction: [0, 0, 1], irradiance: 1}]\n"
+        "shapes: [{type: plane, material: none, interior: ink},\n"
+        f"  {{type: sphere, material: none, center: [0, 0, -3], {around}}}]\n"
+    )
+    assert in_place_of(scene) is None
+    assert np.all(picture(load(scene).mi_scene, 64, 3) == 0.0)
+    assert np.all(rt.render(scene, spp=64).colour == 0.0)
+
+
 @pytest.mark.parametrize(
     ("shape", "endless"),
     [(shape, True) for shape in ENDLESS.items()] + [(shape, False) for shape in CLOSED.items()],

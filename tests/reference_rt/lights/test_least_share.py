@@ -9,7 +9,7 @@ import reference_rt as rt
 from reference_rt.core.transform import Scale
 from reference_rt.scene.build_lights import LEAST_SHARE
 
-FLOOR = rt.Rectangle(transform=(Scale(scale=3.0),))
+FLOOR = rt.Rectangle(transform=(Scale(scale=(3.0, 3.0, 3.0)),))
 FAR = rt.Sphere(center=(0.0, 0.0, -3e6))
 """It makes the scene so large that a sun has 1e12 times the power of a lamp."""
 
@@ -26,6 +26,25 @@ def scene(lights: Any, **parts: Any) -> rt.Scene:
         integrator=rt.Direct(),
         **parts,
     )
+
+
+@pytest.mark.parametrize("integrator", [rt.Direct(), rt.Path(max_depth=3)], ids=["direct", "path"])
+@pytest.mark.parametrize("shape", [rt.Rectangle, rt.Sphere, rt.Disk])
+def test_a_lamp_with_an_area_is_not_lost(shape: Any, integrator: Any) -> None:
+    steps = ({"scale": 0.3}, {"rotate": {"axis": (1, 0, 0), "degrees": 180}})
+    lamp = shape(material="lamp", transform=(*steps, {"translate": (0.5, 0.2, 1.5)}))
+    glow = {"lamp": rt.Emissive(radiance=(3.0, 4.0, 5.0))}
+
+    def mean(lights: Any, shapes: Any) -> Any:
+        lit = scene(lights, materials=glow).changed(shapes=shapes, integrator=integrator)
+        return rt.render(lit, spp=256).colour.mean(axis=(0, 1))
+
+    both = mean((SUN,), (FLOOR, FAR, lamp))
+    # The lamp's shadow, too: it is there, but dark, in the other picture.
+    dark = lamp.model_copy(update={"material": "black"})
+    glow["black"] = rt.Emissive(radiance=(0.0, 0.0, 0.0))
+    alone = mean((SUN,), (FLOOR, FAR, dark)) + mean((), (FLOOR, FAR, lamp))
+    np.testing.assert_allclose(both, alone, rtol=0.02)
 
 
 @pytest.mark.parametrize("kind", ["point", "spot", "projector"])
