@@ -27,6 +27,7 @@ from .lights import Ambient as Ambient
 from .lights import Constant as Constant
 from .lights import Directional as Directional
 from .lights import EnvironmentMap as EnvironmentMap
+from .lights import Goniometric as Goniometric
 from .lights import Point as Point
 from .lights import Projector as Projector
 from .lights import Spot as Spot

@@ -19,6 +19,7 @@ from reference_rt.lights.emitters import (
     constant,
     directional,
     environment_map,
+    goniometric,
     point,
     projector,
     spot,
@@ -29,6 +30,7 @@ from reference_rt.lights.emitters.constant import Environment
 from reference_rt.lights.emitters.directional import Directional as Directional
 from reference_rt.lights.emitters.environment_map import EnvironmentMap as EnvironmentMap
 from reference_rt.lights.emitters.environment_map import EnvironmentMaps
+from reference_rt.lights.emitters.goniometric import Goniometric as Goniometric
 from reference_rt.lights.emitters.point import Point as Point
 from reference_rt.lights.emitters.projector import Projector as Projector
 from reference_rt.lights.emitters.spot import Spot as Spot
@@ -36,7 +38,7 @@ from reference_rt.lights.light import Background, LightBlock, LightSample, put_b
 from reference_rt.lights.selection.choice import LightSampler, LightTree
 
 AnyLight = Annotated[
-    Point | Spot | Projector | Directional | Constant | EnvironmentMap | Ambient,
+    Point | Spot | Goniometric | Projector | Directional | Constant | EnvironmentMap | Ambient,
     Field(discriminator="type"),
 ]
 
@@ -105,6 +107,7 @@ class Lights(NamedTuple):
     areas: Annotated[area.Areas | None, area]
     points: Annotated[point.Points | None, point]
     spots: Annotated[spot.Spots | None, spot]
+    goniometrics: Annotated[goniometric.Goniometrics | None, goniometric]
     projectors: Annotated[projector.Projectors | None, projector]
     directionals: Annotated[directional.Directionals | None, directional]
     environment: Annotated[Environment | EnvironmentMaps | None, _Surroundings]

@@ -15,7 +15,7 @@ from reference_rt.accel.geometry import Geometry
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.materials import Emissive
 from reference_rt.scene.build_geometry import assemble
-from reference_rt.scene.build_lights import environment_of, light_tables
+from reference_rt.scene.build_lights import environment_of, light_tables, lights_of
 from reference_rt.scene.build_materials import material_tables
 from reference_rt.scene.build_media import Boundary, boundaries
 from reference_rt.scene.build_textures import texture_tables, with_uv_sets
@@ -63,7 +63,7 @@ def build_tables(scene: SceneModel) -> SceneTables:
         try:
             textures, palette = texture_tables(scene)
             geometry = assemble(scene, numbers)
-            environment = environment_of(scene)
+            environment, described = environment_of(scene), lights_of(scene)
         except SceneError:
             raise together(_wrong_in_files(scene, numbers)) from None
         if any(isinstance(material, Emissive) for material in scene.materials.values()):
@@ -71,7 +71,7 @@ def build_tables(scene: SceneModel) -> SceneTables:
         default = numbers[Boundary(None)]
         has_default = len(numbers) > default + 1 or _has_material(geometry, default)
         materials = material_tables(scene, palette, has_default, numbers)
-        lights = light_tables(scene, geometry, palette, numbers, environment)
+        lights = light_tables(scene, geometry, palette, numbers, environment, described)
         textures = with_uv_sets(scene, textures, geometry.shapes.triangles)
         geometry = _with_triangles(geometry, _as_in_scenes)
         return SceneTables(geometry, materials, lights, textures)
@@ -79,7 +79,7 @@ def build_tables(scene: SceneModel) -> SceneTables:
 
 def _wrong_in_files(scene: SceneModel, numbers: dict[Boundary, int]) -> Iterator[SceneError]:
     """The errors of textures, shapes and lights, so that all files that are missing are told."""
-    for read in (texture_tables, partial(assemble, materials=numbers), environment_of):
+    for read in (texture_tables, partial(assemble, materials=numbers), environment_of, lights_of):
         try:
             read(scene)
         except SceneError as error:

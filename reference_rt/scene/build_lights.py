@@ -15,6 +15,7 @@ from reference_rt.lights import (
     Areas,
     Constant,
     EnvironmentMap,
+    Goniometric,
     Lights,
     LightSampler,
 )
@@ -64,17 +65,18 @@ def light_tables(
     palette: Palette,
     boundaries: Iterable[Boundary],
     environment: Any,
+    described: Sequence[Any],
 ) -> Lights:
     """All lights, selected in proportion to their power, but each sometimes.  Writes the
     primitives' `light` columns.  boundaries: the rows of the materials;  environment: by
-    `environment_of`."""
+    `environment_of`;  described: the scene's lights, by `lights_of`."""
     radius = scene_radius(geometry)
     materials = [scene.materials.get(boundary.material or "") for boundary in boundaries]
     areas, powers = _area_lights(scene, geometry, palette, materials)
     kinds, rows, weights = [AREA] * len(powers), [*range(len(powers))], [powers]
     tables: dict[str, Any] = {}
     for code, field, description, module in LIGHT_TABLES:
-        found: list[Any] = [light for light in scene.lights if isinstance(light, description)]
+        found: list[Any] = [light for light in described if isinstance(light, description)]
         made = [light.tabulate(palette) for light in found]
         tables[field] = joined(module, made) if found else None
         if found:
@@ -267,6 +269,23 @@ def environment_of(scene: SceneModel) -> Any:
             except ValueError as error:
                 raise scene.error(str(error), "lights", i) from None
     return None
+
+
+def lights_of(scene: SceneModel) -> list[Any]:
+    """The scene's lights, with the table of those that name a file of photometry.  Warns of what
+    of the file is left out.  Raises SceneError."""
+    found: list[Any] = []
+    for i, light in enumerate(scene.lights):
+        left_out = ""
+        try:
+            if isinstance(light, Goniometric):
+                light, left_out = light.read(scene.folder)
+        except ValueError as error:
+            raise scene.error(str(error), "lights", i) from None
+        if left_out:
+            scene.warn(f"of the file is left out {left_out}", "lights", i, "file")
+        found.append(light)
+    return found
 
 
 def _ambient(scene: SceneModel) -> FloatArray | None:

@@ -24,12 +24,25 @@ NAMED: dict[str, dict[str, Any]] = {
 """Fields of a scene with all that examples name but files."""
 
 
+PHOTOMETRY = """IESNA:LM-63-2002
+[TEST] an example
+[MANUFAC] none
+TILT=NONE
+1 -1 2 3 2 1 2 0 0 0
+1 1 10
+0 45 90
+0 90
+900 700 50 900 400 0
+"""
+
+
 def write_files(folder: Path) -> None:
-    """The files that examples name: an image, which files of float32 hold exactly, and the maps of
-    two copies."""
+    """The files that examples name: an image, which files of float32 hold exactly, the maps of two
+    copies, and photometry."""
     image = np.linspace(0.1, 0.9, 12 * 3, dtype=np.float32)
     np.save(folder / "image.npy", image.reshape(3, 4, 3))
     np.save(folder / "copies.npy", np.stack([np.eye(4)[:3], 0.5 * np.eye(4)[:3]]))
+    (folder / "lamp.ies").write_text(PHOTOMETRY, encoding="ascii")
 
 
 def examples(kind: Any) -> list[Any]:
