@@ -14,6 +14,7 @@ from reference_rt.lights import (
     Constant,
     Directional,
     EnvironmentMap,
+    Goniometric,
     Point,
     Projector,
     Spot,
@@ -98,7 +99,7 @@ def _shines(scene: Scene) -> Iterator[bool]:
         match light:
             case Constant(radiance=colour) | Directional(irradiance=colour):
                 yield max(colour) > 0.0
-            case Point(intensity=colour) | Spot(intensity=colour):
+            case Point(intensity=colour) | Spot(intensity=colour) | Goniometric(intensity=colour):
                 yield max(colour) > 0.0
             case Projector(irradiance=colour):
                 yield isinstance(colour, str) or max(colour) > 0.0

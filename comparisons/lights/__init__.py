@@ -9,6 +9,7 @@ from typing import Any
 from comparisons.lights.constant import AMBIENT, CONSTANT
 from comparisons.lights.directional import DIRECTIONAL
 from comparisons.lights.environment_map import ENVIRONMENT_MAP
+from comparisons.lights.goniometric import GONIOMETRIC
 from comparisons.lights.light import Data, LightType
 from comparisons.lights.point import POINT
 from comparisons.lights.projector import PROJECTOR
@@ -19,6 +20,7 @@ from comparisons.mitsuba.node import Node, Reading
 LIGHTS: tuple[LightType[Any], ...] = (
     POINT,
     SPOT,
+    GONIOMETRIC,
     PROJECTOR,
     DIRECTIONAL,
     CONSTANT,

@@ -87,7 +87,7 @@ class LightType(Generic[L]):
     is_bounded: bool
     """Whether some directions are dark: no shadow then explains that only one renderer is."""
     projects: Callable[[L], bool]
-    """Whether an image makes its intensity vary with the direction."""
+    """Whether an image or a table makes its intensity vary with the direction."""
     brightest: Callable[[L], float]
     """The largest radiance, irradiance or intensity, where an image counts as 1."""
     float32: Callable[[L, FloatArray], FloatArray] | None

@@ -1,4 +1,4 @@
-"""Plugins for Mitsuba: materials, views and integrators that it lacks or approximates.
+"""Plugins for Mitsuba: materials, lights, views and integrators that it lacks or approximates.
 
 Each module has `register(mi)`, which defines a class and registers it with Mitsuba: the classes
 derive from classes of a variant, so this runs after every change of the variant.  Plugins follow
@@ -11,6 +11,7 @@ from typing import Any
 from comparisons.mitsuba.plugins import (
     exact_coat,
     exact_coordinates,
+    goniometric,
     materials,
     media_of_solids,
     mesh_area,
@@ -23,7 +24,7 @@ from comparisons.mitsuba.plugins import (
 def register(mi: Any) -> None:
     """Register the plugins of this folder for the current variant."""
     plugins = (
-        *(exact_coat, exact_coordinates, materials),
+        *(exact_coat, exact_coordinates, goniometric, materials),
         *(media_of_solids, mesh_area, path_of_solids, view_rectangle, whitted),
     )
     for plugin in plugins:
