@@ -16,7 +16,7 @@ from comparisons.lights.light import (
     plain,
     similarity,
 )
-from comparisons.mitsuba.context import TranslationContext, UntranslatableError, rgb
+from comparisons.mitsuba.context import TranslationContext, rgb
 from comparisons.mitsuba.node import Node, Reading, triple
 from comparisons.mitsuba.parse import LookAt
 from reference_rt.core.arrays import FloatArray
@@ -49,8 +49,6 @@ def second_reading(content: bytes) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _to_mitsuba(light: Goniometric, context: TranslationContext) -> Data:
-    if context.native:
-        raise UntranslatableError(light, "light")
     vertical, horizontal, values = table_of(light, context.folder)
     return {
         "type": "goniometric",

@@ -35,7 +35,9 @@ OURS = (
 )
 """A note on a plugin."""
 
-OUR_PLUGINS = ("textbook_phong", "gltf_pbr", "view_rectangle", "whitted", "mesh_area")
+OUR_PLUGINS = (
+    *("textbook_phong", "gltf_pbr", "goniometric", "view_rectangle", "whitted", "mesh_area"),
+)
 
 TEXTURES = (*READERS, "uniform")
 """Plugins that are elements of their own, however often they are used."""

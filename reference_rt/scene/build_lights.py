@@ -31,6 +31,7 @@ from reference_rt.scene.model import SceneModel
 from reference_rt.shapes import TABLES as SHAPE_TABLES
 from reference_rt.textures import Colours, Palette
 from reference_rt.textures.parameter import join, joined
+from reference_rt.util.errors import SceneError, together
 
 _PLACED = (AREA, *(code for code, _, _, module in LIGHT_TABLES if hasattr(module, "bounds")))
 """The codes of lights that have a position: a light tree may hold them."""
@@ -273,18 +274,21 @@ def environment_of(scene: SceneModel) -> Any:
 
 def lights_of(scene: SceneModel) -> list[Any]:
     """The scene's lights, with the table of those that name a file of photometry.  Warns of what
-    of the file is left out.  Raises SceneError."""
+    of the file is left out.  Raises SceneError with all files that cannot be used."""
     found: list[Any] = []
+    errors: list[SceneError] = []
     for i, light in enumerate(scene.lights):
         left_out = ""
         try:
             if isinstance(light, Goniometric):
                 light, left_out = light.read(scene.folder)
         except ValueError as error:
-            raise scene.error(str(error), "lights", i) from None
+            errors.append(scene.error(str(error), "lights", i))
         if left_out:
             scene.warn(f"of the file is left out {left_out}", "lights", i, "file")
         found.append(light)
+    if errors:
+        raise together(errors)
     return found
 
 

@@ -5,6 +5,7 @@ direction to the table: the table stays as it is given, and a horizontal angle i
 the table has it, by the lamp's planes of symmetry.
 """
 
+from bisect import bisect_right
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ def register(mi: Any) -> None:
             # Counterclockwise for who looks along the axis.
             self.axes = [c0.tolist(), np.cross(c0, down).tolist(), down.tolist()]
             self.vertical, self.horizontal, self.values = (
-                np.array(properties[name].split(), np.float64)
+                np.array(properties[name].split(), np.float64).tolist()
                 for name in ("vertical_angles", "horizontal_angles", "values")
             )
             self.intensity = [float(c) for c in np.ravel(properties["intensity"])] * (
@@ -72,7 +73,7 @@ def register(mi: Any) -> None:
             towards the next."""
             n = len(angles)
             if not is_wide(mi):
-                j = int(np.clip(np.searchsorted(angles, x, side="right") - 1, 0, n - 2))
+                j = min(max(bisect_right(angles, x) - 1, 0), n - 2)
                 return j, (x - angles[j]) / (angles[j + 1] - angles[j])
             column = mi.Float64(angles)
             after = dr.binary_search(0, n, lambda k: dr.gather(mi.Float64, column, k) <= x)

@@ -138,10 +138,8 @@ class Goniometric(Description):
         horizontal = np.radians(horizontal)
         c0, c90, axis = self._frame()
         shines = np.flatnonzero(values.max(axis=0) > 0.0)
-        first, last = (
-            max(shines.min(initial=0) - 1, 0),
-            min(shines.max(initial=0) + 1, len(vertical) - 1),
-        )
+        # Towards a neighbour without light the intensity falls off.
+        ends = np.append(shines[:1] - 1, shines[-1:] + 1).clip(0, len(vertical) - 1)
         return Goniometrics(
             position=np.array([self.origin]),
             c0=c0[None],
@@ -155,7 +153,7 @@ class Goniometric(Description):
             values=values.ravel(),
             flux=np.array([flux(vertical, horizontal, values)]),
             greatest=np.array([values.max()]),
-            range=vertical[None, [first, last]],
+            range=vertical[None, ends] if len(ends) else np.zeros((1, 2)),
         )
 
 

@@ -214,6 +214,7 @@ def _white(found: re.Match[str]) -> str:
 ALONE = {
     "radiancemeter": {},  # is read as another camera
     "view_rectangle": {},  # ours
+    "goniometric": {},  # ours
     "sunsky": {},
     "envmap": {},  # needs a file
     "volpath": {},
