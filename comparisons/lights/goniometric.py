@@ -41,9 +41,8 @@ def second_reading(content: bytes) -> tuple[FloatArray, FloatArray, FloatArray]:
     if how.strip() == b"INCLUDE":
         numbers = numbers[2 + 2 * int(numbers[1]) :]
     m, k = int(numbers[3]), int(numbers[4])
-    # Since 2002 the second number of the line of the ballast is no factor.
-    is_new = b"2002" in head[:24] or b"2019" in head[:24]
-    factor = numbers[2] * numbers[10] * (1.0 if is_new else numbers[11])
+    # Since 1995 the second number of the line of the ballast is no factor.
+    factor = numbers[2] * numbers[10] * (1.0 if b":LM-63-" in head[:16] else numbers[11])
     vertical, horizontal, values, _ = np.split(numbers[13:], np.cumsum([m, k, k * m]))
     return vertical, horizontal, factor * values.reshape(k, m)
 

@@ -185,9 +185,9 @@ def _table(numbers: _Numbers, year: int, tilts: bool) -> Photometry:
         metres * numbers.number(f"the opening's {name}") for name in ("width", "length", "height")
     )
     factor *= numbers.number("the ballast factor", above=0.0)
-    # Since 2002 this number is no factor: it was reserved, and now says how the file was made.
+    # Since 1995 this number is no factor: it was reserved, and in 2019 says how the file was made.
     other = numbers.number("the ballast-lamp photometric factor")
-    if year < 2002:
+    if year < 1995:
         if other <= 0.0:
             raise numbers.wrong(
                 f"the ballast-lamp photometric factor is {other:g}; expected more than 0"

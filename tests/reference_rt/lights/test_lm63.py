@@ -29,7 +29,7 @@ TILT=INCLUDE
 0 45 90
 1 1 1
 1 1000 2 2 2 1 2 0 0 0
-1 1 75
+1 0.5 75
 0 180
 0 90
 10 20
@@ -69,9 +69,9 @@ FOOT = 0.3048
 
 READ = {
     "1986": (OF_1986, [0, 45, 90], [0], 0.45 * np.array([[100, 80, 20]]), (0.5, 2, 0), FOOT),
-    "1991": (OF_1991, [0, 180], [0, 90], [[20, 40], [60, 80]], (0, 0, 0), 1),
+    "1991": (OF_1991, [0, 180], [0, 90], [[10, 20], [30, 40]], (0, 0, 0), 1),
     "1995": (
-        OF_1995, [0, 30, 90], [90, 180, 270], 0.36 * np.arange(10, 91, 10).reshape(3, 3),
+        OF_1995, [0, 30, 90], [90, 180, 270], 0.4 * np.arange(10, 91, 10).reshape(3, 3),
         (-0.3, -0.3, 0), 1,
     ),
     "2002": (OF_2002, [0, 180], [0, 30, 60, 90], 0.5 * np.arange(1, 9).reshape(4, 2), (0, 0, 0), 1),
@@ -95,8 +95,8 @@ def agrees(found: Photometry, year: str) -> None:
 
 @pytest.mark.parametrize("year", READ)
 def test_files_of_each_year(year: str) -> None:
-    """Factors are the multiplier and that of the ballast; until 1995 the third one, too, which is
-    no factor any more: reserved in 2002, and the kind of the measurement in 2019."""
+    """Factors are the multiplier and that of the ballast; until 1991 the third one, too, which is
+    no factor any more: reserved in 1995 and 2002, and the kind of the measurement in 2019."""
     agrees(parse(of(year)), year)
 
 
@@ -165,8 +165,8 @@ WRONG = {
         "line 8: the ballast factor is -0.5; expected more than 0",
     ),
     "lamp and ballast": (
-        OF_1995.replace("0.8, 0.9", "0.8, 0").encode("latin-1"),
-        "line 8: the ballast-lamp photometric factor is 0; expected more than 0",
+        OF_1991.replace("1 0.5 75", "1 0 75").encode(),
+        "line 11: the ballast-lamp photometric factor is 0; expected more than 0",
     ),
     "one angle": (
         OF_2002.replace("1 2 4 1 2", "1 1 4 1 2").encode(),
