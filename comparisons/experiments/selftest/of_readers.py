@@ -222,6 +222,25 @@ OF_UNITS = (
         "scale=np.array([self.scale])", "scale=np.array([1.0])",
         "direct",
     ),
+    _shared(
+        "horizontal angles of a lamp's table clockwise", "goniometric",
+        "lights/emitters/goniometric.py",
+        "np.cross(axis, c90), c90, axis", "np.cross(axis, c90), -c90, axis",
+        "direct",
+    ),
+    _shared(
+        "a half of a lamp's table repeated, not mirrored", "goniometric",
+        "lights/emitters/goniometric.py",
+        "values = np.concatenate([values, values[-2::-1]])",
+        "values = np.concatenate([values, values[1:]])",
+        "direct",
+    ),
+    _shared(
+        "multiplier of photometry ignored", "goniometric", "lights/lm63.py",
+        'factor = numbers.number("the multiplier", above=0.0)',
+        'factor = numbers.number("the multiplier", above=0.0) * 0.0 + 1.0',
+        "direct",
+    ),
 )  # fmt: skip
 
 FAULTS = (*OF_MESHES, *OF_TRANSFORMS, *OF_IMAGES, *OF_UNITS)
