@@ -26,7 +26,7 @@ from comparisons.geometry.frame import Frame
 from comparisons.translator.moved import moved as in_frame
 from reference_rt.core import transform
 from reference_rt.core.arrays import FloatArray
-from reference_rt.lights import Directional, Point, Spot
+from reference_rt.lights import Directional, Goniometric, Point, Spot
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
 from reference_rt.shapes import Mesh
@@ -92,7 +92,12 @@ def _turned(scene: Scene, turn: Motion) -> Scene:
         found = {name: tuple(turn.points([getattr(part, name)])[0].tolist()) for name in names}
         return part.model_copy(update=found)
 
-    places = {Point: ("position",), Spot: ("origin", "target"), Directional: ("direction",)}
+    places = {
+        Point: ("position",),
+        Spot: ("origin", "target"),
+        Goniometric: ("origin", "target", "c0"),
+        Directional: ("direction",),
+    }
     rows = np.column_stack([turn.turn, np.zeros(3)]).tolist()
     step = transform.Matrix.model_validate({"matrix": rows})
     return scene.changed(

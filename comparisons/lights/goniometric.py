@@ -76,21 +76,21 @@ def _from_mitsuba(reading: Reading, node: Node) -> Goniometric:
     vertical, horizontal, values = (
         _read_numbers(node, name) for name in ("vertical_angles", "horizontal_angles", "values")
     )
-    rows = [values[k : k + len(vertical)] for k in range(0, len(values), max(len(vertical), 1))]
+    starts = range(0, len(values), max(len(vertical), 1))
     return Goniometric(
         origin=origin,
         target=target,
         c0=c0,
         vertical_angles=vertical,
         horizontal_angles=horizontal,
-        values=rows,
+        values=tuple(values[k : k + len(vertical)] for k in starts),
         intensity=plain(node, "intensity"),
     )
 
 
-def _read_numbers(node: Node, name: str) -> list[float]:
+def _read_numbers(node: Node, name: str) -> tuple[float, ...]:
     try:
-        return [float(word) for word in node.text(name, "").split()]
+        return tuple(float(word) for word in node.text(name, "").split())
     except ValueError:
         raise node.error(f"'{name}' has a word that is no number; expected numbers") from None
 

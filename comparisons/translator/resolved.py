@@ -198,8 +198,9 @@ class _Document:
 
     def light(self, light: Any, number: int) -> dict[str, Any]:
         found: dict[str, Any] = light.model_dump(mode="json")
-        if isinstance(light, EnvironmentMap):
+        if found.get("file") is not None:
             found["file"] = self.files.copy(light.file, "lights", number, "file")
+        if isinstance(light, EnvironmentMap):
             found["transform"] = transform.affine(light.transform).tolist()
         return found
 

@@ -307,11 +307,27 @@ def _quadric(draw: Draw) -> Data:
     return found | ({"capped": draw.chance(0.5)} if draw.chance(0.5) else {})
 
 
+def _goniometric(draw: Draw) -> Data:
+    """A lamp with a table, of any symmetry; its place is given by others."""
+    around = draw.pick(
+        ([0], [0, 90], [0, 30, 90], [0, 60, 180], [90, 150, 200, 270], [0, 100, 200, 300, 360])
+    )
+    down = draw.pick(([0, 20, 50, 90], [0, 35, 70, 120, 180], [0, 10, 60]))
+    values = [[draw.log(0.3, 3.0) for _ in down] for _ in around]
+    for row in values:
+        row[0] = values[0][0]  # one direction
+    if around[-1] == 360:
+        values[-1] = values[0]
+    found = {"vertical_angles": down, "horizontal_angles": around, "values": values}
+    return found | {"intensity": draw.log(10.0, 60.0), "c0": draw.vector()}
+
+
 SPECIAL: dict[str, Callable[[Draw], Data]] = {
     "triangle": _triangle,
     "polygon": _polygon,
     "cylinder": _cylinder,
     "torus": _torus,
     "quadric": _quadric,
+    "goniometric": _goniometric,
 }
 """Types whose fields depend on each other in ways that few random numbers satisfy."""

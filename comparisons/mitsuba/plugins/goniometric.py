@@ -76,7 +76,8 @@ def register(mi: Any) -> None:
                 j = min(max(bisect_right(angles, x) - 1, 0), n - 2)
                 return j, (x - angles[j]) / (angles[j + 1] - angles[j])
             column = mi.Float64(angles)
-            after = dr.binary_search(0, n, lambda k: dr.gather(mi.Float64, column, k) <= x)
+            search: Any = dr.binary_search
+            after = search(0, n, lambda k: dr.gather(mi.Float64, column, k) <= x)
             j = mi.UInt32(dr.clip(mi.Int32(after) - 1, 0, n - 2))
             low, high = dr.gather(mi.Float64, column, j), dr.gather(mi.Float64, column, j + 1)
             return j, (x - low) / (high - low)
