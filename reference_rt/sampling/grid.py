@@ -17,7 +17,8 @@ def _square(n: int) -> int:
 
 class Grid(Description):
     """The centres of n x n equal cells of the pixel, without random numbers: for deterministic
-    integrators, and for `direct` where all lights are points, spots, projectors or directional."""
+    integrators, and for `direct` where all lights are points, spots, goniometric, projectors or
+    directional."""
 
     EXAMPLES: ClassVar[Examples] = ({}, {"spp": 4})
     type: Literal["grid"] = "grid"
