@@ -112,12 +112,18 @@ _AXIS = {"origin": (0.0, 4.0, 0.5), "target": (0.0, 0.0, 0.0)}
 _BALL = (rt.Sphere(center=(0.3, 0.0, 0.0), radius=0.5),)
 _TURNED = ({"scale": (0.5, 0.7, 0.3)}, {"rotate": {"axis": (1.0, 2.0, 3.0), "degrees": 40.0}})
 _CUTOFF = math.radians(30.0)
+_TABLE = {"vertical_angles": (0.0, 90.0), "values": ((4.0, 1.0),)}
 
 LAMPS = {
     "point": ({"lights": (rt.Point(position=(1.0, 2.0, 3.0), intensity=2.0),)}, 8.0 * math.pi),
     "spot": (
         {"lights": (rt.Spot(**_AXIS, intensity=3.0, cutoff_angle=30.0, beam_width=30.0),)},
         6.0 * math.pi * (1.0 - math.cos(_CUTOFF)),
+    ),
+    "goniometric": (
+        {"lights": (rt.Goniometric(**_AXIS, intensity=2.0, **_TABLE),)},
+        # 4 less 3 gamma / (pi / 2), times sin gamma, whose primitives are known.
+        2.0 * 2.0 * math.pi * (4.0 - 3.0 / (0.5 * math.pi)),
     ),
     "projector": (
         {"lights": (rt.Projector(**_AXIS, irradiance=2.0, fov=60.0, aspect=2.0),)},
@@ -293,6 +299,15 @@ def test_every_filter_spreads_it(of: Any) -> None:
 LIGHTS = {
     "point": (rt.Point(position=(1.0, 2.5, 1.0), intensity=9.0),),
     "spot": (rt.Spot(**_AXIS, intensity=30.0, cutoff_angle=25.0),),
+    "goniometric": (
+        rt.Goniometric(
+            **_AXIS,
+            intensity=5.0,
+            vertical_angles=(0.0, 20.0, 50.0),
+            horizontal_angles=(90.0, 180.0, 270.0),
+            values=((4.0, 3.0, 0.0), (4.0, 1.0, 0.0), (4.0, 5.0, 1.0)),
+        ),
+    ),
     "projector": (rt.Projector(**_AXIS, irradiance=20.0, fov=40.0),),
     "sun": (rt.Directional(direction=(1.0, -2.0, -1.0), irradiance=2.0),),
     "sky": (rt.Constant(radiance=(0.3, 0.4, 0.5)),),
