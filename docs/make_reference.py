@@ -324,6 +324,8 @@ def _array(value: Mapping[str, Any], targets: list[str]) -> str:
     if most is None:
         if least is not None and items.get("type") == "number":
             return f"{least} numbers or more"
+        if items.get("type") == "number":
+            return "a list of numbers"
         return "a list" if least is None else f"a list of at least {least}"
     count = str(most) if least == most else f"{least} or {most}"
     return f"{count} {'integers' if items.get('type') == 'integer' else 'numbers'}{_range(items)}"

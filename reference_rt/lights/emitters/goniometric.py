@@ -8,11 +8,12 @@ is continuous, takes the table's values, and overshoots none of them.
 """
 
 import math
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import Strict, model_validator
+from pydantic import AfterValidator, Strict, model_validator
 
 from reference_rt.core.arrays import FloatArray, IntArray
 from reference_rt.core.model import Colour, Description, Direction, Examples, Vector
@@ -27,6 +28,22 @@ from reference_rt.textures.parameter import join as joined_columns
 
 _PLACE = {"origin": (0.0, 4.0, 0.5), "target": (0.0, 0.0, 0.0)}
 _Numbers = Annotated[tuple[float, ...], Strict(False)]
+
+
+def _checked(check: Callable[[Sequence[float]], None]) -> AfterValidator:
+    def checked(angles: tuple[float, ...]) -> tuple[float, ...]:
+        check(angles)
+        return angles
+
+    return AfterValidator(checked)
+
+
+def _not_negative(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+    if not rows or not all(rows):
+        raise ValueError("expected rows of numbers, one for each horizontal angle")
+    if min(map(min, rows)) < 0.0:
+        raise ValueError("has a negative number; expected numbers of at least 0")
+    return rows
 
 
 class Goniometric(Description):
@@ -56,12 +73,14 @@ class Goniometric(Description):
     file: str | None = None
     """A file of photometry (.ies, IESNA LM-63, type C), relative to the scene file.  Its candelas,
     with the multiplier and the ballast factors, are taken for W sr^-1."""
-    vertical_angles: _Numbers | None = None
+    vertical_angles: Annotated[_Numbers, _checked(check_vertical)] | None = None
     """Without a file: angles from the axis in degrees, ascending, from 0 to 180; two or more."""
-    horizontal_angles: _Numbers | None = None
+    horizontal_angles: Annotated[_Numbers, _checked(check_horizontal)] | None = None
     """Angles around the axis in degrees, ascending: 0 alone for a lamp that is the same all around,
     0 to 90, 0 to 180 or 90 to 270 for one that is symmetric, or 0 to 360.  Default: 0 alone."""
-    values: Annotated[tuple[_Numbers, ...], Strict(False)] | None = None
+    values: Annotated[tuple[_Numbers, ...], Strict(False), AfterValidator(_not_negative)] | None = (
+        None
+    )
     """Without a file: a row for each horizontal angle of the intensities at all vertical angles, in
     W sr^-1, at least 0."""
     intensity: Colour = (1.0, 1.0, 1.0)
@@ -80,18 +99,14 @@ class Goniometric(Description):
         if len(own) < 2:
             raise ValueError("has no table; expected a file, or vertical_angles and values")
         assert self.vertical_angles is not None
-        check_vertical(self.vertical_angles)
-        check_horizontal(self._horizontal)
         k, m = len(self._horizontal), len(self.vertical_angles)
         rows = self.values or ()
         if [len(one) for one in rows] != [m] * k:
-            lengths = ", ".join(sorted({str(len(one)) for one in rows})) or "no"
+            lengths = ", ".join(sorted({str(len(one)) for one in rows}))
             raise ValueError(
                 f"values has {len(rows)} rows of {lengths} numbers; expected {k} of {m}, a row for "
                 "each horizontal angle"
             )
-        if min(map(min, rows)) < 0.0:
-            raise ValueError("values has a negative number; expected numbers of at least 0")
         return self
 
     @property

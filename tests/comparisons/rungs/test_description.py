@@ -57,7 +57,8 @@ SECTIONS = {
 KINDS = {
     "number": r"number( .*)?", "integer": r"integer .*", "flag": r"`true`, `false`",
     "text": r"text|(`\w+`, )+`\w+`", "text or texts": r".* or a list of (`\w+`, )+`\w+`",
-    "texts": r"a list of .*", "vector": r"3 numbers", "numbers": r"(4|10) numbers",
+    "texts": r"a list of .*", "vector": r"3 numbers",
+    "numbers": r"(4|10) numbers|a list of (a list of )?numbers",
     "colour": r"colour [^a-z]*( to 1)?|colour from 0 to 1", "factors": "number or a list",
     "pair": r"number or 2 numbers", "pair or texture": r"number .*2 numbers or a texture's name",
     "number or texture": r"number .*or a texture's name",

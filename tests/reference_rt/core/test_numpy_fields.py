@@ -39,6 +39,13 @@ REQUIRED = {
         "target": [0.0, 0.0, 1.0],
         "irradiance": [0.5, 0.25, 1.0],
     },
+    "Goniometric": {
+        "origin": [1.0, 2.0, 3.0],
+        "target": [0.0, 0.0, 1.0],
+        "vertical_angles": [0.0, 45.0, 90.0],
+        "horizontal_angles": [0.0, 90.0],
+        "values": [[0.5, 0.25, 1.0], [0.5, 0.75, 2.0]],
+    },
     "Spot": {"origin": [1.0, 2.0, 3.0], "target": [0.0, 0.0, 1.0], "intensity": [0.5, 0.25, 1.0]},
     "BlendPhase": {"first": {"type": "isotropic"}, "second": {"type": "hg", "g": 0.5}},
     "Homogeneous": {"sigma_t": [0.5, 0.25, 1.0], "albedo": [0.5, 0.25, 1.0]},

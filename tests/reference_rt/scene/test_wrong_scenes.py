@@ -265,7 +265,7 @@ TOGETHER = [
 ]  # fmt: skip
 
 LIGHTS = [
-    ("type: laser", "", "unknown type 'laser'; expected one of: point, spot, projector,"),
+    ("type: laser", "", "unknown type 'laser'; expected one of: point, spot, goniometric,"),
     ("type: constant, radiance: t", ".radiance", "expected one number or three [r, g, b]"),
     ("type: ambient, radiance: .nan", ".radiance", "expected numbers of at least 0"),
     ("type: directional, direction: [0, 0, 0], irradiance: 1", ".direction", "expected a"),
