@@ -31,7 +31,7 @@ from scipy import stats
 from comparisons.truth.case import Expected, FloatArray
 
 LEVEL = 1e-4
-"""The chance that a right renderer fails a case: 1.7 % for all of 165."""
+"""The chance that a right renderer fails a case: 1.7 % for all of 166."""
 
 TILES = 4
 """Tiles along each side of a picture."""

@@ -122,6 +122,29 @@ def spot_falloff_by_cutoff() -> Expected:
 
 
 @case(
+    r"$\frac{\rho I(\gamma, C) h}{\pi d^3}$, $I$ bilinear in $\gamma$ and $C$",
+    "a lamp with a measured table",
+)
+def measured_lamp() -> Expected:
+    """gamma is the angle from the axis, straight down, and C that around it, from the x axis
+    counterclockwise seen from above.  Between the table's angles I is linear in each.  Its kinks in
+    C lie on the pixels' edges; those in gamma are not stated, nor what is below the lamp."""
+    vertical, table = (0.0, 30.0, 90.0), ((1, 0.7, 0.1), (1, 0.3, 0.5), (1, 0.9, 0), (1, 0.2, 0.4))
+    half_pixel = 4.0 / 32 / 2
+
+    def irradiance(x: FloatArray, y: FloatArray) -> FloatArray:
+        x, y = x - 0.25, y + 0.125
+        out, d = np.hypot(x, y), np.sqrt(x**2 + y**2 + 4.0)
+        gamma, c = np.degrees(np.arctan2(out, 2.0)), np.degrees(np.arctan2(y, x)) % 360.0
+        rows = np.stack([np.interp(gamma, vertical, row) for row in (*table, table[0])])
+        share = np.stack([np.maximum(0.0, 1.0 - abs(c / 90.0 - k)) for k in range(5)])
+        close = (abs(gamma - 30.0) < np.degrees(half_pixel / 2.0)) | (out < 6.0 * half_pixel)
+        return np.where(close, np.nan, (rows * share).sum(axis=0) * 2.0 / d**3)
+
+    return _floor(irradiance, INTENSITY)
+
+
+@case(
     r"$\frac{\rho E}{\pi d^2} A$, $A$ the area of the image in the pixel",
     "a projector's even image",
 )

@@ -88,7 +88,7 @@ def test_the_page_in_a_browser(run, check_page):
             "--renderer: expected ours, mitsuba, both, cycles or povray",
         ),
         (["gate", "--truth", "nothing", "a.npy"], "--truth: there is no case 'nothing'"),
-        (["gate", "--truth", "all", "a.npy"], "is 165 cases; expected one, or --command"),
+        (["gate", "--truth", "all", "a.npy"], "is 166 cases; expected one, or --command"),
         (["gate", "--truth", "slab"], "expected either candidates, --command, --browser or --pair"),
         (
             ["gate", "--truth", "slab", "a.npy", "--scene", "x.yaml"],

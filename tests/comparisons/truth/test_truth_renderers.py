@@ -42,6 +42,8 @@ FAULTS = (
     ("point_over_floor", "0.3, 1]", "0.3, 1.005]"),
     ("point_over_slope", "degrees: 40", "degrees: 40.1"),
     ("three_points", "intensity: [0.2, 0.2, 0]", "intensity: [0.2, 0.22, 0]"),
+    ("measured_lamp", "[1, 0.3, 0.5]", "[1, 0.303, 0.5]"),
+    ("measured_lamp", "c0: [1, 0, 0]", "c0: [1, 0.01, 0]"),
     ("spot_falloff", "beam_width: 10", "beam_width: 11"),
     ("spot_falloff", "cutoff_angle: 25", "cutoff_angle: 25.2"),
     ("projector", "aspect: 1.5", "aspect: 1.49"),
