@@ -30,16 +30,19 @@ WATT = 179.0
 
 
 def photometry(
-    horizontal: tuple[int, ...], heading: str = "IESNA:LM-63-2002", other: float = 1
+    horizontal: tuple[int, ...],
+    heading: str = "IESNA:LM-63-2002",
+    other: float = 1,
+    vertical: tuple[int, ...] = VERTICAL,
 ) -> str:
     """A file with random candelas;  other: the second number of the ballast's line."""
-    rows = np.random.default_rng(1).integers(100, 900, (len(horizontal), len(VERTICAL)))
+    rows = np.random.default_rng(1).integers(100, 900, (len(horizontal), len(vertical)))
     rows[:, 0], rows[:, -1] = 500, 300
     if horizontal[-1] == 360:
         rows[-1] = rows[0]
-    numbers = f"1 -1 1 {len(VERTICAL)} {len(horizontal)} 1 2 0 0 0\n1 {other} 10"
+    numbers = f"1 -1 1 {len(vertical)} {len(horizontal)} 1 2 0 0 0\n1 {other} 10"
     labels = "[TEST] 1\n[TESTLAB] none\n[ISSUEDATE] 1-JAN-2020\n[MANUFAC] none"
-    table = [VERTICAL, horizontal, *rows.tolist()]
+    table = [vertical, horizontal, *rows.tolist()]
     lines = [heading, labels, "TILT=NONE", numbers, *(" ".join(map(str, row)) for row in table)]
     return "\n".join(lines) + "\n"
 
@@ -88,6 +91,11 @@ def main() -> None:
             text = photometry((0,), heading, 1.1)
             theirs, ours = by_radiance(text, points, programs, place), by_us(text, points, place)
             print(f"{heading}, third factor 1.1: Radiance over ours {(theirs / ours).mean():.4f}")
+        half = photometry((0,), vertical=(0, 30, 60, 90))
+        theirs, ours = by_radiance(half, points, programs, place), by_us(half, points, place)
+        behind = points[:, 2] > 0.0
+        print(f"beyond a table that ends at 90 degrees with 3: {theirs[behind].max():.3f} at most")
+        print(f"  by us {ours[behind].max():.3f}")
 
 
 if __name__ == "__main__":
