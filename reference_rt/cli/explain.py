@@ -19,6 +19,7 @@ from reference_rt.cli.media_sides import contradictions
 from reference_rt.integrators import RayCast, Whitted
 from reference_rt.integrators.scene_tables import SceneTables
 from reference_rt.jit.kernel import Signature, is_compiled
+from reference_rt.lights import TABLES as LIGHT_TABLES
 from reference_rt.lights import Lights
 from reference_rt.lights.emitters.environment_map import EnvironmentMaps
 from reference_rt.materials.bsdfs.tables import TABLES as MATERIAL_TABLES
@@ -232,10 +233,7 @@ def _lights(scene: Scene, tables: SceneTables, used: Lines, pruned: Lines) -> No
         pruned.append(("lights", "ray casting shows surfaces without light"))
         return
     for name, table in (
-        ("point lights", lights.points),
-        ("spots", lights.spots),
-        ("projectors", lights.projectors),
-        ("directional lights", lights.directionals),
+        *((f"lights: {field}", getattr(lights, field)) for _, field, _, _ in LIGHT_TABLES),
         ("emissive primitives", lights.areas),
     ):
         if table is None:

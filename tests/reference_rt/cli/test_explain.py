@@ -8,6 +8,7 @@ from galleries import GALLERIES
 
 import reference_rt as rt
 from reference_rt.cli.explain import explain
+from reference_rt.lights import TABLES as LIGHT_TABLES
 from reference_rt.materials.bsdfs.tables import TABLES as LEAVES
 from reference_rt.scene import build_hierarchies
 from reference_rt.scene.examples import examples
@@ -20,9 +21,7 @@ SHAPES = tuple(field for _, field, _, _ in TABLES)
 MATERIALS = tuple(field for _, field, _, _, _ in LEAVES)
 WRAPPERS = ("layers", "shares", "bumps", "normal maps")
 LIGHTS = {
-    "point lights": "points",
-    "spots": "spots",
-    "directional lights": "directionals",
+    **{f"lights: {field}": field for _, field, _, _ in LIGHT_TABLES},
     "emissive primitives": "areas",
     "environment": "environment",
     "light tree": "tree",
@@ -119,7 +118,7 @@ def test_whitted_on_a_grid():
     _, used, left_out = explained(scene)
     assert "random numbers" in left_out
     assert "light of the environment" in left_out
-    assert used["point lights"] == "1"
+    assert used["lights: points"] == "1"
     assert "ambient light" in used
 
 
