@@ -25,16 +25,17 @@ from reference_rt.lights import Goniometric
 
 def table_of(light: Goniometric, folder: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The angles in degrees, vertical (m,) and horizontal (k,), and the values (k, m) of a
-    description, of a file as this second reader reads it.  Raises ValueError."""
+    description, of a file as this second reader reads it.  Raises ValueError for a file that ours
+    refuses, which says why."""
     if light.file is not None:
+        light.read(folder)
         return second_reading((folder / light.file).read_bytes())
     horizontal = (0.0,) if light.horizontal_angles is None else light.horizontal_angles
     return np.array(light.vertical_angles), np.array(horizontal), np.array(light.values)
 
 
 def second_reading(content: bytes) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The same of an LM-63 file, by the order of its numbers alone.  Raises ValueError where they
-    are too few."""
+    """The same of a sound LM-63 file, by the order of its numbers alone."""
     head, _, tail = content.partition(b"TILT=")
     how, _, rest = tail.replace(b"\r", b"\n").partition(b"\n")
     numbers = np.array(re.findall(rb"[-+.\deE]+", rest), np.float64)

@@ -172,6 +172,13 @@ def integrator(scene: Scene, surfaces: Surfaces) -> Element:
 
 
 def lights(scene: Scene, surfaces: Surfaces) -> list[Element]:
-    """Those that are no shapes.  Raises UntranslatableError."""
-    found = (translate_light(light, surfaces.context) for light in scene.lights)
-    return [surfaces.element(value, "emitter") for value in found if value is not None]
+    """Those that are no shapes.  Raises UntranslatableError, SceneError."""
+    found = []
+    for k, light in enumerate(scene.lights):
+        try:
+            value = translate_light(light, surfaces.context)
+        except ValueError as error:
+            raise scene.error(str(error), "lights", k) from None
+        if value is not None:
+            found.append(surfaces.element(value, "emitter"))
+    return found

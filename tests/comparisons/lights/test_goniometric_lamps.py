@@ -20,6 +20,7 @@ from comparisons.mitsuba.context import NO_CONTEXT
 from comparisons.rungs import direct
 from comparisons.translator import load
 from comparisons.translator.reading import read_dict
+from comparisons.translator.writing import write_xml
 from reference_rt.lights.lm63 import parse
 
 VERTICAL = (0.0, 10.0, 25.0, 60.0, 90.0, 140.0, 180.0)
@@ -109,6 +110,26 @@ def test_it_moves_with_the_world(horizontal: tuple[float, ...]) -> None:
     # Rounding of the places turns directions by some 1e-15, which the steepest table has 1e3 times.
     np.testing.assert_allclose(other, one, rtol=1e-10, atol=1e-11)
     assert BY_TYPE[rt.Goniometric].moved(light, motion._replace(steps=({"scale": -1},))) is None
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", r"a.ies: has no line 'TILT='"),
+        (READ["2002"][0].encode()[:-9], r"a.ies: line 11: the file ends before value 5 of 8"),
+        (None, "a.ies: cannot be read: No such file"),
+    ],
+)
+def test_a_wrong_file_is_told_when_a_scene_is_written(
+    content: bytes | None, message: str, tmp_path: Path
+) -> None:
+    if content is not None:
+        (tmp_path / "a.ies").write_bytes(content)
+    light = "{type: goniometric, origin: [0, 1, 0], target: [0, 0, 0], file: a.ies}"
+    (tmp_path / "s.yaml").write_text(f"lights:\n  - {light}\n")
+    with pytest.raises(rt.SceneError, match=rf"s.yaml:2: lights\[0\]: .*{message}"):
+        write_xml(rt.Scene.load(tmp_path / "s.yaml"), tmp_path / "s.xml")
+    assert not (tmp_path / "s.xml").exists()
 
 
 FLOOR = """
