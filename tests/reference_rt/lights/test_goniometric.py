@@ -362,6 +362,31 @@ def test_lamps_keep_to_their_own_tables():
     assert np.array_equal(goniometric.power(table, 1.0), powers)
 
 
+def test_a_tree_of_lamps_picks_each_that_shines():
+    """Of forty lamps, most of which are dark at a point: the mean of what is picked, over its
+    probability, is the sum of all, within five standard errors."""
+    rng, lamps = np.random.default_rng(20), []
+    for k in range(40):
+        own = list(KINDS.values())[k % 4]
+        table = values(len(own), k) * (np.arange(len(VERTICAL)) < 1 + k % 4)
+        table = table[:, ::-1] if k % 3 == 0 else table
+        place = rng.uniform(-3.0, 3.0, (2, 3))
+        lamps.append(lamp(own, table, origin=tuple(place[0]), target=tuple(place[1])))
+    scene = rt.Scene(lights=tuple(lamps))
+    assert scene.tables.lights.tree is not None
+    for p in rng.uniform(-3.0, 3.0, (4, 3)):
+        alone = [rt.Scene(lights=(one,)).sample_lights(p[None], [[0.5] * 3]) for one in lamps]
+        expected = sum(one.radiance[0, 0] for one in alone if one.pdf[0] > 0.0)
+        assert any(one.pdf[0] == 0.0 for one in alone)
+        found = scene.sample_lights(np.tile(p, (20000, 1)), rng.random((20000, 3)))
+        share = np.divide(
+            found.radiance[:, 0], found.pdf, out=np.zeros(20000), where=found.pdf > 0.0
+        )
+        error = share.std(ddof=1) / math.sqrt(len(share))
+        assert error < 0.05 * expected
+        assert abs(share.mean() - expected) <= 5.0 * error
+
+
 # ---- files and wrong descriptions ----------------------------------------------------------------
 
 PHOTOMETRY = "any words\nTILT=NONE\n1 1000 0.5 3 2 1 1 {} 1 1 60\n0 45 90\n0 180\n4 2 0 6 2 1\n"
