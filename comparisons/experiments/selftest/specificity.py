@@ -17,6 +17,7 @@ from comparisons.gate.copies import fingerprint
 from comparisons.gate.gate import gate_pictures, look
 from comparisons.gate.pictures_in import Picture
 from comparisons.gate.reference import Reference
+from comparisons.results import LIMIT
 from comparisons.runs.elsewhere import run_elsewhere
 from reference_rt.core.arrays import FloatArray
 from reference_rt.util.workers import Workers
