@@ -125,9 +125,9 @@ def curved_instance(name: str, m: affine.Affine, site: Site) -> Plugin:
 THIN = 64.0
 """Cylinders and ellipsoids this many times smaller than the scene are meshes.  Llvm variants solve
 their quadratics in float32, with an error of some u D² / r (see `hits.CURVED`): with D / r = 1000
-every other ray misses a cylinder; with 500 light at the rim of a flat ellipsoid is 8 % off.  Scalar
-variants move hit points along the normal by some u D / r, which is ten radii for a cylinder of 1e-3
-at D = 10, and across an ellipsoid 5,000 times as wide as high by a fifth of it."""
+every other ray misses a cylinder; with 500 light at the rim of a flat ellipsoid is 8 % off.  In
+scalar variants, too, a point on an ellipsoid 5,000 times as wide as high is off by a fifth of it,
+since its error across becomes one along."""
 
 
 def is_thin(least: float, site: Site) -> bool:
