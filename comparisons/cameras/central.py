@@ -99,7 +99,6 @@ def read_angle(node: Node, frame: Frame) -> tuple[Data, float]:
             raise node.error(f"'fov' is {fov:g}; expected degrees above 0 and below 180")
         values: Data = {"fov": fov, "fov_axis": axis}
     else:
-        node.ignore("fov_axis")  # a focal length is that of a film's diagonal
         text = node.take("focal_length")
         try:
             length = float(str("50mm" if text is None else text).removesuffix("mm"))

@@ -57,13 +57,16 @@ POINT = 1e-12
 
 def _radiance_meter(reading: Reading, node: Node, frame: Frame) -> Orthographic:
     """One ray: a camera of parallel rays that sees next to nothing."""
-    if node.has("origin") or node.has("direction"):
-        eye = np.array(node.vector("origin", (0.0, 0.0, 0.0)))
-        towards = np.array(node.vector("direction", (1.0, 0.0, 0.0)))
-        node.ignore("to_world")
-    else:
+    given = [key for key in ("origin", "direction") if node.has(key)]
+    if node.has("to_world") or not given:
+        node.ignore("origin", "direction")  # the map comes before them
         m = node.transform()
         eye, towards = m[:, 3], m[:, 2]
+    elif len(given) == 1:
+        raise node.error(f"has '{given[0]}' alone; expected 'origin' and 'direction'")
+    else:
+        eye = np.array(node.vector("origin", (0.0, 0.0, 0.0)))
+        towards = np.array(node.vector("direction", (1.0, 0.0, 0.0)))
     if (frame.crop_width, frame.crop_height) != (1, 1):
         raise node.error(
             f"has a film of {frame.crop_width} x {frame.crop_height} pixels for one ray; expected "

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from comparisons.commands.options import Baselines, Layer, NoiseFree, compare_extra
+from comparisons.results import LIMIT
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.cli.options import adjusted
 from reference_rt.util.errors import SceneError, UsageError
@@ -41,7 +42,7 @@ def accept(
             min=0.0,
             help="Warn if no gate could detect this relative bias with so few pictures.",
         ),
-    ] = 0.005,
+    ] = LIMIT,
     baselines: Baselines = Path("baselines"),
     layer: Layer = "",
     noise_free: NoiseFree = False,

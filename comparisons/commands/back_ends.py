@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from comparisons.commands.options import Scenes, compare_extra, out_folder, some_of, table_in
+from comparisons.commands.options import Limit, Scenes, compare_extra, out_folder, some_of, table_in
+from comparisons.results import LIMIT
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.util.errors import UsageError
 
@@ -26,11 +27,6 @@ Size = Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Size of the pic
 Spp = Annotated[int, typer.Option(min=1, help="Samples per pixel of each picture.")]
 
 Pictures = Annotated[int, typer.Option("--replicates", min=2, help="Pictures of each scene.")]
-
-Limit = Annotated[
-    float,
-    typer.Option(help="Smallest relative bias of the image mean that must be detectable."),
-]
 
 FILES = ("results.json", "report.html")
 
@@ -103,7 +99,7 @@ def versions(
     size: Size = "64x64",
     spp: Spp = 32,
     replicates: Pictures = 8,
-    limit: Limit = 0.005,
+    limit: Limit = LIMIT,
     scenes: Scenes = Path("scenes"),
     out: Annotated[Path, out_folder("results.json and report.html")] = Path("out/versions"),
     markdown: Annotated[Path | None, table_in("versions")] = None,

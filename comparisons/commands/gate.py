@@ -18,6 +18,7 @@ from comparisons.commands.options import (
     GitHub,
     JUnit,
     Layer,
+    Limit,
     NoiseFree,
     Threads,
     Witness,
@@ -25,6 +26,7 @@ from comparisons.commands.options import (
 )
 from comparisons.commands.pair import pair_gate
 from comparisons.commands.truth import truth_gate
+from comparisons.results import LIMIT
 from reference_rt.cli.guarded import guarded, say
 from reference_rt.cli.options import AllowMissing, Defaults, adjusted, by_name, duration
 from reference_rt.cli.quantities import seconds_of
@@ -130,10 +132,7 @@ def gate(
     reference_layer: Annotated[
         str | None, typer.Option(help="The same of --reference. (default: that of --layer)")
     ] = None,
-    limit: Annotated[
-        float,
-        typer.Option(help="Smallest relative bias of the image mean that must be detectable."),
-    ] = 0.005,
+    limit: Limit = LIMIT,
     noise_free: NoiseFree = False,
     tolerance: Annotated[
         float,

@@ -49,6 +49,11 @@ Layer = Annotated[
     str, typer.Option(help="Prefix of an EXR's channel names: 'beauty' for beauty.R.")
 ]
 
+Limit = Annotated[
+    float,
+    typer.Option(help="Smallest relative bias of the image mean that must be detectable."),
+]
+
 NoiseFree = Annotated[
     bool,
     typer.Option("--noise-free", help="The candidates were rendered without random numbers."),

@@ -60,9 +60,9 @@ Say = Callable[[str], None]
 
 
 def may_matter(scene: Scene, counterpart: Counterpart) -> bool:
-    """Whether paths are long enough in glass, and Mitsuba traces many rays at a time; none of the
-    integrators that start rays close to a surface follow media."""
-    if not isinstance(scene.integrator, Path) or not is_wide(mitsuba()) or scene.has_media:
+    """Whether paths are long enough in glass; none of the integrators that start rays close to a
+    surface follow media."""
+    if not isinstance(scene.integrator, Path) or scene.has_media:
         return False
     depth = scene.integrator.max_depth
     glass = any(isinstance(m, Dielectric | RoughDielectric) for m in scene.materials.values())
@@ -84,6 +84,12 @@ def explained(
 
     limit: as in `statistics.compare`;  seconds: the time for pairs;  replicates: of both sides.
     """
+    if not is_wide(mitsuba()):
+        reason = (
+            "; Mitsuba's ray epsilon may explain it, which is measured by variants that trace many "
+            "rays at a time: --variant llvm_ad_rgb"
+        )
+        return replace(result, reason=result.reason + reason), None
     ours, theirs = (_grouped(side) for side in replicates)
     effect = Effect(scene, counterpart, min(len(ours), len(theirs)))
     start = time.perf_counter()

@@ -13,6 +13,7 @@ from comparisons.compare.derivative_causes import Ours, likeliest
 from comparisons.compare.notebook import NotebookCase
 from comparisons.gate.pictures_in import Picture, pictures_of
 from comparisons.gate.reference import check_sizes, size_of
+from comparisons.results import LIMIT
 from comparisons.results.case import Case, Images, RungResult, decide
 from comparisons.statistics import Known, standard_error
 from comparisons.statistics.cells import Margins
@@ -44,7 +45,7 @@ class Asked:
     primal: Primal | None = None
     at: float | None = None
     step: float | None = None
-    limit: float = 0.005
+    limit: float = LIMIT
     threads: int | None = None
     name: str = "derivative"
 
@@ -122,7 +123,7 @@ def gate_derivative(
     primal: Primal | None = None,
     at: float | None = None,
     step: float | None = None,
-    limit: float = 0.005,
+    limit: float = LIMIT,
     threads: int | None = None,
 ) -> NotebookCase:
     """Judge derivatives of pictures by another renderer; Mitsuba takes no part.

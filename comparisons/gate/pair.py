@@ -27,10 +27,10 @@ from comparisons.gate.driver import Driver
 from comparisons.gate.pair_causes import cause_of
 from comparisons.gate.pair_noise import FEWEST, Streams, notes_of, streams_of
 from comparisons.gate.pictures_in import Picture, pictures_of
-from comparisons.gate.question import LIMIT
 from comparisons.gate.reference import check_sizes, size_of, stacked
 from comparisons.gate.rim import check_rim, left_out, without
 from comparisons.gate.rounds import Rounds
+from comparisons.results import LIMIT
 from comparisons.results.case import Case, FloatArray, Images, RungResult
 from comparisons.results.naming import named
 from comparisons.rungs.input import input_rung

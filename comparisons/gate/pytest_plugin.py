@@ -80,8 +80,10 @@ def pair_gate(request: pytest.FixtureRequest) -> "PairGate":
 
 def _limit(text: str) -> float:
     """The smallest bias that must be detectable, by default.  Raises pytest.UsageError."""
+    from comparisons.results import LIMIT
+
     try:
-        return float(text or 0.005)
+        return float(text or LIMIT)
     except ValueError:
         told = f"image_gate_limit: expected a number such as 0.005, got '{text}'"
         raise pytest.UsageError(told) from None

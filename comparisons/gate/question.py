@@ -5,12 +5,10 @@ from dataclasses import dataclass
 from comparisons.compare.darkness import Darkness
 from comparisons.compare.judge import Lights
 from comparisons.compare.path_length import Lengths
+from comparisons.results import LIMIT
 from comparisons.results.case import RungResult
 from comparisons.rungs.edges import Edges
 from comparisons.rungs.witness import Witness
-
-LIMIT = 0.005
-"""The smallest relative bias of the image mean that must be detectable."""
 
 
 @dataclass(frozen=True)

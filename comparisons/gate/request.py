@@ -22,7 +22,7 @@ from comparisons.gate.as_renderers import as_renderers
 from comparisons.gate.digest import scene_digest
 from comparisons.gate.gate import gate_pictures
 from comparisons.gate.pictures_in import Picture, pictures_of
-from comparisons.gate.question import LIMIT, Question
+from comparisons.gate.question import Question
 from comparisons.gate.reference import Reference, check_sizes, size_of
 from comparisons.gate.rim import check_rim
 from comparisons.gate.shown_curve import estimated
@@ -30,6 +30,7 @@ from comparisons.gate.terms import missing_terms
 from comparisons.gate.tone_curves import ESTIMATE, ToneCurve, curve_of
 from comparisons.gate.undone import Reading, Undo
 from comparisons.renderers import Witnesses, several
+from comparisons.results import LIMIT
 from comparisons.results.case import Case, Cause, FloatArray, RungResult
 from comparisons.results.headline import UP_TO
 from comparisons.rungs.edges import DARK, TOLERANCE, Edges

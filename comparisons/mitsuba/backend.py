@@ -123,7 +123,7 @@ def choose(asked: str | None = None) -> Backend:
         problem = None if forced.startswith("scalar") else prove(forced, None)
         if problem:
             raise ReferenceUnavailableError(f"{FORCE}={forced}: {problem}")
-        return Backend(forced, version, f"forced by {FORCE}", None)
+        return Backend(forced, version, f"asked for by --variant or {FORCE}", None)
     variant = forced or LLVM
     tried = []
     for path in _libraries():
@@ -132,7 +132,11 @@ def choose(asked: str | None = None) -> Backend:
         )
         name = path or "the LLVM that Dr.Jit had loaded"
         if problem is None:
-            why = f"forced by {FORCE}" if forced else "the fastest variant that works here"
+            why = (
+                f"asked for by --variant or {FORCE}"
+                if forced
+                else "the fastest variant that works here"
+            )
             return Backend(variant, version, f"{why}, with {name}{slower}", path)
         tried.append(f"{name} {problem}")
     reasons = "; ".join(tried) or "no libLLVM was found"

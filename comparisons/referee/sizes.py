@@ -7,17 +7,19 @@ import numpy as np
 from comparisons import shapes
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import Copy, copies_of, place_of
-from comparisons.geometry.frame import OURS, ROUNDINGS, UNIT_ROUNDOFF, Frame, largest
+from comparisons.geometry.frame import OURS, Frame
+from comparisons.shapes.shape import Features, per_face
 from reference_rt.core.arrays import Bounds, FloatArray, IdArray, IntArray
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
-from reference_rt.shapes import TABLES, Sphere
+from reference_rt.shapes import TABLES
 from reference_rt.shapes.shape import Shape
 
 
 class LeafSizes:
     """Lengths of one primitive shape, in its group's coordinates: `feature_at` points (n, 3) of its
-    faces (n,) is the smallest length over which its uv or its normal change.
+    faces (n,) is the smallest length over which its uv or its normal change, `bend_at` that of its
+    normal alone, infinite on planes.
 
     shape: the description;  material: its name;  table: its rows;  field: the field of `Shapes`
     that they belong to;  known: that table's type;  bounds: lower and upper, (3,) each,
@@ -32,6 +34,11 @@ class LeafSizes:
         self.is_finite = bool(np.isfinite(self.bounds).all())
         self.known = shapes.TABLES[self.field]
         self.feature_at = self.known.features(table)
+        self.bend_at = self.feature_at
+        if self.known.bends is not None:
+            self.bend_at = self.known.bends(table)
+        elif not self.is_finite:
+            self.bend_at = per_face(np.array([np.inf]))
 
     def row_of(self, primitive: IntArray | IdArray) -> IntArray | IdArray:
         """The rows (n,) of the table for the faces `primitive`: faces of a mesh are numbered as in
@@ -129,37 +136,22 @@ class ShapeSizes:
 
     def feature_of(self, hits: Intersections) -> FloatArray:
         """(n,): the feature size at each hit, in scene units; infinite for a miss."""
+        return self._at(hits, [leaf.feature_at for leaf in self.leaves])
+
+    def bend_of(self, hits: Intersections) -> FloatArray:
+        """(n,): the smallest length over which the normal changes at each hit; infinite for a miss,
+        and on planes."""
+        return self._at(hits, [leaf.bend_at for leaf in self.leaves])
+
+    def _at(self, hits: Intersections, lengths: list[Features]) -> FloatArray:
+        """(n,): those of the leaves' `lengths` at each hit, in scene units."""
         found = np.full(len(hits.t), np.inf)
         copy, leaf, local = self.copy_of(hits), self.leaf_of(hits), self.local_points(hits)
         for number in np.unique(leaf[leaf >= 0]).tolist():
             rows = np.flatnonzero(leaf == number)
-            feature = self.leaves[number].feature_at(local[rows], hits.primitive[rows])
-            found[rows] = self._least[copy[rows]] * feature
-        return found
-
-    def bend_of(self, hits: Intersections) -> FloatArray:
-        """(n,): the smallest length over which the normal changes at each hit: `feature_of`, whose
-        planes have the unit of their uv, but no normal that changes.  Infinite for a miss."""
-        is_finite = np.array([*(leaf.is_finite for leaf in self.leaves), False])
-        return np.where(is_finite[self.leaf_of(hits)], self.feature_of(hits), np.inf)
-
-    def slip_of(self, o: FloatArray, hits: Intersections) -> FloatArray:
-        """(n,): how far float32 moves points of ellipsoids along them, by the rounding of the rays'
-        origins o (n, 3) in the coordinates of the unit sphere; 0 elsewhere.
-
-        Mitsuba has an instance of a sphere, whose points it projects onto the sphere: the error
-        across a flat ellipsoid becomes one along it.
-        """
-        found = np.zeros(len(o))
-        copy, leaf = self.copy_of(hits), self.leaf_of(hits)
-        local = np.einsum("nij,nj->ni", self._inverse[copy], o - self._offset[copy])
-        for number in np.unique(leaf[leaf >= 0]).tolist():
-            of = self.leaves[number]
-            if isinstance(of.shape, Sphere) and of.field == "quadrics":
-                rows, m = np.flatnonzero(leaf == number), of.table.to_local[0].reshape(3, 3)
-                there = (local[rows] - of.table.center[0]) @ m.T
-                stretch = self._most[copy[rows]] / np.linalg.svd(m, compute_uv=False)[-1]
-                found[rows] = ROUNDINGS * UNIT_ROUNDOFF * stretch * largest(there)
+            found[rows] = self._least[copy[rows]] * lengths[number](
+                local[rows], hits.primitive[rows]
+            )
         return found
 
     def straightness_of(self, hits: Intersections) -> FloatArray:

@@ -11,3 +11,7 @@
 None means that a case does not have the item; NaN that a metric is undefined.  To add a field to
 `Case`: give it a default, and raise `stored_case.SCHEMA` if older files would be misread.
 """
+
+LIMIT = 0.005
+"""The smallest relative bias of the image mean that must be detectable, unless another is asked
+for."""

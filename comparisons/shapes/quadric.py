@@ -134,24 +134,33 @@ def _total(terms: list[Dyadic]) -> Dyadic:
     return total
 
 
-def _features(table: Any) -> Features:
+def _lengths(table: Any, of_normals: bool) -> Features:
+    """In the group's coordinates;  of_normals: without uv.
+
+    Where f's gradient g turns, g / |g| moves by H / |g| times a step, H the Hessian, less what is
+    along g: on a flat ellipsoid that is over its width, not its height.  uv change over |g| / |H|
+    at least, and over the heights of the clip box, in which caps have theirs.
+    """
     m = table.to_local[0].reshape(3, 3)
     k = table.coefficients[0]
-    hessian = np.array([[2 * k[0], k[3], k[5]], [k[3], 2 * k[1], k[4]], [k[5], k[4], 2 * k[2]]])
-    bend = np.linalg.norm(m.T @ hessian @ m, 2)
-    heights = (table.upper - table.lower)[0] / np.linalg.norm(m, axis=1)
-    least = heights.min()
+    own = np.array([[2 * k[0], k[3], k[5]], [k[3], 2 * k[1], k[4]], [k[5], k[4], 2 * k[2]]])
+    hessian = m.T @ own @ m
+    steepest = np.linalg.norm(hessian, 2)
+    least = ((table.upper - table.lower)[0] / np.linalg.norm(m, axis=1)).min()
 
-    def features(p: FloatArray, faces: IntArray) -> FloatArray:
-        """The length over which f's gradient turns, |grad f| / |Hessian|, in the group's
-        coordinates; for a cap the smallest height of the clip box."""
-        q = (p - table.center[0]) @ m.T
-        gradient = (q @ hessian + k[6:9]) @ m
-        with np.errstate(divide="ignore"):
-            feature = np.linalg.norm(gradient, axis=1) / bend
-        return np.asarray(np.where(faces > 0, least, np.minimum(feature, least)))
+    def lengths(p: FloatArray, faces: IntArray) -> FloatArray:
+        gradient = ((p - table.center[0]) @ m.T @ own + k[6:9]) @ m
+        size = np.linalg.norm(gradient, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            if of_normals:
+                n = np.nan_to_num(gradient / size[:, None])
+                across = hessian - n[:, :, None] * (n @ hessian)[:, None, :]
+                found = size / np.linalg.norm(across, axis=(1, 2))
+            else:
+                found = np.minimum(size / steepest, least)
+        return np.asarray(np.where(faces > 0, least, np.nan_to_num(found, posinf=np.inf)))
 
-    return features
+    return lengths
 
 
 def _to_mitsuba(shape: Quadric, site: Site) -> list[Plugin]:
@@ -232,7 +241,12 @@ def _to_povray(shape: Quadric, folder: Path) -> PovShape:
 
 QUADRIC = ShapeType(
     of=Quadric,
-    table=TableType(field="quadrics", crossings=_crossings, features=_features),
+    table=TableType(
+        field="quadrics",
+        crossings=_crossings,
+        features=partial(_lengths, of_normals=False),
+        bends=partial(_lengths, of_normals=True),
+    ),
     surface=surface_of,
     to_mitsuba=_to_mitsuba,
     triangles=_triangles,

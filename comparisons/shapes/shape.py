@@ -37,14 +37,16 @@ class TableType:
 
     field: that of `reference_rt.shapes.Shapes`;  crossings: where lines (n, 3) cross a row,
     exactly: the surface is the one that the kernels compute from the row, from center, normal,
-    radius, vertices, or from to_local and the unit shape;  features: of one shape's table;
-    targets: corners and middles of edges (n, 3) of one shape's table, where rays are aimed;  near:
-    of a table of many rows, those that a line may cross, conservatively, in floats.
+    radius, vertices, or from to_local and the unit shape;  features: of one shape's table;  bends:
+    the same of its normals alone, None where that is no longer;  targets: corners and middles of
+    edges (n, 3) of one shape's table, where rays are aimed;  near: of a table of many rows, those
+    that a line may cross, conservatively, in floats.
     """
 
     field: str
     crossings: Callable[[Row, Dyadic, Dyadic], Crossings]
     features: Callable[[Any], Features]
+    bends: Callable[[Any], Features] | None = None
     targets: Callable[[Any], FloatArray] = lambda table: np.zeros((0, 3))
     near: Callable[[Row, FloatArray, FloatArray], IntArray] | None = None
 

@@ -1,5 +1,6 @@
 """What cylinders and cones share: a side of revolution about the z axis, and its caps."""
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -18,9 +19,12 @@ from comparisons.shapes.surface import Patch, Surface
 from reference_rt.core.arrays import FloatArray
 
 SIDE = (4096, 8)
-"""Cells around a cone and along its side.  That is straight, but Mitsuba's hit on a triangle of
-length L and height h is off by some u L² / h along the triangle: with one cell along the side by
-1e-4 of it, seen at a grazing angle by a hundredth."""
+"""Cells around a tube as wide as high, and along its side.  That is straight, but Mitsuba's hit on
+a triangle of length L and height h is off by some u L² / h along the triangle: with one cell along
+the side by 1e-4 of it, seen at a grazing angle by a hundredth."""
+
+FEWEST_AROUND = 64
+"""Of tubes 4,096 times as high as wide, and more slender ones: the sag is 1e-3 of the radius."""
 
 RINGS = 32
 """Cells along the side of a textured cone."""
@@ -95,8 +99,8 @@ def tube_surface(tube: Tube, textured: bool = False) -> Surface:
         out = np.divide(p[..., :2], rho, out=np.zeros_like(p[..., :2]), where=rho > 0.0)
         return np.concatenate([out, np.where(rho > 0.0, -slope, 0.0)], axis=-1)
 
-    cells = (SIDE[0], RINGS) if textured else SIDE
     most = max(bottom, top)
+    cells = _cells(most / (high - low), textured)
     return Surface(
         value,
         gradient,
@@ -106,6 +110,15 @@ def tube_surface(tube: Tube, textured: bool = False) -> Surface:
         ends=(np.array([-np.inf, -np.inf, low]), np.array([np.inf, np.inf, high])),
         capped=capped,
     )
+
+
+def _cells(slender: float, textured: bool) -> tuple[int, int]:
+    """Around and along the side of a tube whose radius over its height is `slender`: as many and as
+    long ones on a wire, whose sag is then about the same part of its height.  Powers of two, by
+    which k / n is exact, so that caps end where the side does."""
+    around = max(FEWEST_AROUND, 2 ** round(math.log2(SIDE[0] * min(1.0, slender**0.5))))
+    along = SIDE[0] * SIDE[1] // around
+    return around, max(along, RINGS) if textured else along
 
 
 def _side(

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
-from threading import Thread
 from types import FrameType
 from typing import Any, NamedTuple
 
@@ -329,7 +328,9 @@ def run_cases(
 
     with Display(len(plan.work), options.steps) as display, _terminable():
         display.line(f"Mitsuba {told['mitsuba']}")
-        Thread(target=import_module, args=("comparisons.report.thumbnails",)).start()
+        # The page's module, while the worker still imports Mitsuba.  Not in a thread: two that
+        # import parts of one package may wait for each other.
+        import_module("comparisons.report.thumbnails")
         # The page of an earlier run must not be mistaken for this run's.
         discard(options.report)
         try:

@@ -16,8 +16,8 @@ from comparisons.experiments.selftest.right import CASES, RightCase
 from comparisons.gate.copies import fingerprint
 from comparisons.gate.gate import gate_pictures, look
 from comparisons.gate.pictures_in import Picture
-from comparisons.gate.question import LIMIT
 from comparisons.gate.reference import Reference
+from comparisons.results import LIMIT
 from comparisons.runs.elsewhere import run_elsewhere
 from reference_rt.core.arrays import FloatArray
 from reference_rt.util.workers import Workers

@@ -42,10 +42,9 @@ Radiance = Callable[..., FloatArray]
 
 def _radii(context: TreeContext, rays: Rays) -> list[FloatArray]:
     """By how much rays are moved, (m,) each: by float32's error of their hits and of all later ones
-    of their trees, once and at each surface; by what it moves along an ellipsoid; and by what they
-    skip where they start, at the height `plugins.whitted.clearance`: on cylinders Mitsuba's ray
-    epsilon, elsewhere float32's error of the scene's size.  It moves the shadows of a lamp by as
-    much over the lamp's cosine."""
+    of their trees, once and at each surface; and by what they skip where they start, at the height
+    `plugins.whitted.clearance`: on cylinders Mitsuba's ray epsilon, elsewhere float32's error of
+    the scene's size.  It moves the shadows of a lamp by as much over the lamp's cosine."""
     sizes, depth = context.sizes, max(context.integrator.max_depth, 1)
     frame, lit = sizes.frame, context.counterpart.lit
     finite = np.full(len(rays.o), lit.reach() / frame.scale)
@@ -59,9 +58,6 @@ def _radii(context: TreeContext, rays: Rays) -> list[FloatArray]:
     height = np.minimum(epsilon, ROUNDINGS * UNIT_ROUNDOFF * finite)
     shadows = np.minimum(height / _least_cosine(context, rays, hits), depth * epsilon)
     radii = [rounding, depth * rounding, rounding + shadows]
-    slip = sizes.slip_of(rays.o, hits)
-    if slip.any():
-        radii += [rounding + slip]
     if any(isinstance(leaf.shape, Cylinder) for leaf in sizes.leaves):
         radii += [epsilon, depth * epsilon]
     return radii

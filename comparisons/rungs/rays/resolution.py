@@ -200,13 +200,10 @@ def too_many_elsewhere(
     concern, if that is more than such rays may be; else 0.
 
     Those that hit a shape for which a mesh stands in are not asked: its edges are wider, and also
-    change what lies beyond the hit; nor those whose points float32 moves further along a flat
-    ellipsoid than it moves the surface.
+    change what lies beyond the hit.
     """
     hits = query.intersect(tables, rays.o, rays.d)
-    sizes = ShapeSizes(scene, counterpart.frame)
-    e = sizes.frame.delta(rays.o, hits.p, sizes.reach_of(hits.shape))
-    is_exact = (counterpart.off_by(hits.shape, "sag") == 0.0) & (sizes.slip_of(rays.o, hits) <= e)
+    is_exact = counterpart.off_by(hits.shape, "sag") == 0.0
     asked = rays.rows(np.flatnonzero(is_exact))
     if not arbiter.too_many(len(asked.o), total):
         return 0

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from comparisons.geometry.frame import UNIT_ROUNDOFF
+from comparisons.geometry.frame import ROUNDINGS, UNIT_ROUNDOFF
 from comparisons.mitsuba.counterpart import Counterpart, trace
 from comparisons.referee.sizes import ShapeSizes
 from comparisons.rungs.rays.light_context import LightContext
@@ -112,7 +112,11 @@ def _slopes(context: TreeContext, rays: Rays, depth: int) -> FloatArray:
     theirs = trace(context.counterpart, *rays) if context.counterpart.stand_ins() else None
     p = np.where(hits.shape[:, None] >= 0, hits.p, rays.o)
     radius = context.sizes.frame.delta(rays.o, p, context.sizes.reach_of(hits.shape))
-    angle = np.zeros(len(rays.o))
+    # The corners of a face are rounded, each by u of its coordinates, which turns the normal of a
+    # small one far from the origin by more than moved rays are turned.
+    size = context.sizes.frame.largest(p)
+    angle = 2.0 * UNIT_ROUNDOFF * size / context.sizes.bend_of(hits)
+    angle[TURNS * angle < ROUNDINGS * UNIT_ROUNDOFF] = 0.0
     apart = np.zeros(len(rays.o))
     if theirs is not None:
         lit = LightContext(

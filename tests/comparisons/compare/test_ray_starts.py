@@ -11,7 +11,7 @@ from comparisons.compare import compare, ray_starts
 from comparisons.compare.budget import Budget
 from comparisons.compare.compare import Subject, compare_scene
 from comparisons.compare.judge import Evidence, judge, of_replicates
-from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.mitsuba.plugins.base import is_wide
 from comparisons.mitsuba.scene import picture
 from comparisons.results.case import RungResult
@@ -49,6 +49,20 @@ def judged(
     subject = Subject(scene, reference=reference)
     case = compare_scene(subject, budget, found.append)
     return case, {rung.name: rung for rung in case.rungs}, found
+
+
+def test_scalar_variants_say_that_they_do_not_measure_it() -> None:
+    scene = Scene.parse(GALLERY)
+    sides = np.zeros((8, 12, 16, 3)), np.ones((8, 12, 16, 3))
+    differs = RungResult("statistics", "differ", "darker")
+    with scalar():
+        counterpart = load(scene)
+        assert ray_starts.may_matter(scene, counterpart)
+        found, without = ray_starts.explained(
+            scene, counterpart, 0.01, 60.0, lambda text: None, differs, sides
+        )
+    assert (found.status, without) == ("differ", None)
+    assert "darker; Mitsuba's ray epsilon may explain it" in found.reason
 
 
 @pytest.mark.slow

@@ -136,6 +136,12 @@ def test_sensors(tmp_path):
         np.testing.assert_allclose(eye, [0.3, 0.0, 4.0], atol=1e-9)
         np.testing.assert_allclose(target - eye, [0.0, 0.0, -4.0], atol=1e-9)
         assert scene.camera.width < 1e-9
+    for alone in (
+        '<point name="origin" value="1, 0, 0"/>',
+        '<vector name="direction" value="1, 0, 0"/>',
+    ):
+        told = refusal(tmp_path, meter.replace(placed, alone) + ball)
+        assert "alone; expected 'origin' and 'direction'" in told
     assert "1 x 1" in refusal(tmp_path, meter.replace(FILM.format(1, 1), FILM.format(2, 1)) + ball)
     second = SENSOR.replace("0,1,5", "0,1,9")
     batch = f'<sensor type="batch">{FILM.format(6, 5)}{SENSOR}{second}</sensor>'

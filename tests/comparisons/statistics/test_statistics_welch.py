@@ -1,15 +1,17 @@
 """The tests behind the statistical rung: their laws, levels and power."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from planted import HEIGHT, LAMP, MARGINS, NONE, WIDTH, replicates, scene
 from scipy import stats
 
-from comparisons.statistics import Known, compare, ranks
+from comparisons.statistics import Known, Margins, compare, ranks
 from comparisons.statistics.advice import _known
 from comparisons.statistics.cells import tiles, whole
+from comparisons.statistics.decide import findings
 from comparisons.statistics.order import ORDER_LEVEL
 from comparisons.statistics.ranks import uniformity
 from comparisons.statistics.scales import IMAGE, PIXELS, SCALES, TILES, Pair, chance_of_parting
@@ -285,3 +287,18 @@ def test_the_stated_confidence_is_that_of_the_look(level):
     rng = np.random.default_rng(2)
     a, b = rng.normal(1.0, 0.01, (2, 16, 16, 16, 3))
     assert compare(a, b, level=level).numbers["confidence"] == 1.0 - level * IMAGE.level
+
+
+@pytest.mark.parametrize("look", [1.0, 0.25])
+@pytest.mark.parametrize("fraction", [0.99, 1.01])
+@pytest.mark.parametrize("way", ["wide", "narrow"])
+def test_ranks_alarm_at_their_part_of_the_levels(way: str, fraction: float, look: float) -> None:
+    """Half of it is for blocks that differ too much; half for those that differ too little, in
+    either order of the pairs."""
+    rng = np.random.default_rng(4)
+    sides = rng.normal(1.0, 0.01, (2, 16, 16, 16, 3))
+    found = findings(*sides, 16, Margins(), look).uniformity
+    assert found is not None
+    chance = fraction * look * ranks.LEVEL / 2.0
+    at = {"p_wide": chance} if way == "wide" else {"p_narrow": 1.0, "p_reversed": chance / 2.0}
+    assert getattr(replace(found, **at), way) == (fraction < 1.0)

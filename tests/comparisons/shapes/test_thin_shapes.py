@@ -1,9 +1,12 @@
-"""Flat ellipsoids in the variant that `compare` takes: Mitsuba's own, instances of spheres, shadow
-themselves there, or are missed by half of the rays."""
+"""Flat ellipsoids and thin cylinders.  Mitsuba's own, instances of spheres, shadow themselves in
+llvm variants, or are missed by half of the rays; scalar variants move points on cylinders off them.
+"""
+
+import contextlib
 
 import pytest
 
-from comparisons.mitsuba.backend import mitsuba
+from comparisons.mitsuba.backend import mitsuba, scalar
 from comparisons.rungs.direct import direct
 from comparisons.rungs.geometry import geometry
 from comparisons.rungs.whitted import whitted
@@ -50,3 +53,34 @@ def test_flat_ellipsoids_agree(flat: float, turn: str) -> None:
         allowed = ("agree", "reference-limited") if edge_on else ("agree",)
         assert found.status in allowed, f"{found.name}: {found.reason}"
     assert geometry(scene, scene.tables, load(larger), 300).status == "differ"
+
+
+WIRE = """
+camera: {{type: perspective, eye: [1, 0.3, 0.5], target: [0, 0, 0.5], fov: {fov}}}
+film: {{width: 24, height: 16}}
+integrator: {{type: whitted}}
+shapes:
+  - {{type: cylinder, radius: {radius}, capped: false{flat}}}
+lights: [{{type: point, position: [1, 1, 1], intensity: 5}}]
+"""
+
+
+@pytest.mark.parametrize("variant", ["scalar", "fast"])
+@pytest.mark.parametrize(
+    "flat", ["", ", transform: [{scale: [1, 0.02, 1]}]"], ids=["round", "flat"]
+)
+@pytest.mark.parametrize("radius", [0.02, 2e-3, 3e-4])
+def test_thin_cylinders_agree(radius: float, flat: str, variant: str) -> None:
+    """A lamp that is a tenth brighter is seen."""
+    text = WIRE.format(radius=radius, flat=flat, fov=120.0 * radius)
+    scene, brighter = (
+        Scene.parse(text.replace("intensity: 5", f"intensity: {i}")) for i in (5, 5.5)
+    )
+    with scalar() if variant == "scalar" else contextlib.nullcontext():
+        for found in (
+            geometry(scene, scene.tables, load(scene), 300),
+            direct(scene, scene.tables, load(scene), 300),
+            whitted(scene, scene.tables, load(scene)),
+        ):
+            assert found.status in ("agree", "reference-limited"), f"{found.name}: {found.reason}"
+        assert direct(scene, scene.tables, load(brighter), 300).status == "differ"
