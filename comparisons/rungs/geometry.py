@@ -248,7 +248,8 @@ def _explained(
 
     Or two rays next to them have it together: one reaches as far as Mitsuba's hit, and one that
     starts just before that hits the same surface.  At an edge Mitsuba may miss the front face and
-    hit the back face from behind, as no single ray can.
+    hit the back face from behind, as no single ray can.  Or the ray begins in the plane that
+    Mitsuba hits, but for its rounding, and runs along it: no ray next to it has the same distance.
     """
     rays, radius = traced.rays, traced.radius
     explained = arbiter.explained(wrong, radius[wrong], _same_hit(tables, comparer, traced))
@@ -274,7 +275,8 @@ def _explained(
         open_ = np.flatnonzero(comes & ~meets)
         same = _same_hit(tables, comparer, beside)
         meets[open_] = arbiter.explained(open_, radius[numbers[open_]], same)
-    explained[rest] = meets
+    height = np.abs(np.sum(theirs.n * (near.o - theirs.p), axis=1))
+    explained[rest] = meets | (height <= radius[numbers])
     return explained
 
 

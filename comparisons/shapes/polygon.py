@@ -53,7 +53,8 @@ def polygon_soup(shape: Polygon) -> Soup:
     middle = points.mean(axis=0)
     # The normal is the direction in which the points spread least.
     n = np.linalg.svd(points - middle)[2][2]
-    axis = int(np.argmax(np.abs(n)))
+    # Of equal components, but for rounding, the first.
+    axis = int(np.flatnonzero(np.abs(n) > (1.0 - 1e-9) * np.abs(n).max())[0])
     kept = [(axis + 1) % 3, (axis + 2) % 3]
     corner, size = points[:, kept].min(axis=0), np.ptp(points[:, kept], axis=0)
     rings = [(np.array(ring)[:, kept] - corner) / size for ring in shape.rings]

@@ -25,6 +25,10 @@ from reference_rt.shapes.flat.base import Integers, integers
 from reference_rt.shapes.rounding import product_error
 from reference_rt.shapes.shape import Shape, TabulationContext, Tangents, outward
 
+NEARLY = 10**9 - 1, 10**9
+"""Components of a normal with this quotient count as equal: roundings of decimals differ by far
+less."""
+
 OFF_PLANE = 64
 """The largest distance of a point from the plane of the others, in u times the largest coordinate:
 a map rounds a point's coordinates some eight times, and at the other points the error of a plane
@@ -173,7 +177,8 @@ def bounds(polygons: Polygons) -> Bounds:
 
 def _plane(points: FloatArray, ends: IntArray) -> tuple[int, float, tuple[float, float]]:
     """The plane of the points (m, 3): (k, a, (s, r)) of x_k = a - s x_(k+1) - r x_(k+2), in which k
-    is the largest axis of the normal.
+    is the largest axis of the normal, the first of those NEARLY as large: the last digit of
+    a corner must not turn the uv of a roof of 45 degrees.
 
     Exact except for the last rounding.  It is the plane of the first point and of two others that
     are as far away as possible.
@@ -197,7 +202,8 @@ def _plane(points: FloatArray, ends: IntArray) -> tuple[int, float, tuple[float,
             f"ring {ring}: point {number} is {off:.3g} off the plane of the others; expected all "
             "in one plane"
         )
-    axis = int(np.argmax(np.abs(n)))
+    size = np.abs(n)
+    axis = int(np.argmax(size * NEARLY[1] >= size.max() * NEARLY[0]))
     s, r = n[(axis + 1) % 3] / n[axis], n[(axis + 2) % 3] / n[axis]
     return axis, (n @ p[0]) / (n[axis] * one), (s, r)
 
