@@ -248,7 +248,8 @@ def _explained(
 
     Or two rays next to them have it together: one reaches as far as Mitsuba's hit, and one that
     starts just before that hits the same surface.  At an edge Mitsuba may miss the front face and
-    hit the back face from behind, as no single ray can.  Or the ray begins in the plane that
+    hit the back face from behind, as no single ray can; between two faces that meet there, such as
+    the side of a cylinder and its cap, it may miss both.  Or the ray begins in the plane that
     Mitsuba hits, but for its rounding, and runs along it: no ray next to it has the same distance.
     """
     rays, radius = traced.rays, traced.radius
@@ -265,8 +266,19 @@ def _explained(
         moved = query.intersect(tables, near.o[rows] + offsets, near.d[rows])
         return np.asarray(moved.t >= (theirs.t - margin)[rows])
 
+    ours = rows_of(traced.ours, numbers)
+
+    def meets_another_face(rows: IntArray, offsets: FloatArray) -> BoolArray:
+        moved = query.intersect(tables, near.o[rows] + offsets, near.d[rows])
+        before = moved.t < (theirs.t - margin)[rows]
+        face = np.column_stack([moved.shape, moved.instance, moved.part, moved.primitive])
+        own = np.column_stack([ours.shape, ours.instance, ours.part, ours.primitive])[rows]
+        return np.asarray(before & (face != own).any(axis=1))
+
     here = np.arange(len(numbers))
     comes = arbiter.explained(here, radius[numbers], comes_so_far)
+    leaks = np.flatnonzero(~comes & (ours.shape >= 0) & (ours.t < theirs.t))
+    comes[leaks] = arbiter.explained(leaks, radius[numbers[leaks]], meets_another_face)
     meets = np.zeros(len(numbers), bool)
     for way in (1.0, -1.0):  # start just before Mitsuba's hit, or just behind it and go back
         start = near.o + near.d * (theirs.t - way * margin)[:, None]

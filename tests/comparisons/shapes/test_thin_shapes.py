@@ -84,3 +84,29 @@ def test_thin_cylinders_agree(radius: float, flat: str, variant: str) -> None:
         ):
             assert found.status in ("agree", "reference-limited"), f"{found.name}: {found.reason}"
         assert direct(scene, scene.tables, load(brighter), 300).status == "differ"
+
+
+RIM = """
+camera: {eye: [38.4544140625, 6.6, -1.178359375], target: [38.47762890625, 6.6, -1.2],
+  type: perspective}
+film: {width: 4, height: 8}
+shapes:
+  - {type: cylinder, radius: 0.796, z_min: -1, z_max: 0.75, transform: [{scale: [1, 0.3, 0.286]},
+     {translate: [9851.33, 1701.35, -298.543]}, {scale: 0.00390625}]}
+  - type: cylinder
+    z_min: -0.6
+    z_max: 0.14
+    transform: [{matrix: [[0.6, 0.322, 1, 0.188], [0.114, 0.591, -0.0629, -0.0145],
+       [0.08, 0.04, 0.701, 0]]}, {rotate: {axis: [-0.3, -0.9, -0.241], degrees: -130}},
+     {translate: [9848, 1700.0348, -299.337]}, {scale: 0.00390625}]
+"""
+
+
+def test_a_ray_between_the_side_of_a_cylinder_and_its_cap() -> None:
+    """Mitsuba's is an instance and a disk, which meet but for rounding: one of these rays passes
+    between the two and hits the other side from within.  A cap that is missing is seen."""
+    scene = Scene.parse(RIM)
+    open_ = Scene.parse(RIM.replace("z_max: 0.14", "z_max: 0.14\n    capped: false"))
+    found = geometry(scene, scene.tables, load(scene), 48)
+    assert found.status == "agree", found.reason
+    assert geometry(scene, scene.tables, load(open_), 48).status == "differ"
