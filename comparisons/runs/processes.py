@@ -203,15 +203,19 @@ class _Child:
         self._inbox: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 (closed by `close`)
         # A session of its own: Ctrl-C is for the parent, which then ends its children.
-        self._process = subprocess.Popen(
-            list(module) if Path(module[0]).is_absolute() else [sys.executable, "-m", *module],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._log,
-            start_new_session=True,
-            cwd=folder if folder and Path(folder).is_dir() else None,
-            **tied(),
-        )
+        try:
+            self._process = subprocess.Popen(
+                list(module) if Path(module[0]).is_absolute() else [sys.executable, "-m", *module],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._log,
+                start_new_session=True,
+                cwd=folder if folder and Path(folder).is_dir() else None,
+                **tied(),
+            )
+        except BaseException:  # there is no such program, or no memory for it
+            self._log.close()
+            raise
         self._cases = 0
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()

@@ -2,11 +2,13 @@
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+import pytest
 
 from comparisons.runs import engine
-from comparisons.runs.processes import _Turns
+from comparisons.runs.processes import Children, _Turns
 
 
 @dataclass(frozen=True)
@@ -48,3 +50,15 @@ def test_kin_follow_each_other_and_none_run_together_while_others_wait():
     # The second process begins b, and goes on with it; a and b never run twice at once.
     assert order(requests, 2, max) == ["a1", "b1", "b2", "c1", "a2", "a3"]
     assert order(requests, 4, min)[:4] == ["a1", "b1", "c1", "a2"]
+
+
+OPEN_FILES = Path("/proc/self/fd")
+
+
+def test_a_program_that_does_not_exist_leaves_no_file_open(tmp_path):
+    """The log of a child that could not be started."""
+    children, missing = Children(), str(tmp_path / "missing")
+    before = {*OPEN_FILES.iterdir()}
+    with pytest.raises(FileNotFoundError) as caught:
+        children.carry_out((missing,), "", "{}", 5.0, lambda step: None)
+    assert {*OPEN_FILES.iterdir()} == before, caught
