@@ -10,6 +10,7 @@ from comparisons.compare.judge import Evidence, judge, of_replicates
 from comparisons.results.case import FloatArray
 from comparisons.statistics import compare
 from comparisons.statistics.decide import findings
+from comparisons.statistics.metric_null import can_draw
 from comparisons.statistics.rare import around, share_unmet
 from comparisons.statistics.sides import met_once, side_of
 from comparisons.statistics.unseen import unseen, worse
@@ -201,6 +202,16 @@ def test_pixels_that_rare_light_has_not_met():
     assert share_unmet(side_of(rare_light(rng, 16, 3.0)), sampled) > 0.3
     assert share_unmet(side_of(sampled_light(rng, 16)), sampled) < 0.002
     assert share_unmet(side_of(1.3 * sampled_light(rng, 16)), sampled) < 0.002
+
+
+def test_rare_light_in_a_few_percent_of_the_pixels_leaves_no_noise_to_draw():
+    """Measured in scenes: 1.5 % and more with rare light, at most 0.11 % without."""
+    rng = np.random.default_rng(3)
+    sampled, partly = (sampled_light(rng, 16) for _ in range(2))
+    assert can_draw((partly, sampled))
+    partly[:, :, :4] = rare_light(rng, 16, 3.0)[:, :, :4]
+    assert 0.02 < share_unmet(side_of(partly), side_of(sampled)) < 0.1
+    assert not can_draw((partly, sampled))
 
 
 # What is said
