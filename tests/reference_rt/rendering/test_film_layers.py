@@ -68,6 +68,30 @@ def test_colour_is_the_same_bits_with_and_without(cornell):
     assert np.array_equal(picture.colour, plain.colour)
 
 
+@pytest.mark.parametrize("degrees", [0.0, 30.0])
+@pytest.mark.parametrize("stretch", [1.0, 3.0])
+def test_the_normal_is_that_of_the_vertices(stretch, degrees):
+    """A triangle before all pixels whose vertices have one normal, (0.6, 0, 0.8), not its own.
+    Under a stretch along x it is that of the inverse transpose, (0.6 / stretch, 0, 0.8)."""
+    steps = (
+        transform.Scale(scale=(stretch, 1, 1)),
+        transform.Rotate(rotate=transform.Turn(axis=(0, 0, 1), degrees=degrees)),
+    )
+    mesh = rt.Mesh(
+        vertices=((-20, -20, 0), (20, -20, 0), (0, 30, 0)),
+        faces=((0, 1, 2),),
+        normals=((0.6, 0, 0.8),) * 3,
+        material="paint",
+        transform=steps,
+    )
+    found = rt.render(wall(shapes=(mesh, BEHIND))).layers["normal"]
+    tilted = np.array([0.6 / stretch, 0.0, 0.8])
+    x, _, z = tilted / np.linalg.norm(tilted)
+    turn = np.radians(degrees)
+    expected = np.array([x * np.cos(turn), x * np.sin(turn), z])
+    np.testing.assert_allclose(found, np.broadcast_to(expected, found.shape), atol=1e-14)
+
+
 def test_a_checked_wall():
     """Pixels are inside of one check each; the last two columns miss."""
     layers = rt.render(wall()).layers
