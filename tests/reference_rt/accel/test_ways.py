@@ -448,3 +448,21 @@ def test_paths_together_are_paths_one_by_one(spp):
         for sample in range(spp):
             kernel({"colour": total[pixel : pixel + 1]}, pixel, pixel + 1, sample, sample + 1)
     assert np.array_equal(rt.render(lit).colour, total.reshape(9, 12, 3) / spp)
+
+
+@pytest.mark.parametrize("hierarchy", ["sah", "median"])
+def test_a_ray_through_each_triangle_of_twenty_thousand(hierarchy):
+    """None is lost on any way, where short rays through the middles meet no other one."""
+    ball = icosphere(5)
+    corners = ball[0][ball[1]]
+    middle = corners.mean(axis=1)
+    n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    n /= np.linalg.norm(n, axis=1)[:, None]
+    o, d, t_max = middle + 1e-4 * n, -n, np.full(len(n), 2e-4)
+    tables = rt.build_tables(rt.Scene(shapes=(mesh(ball),), hierarchy=hierarchy))
+    found = alone(link_to_geometry(tables, "closest_hit", "occluded").tables, o, d, t_max)
+    many = link_to_geometry(tables, "closest_hits", "any_hits").tables
+    assert in_blocks(many, o, d, t_max).tobytes() == found.tobytes()
+    assert (found[:, 3] >= 0).all()
+    assert len(np.unique(found[:, 4])) == len(o) == 20_480
+    np.testing.assert_allclose(found[:, 0], 1e-4, rtol=1e-9)
