@@ -236,12 +236,19 @@ def _is_flat(rays: Rays, hits: Intersections) -> BoolArray:
     return np.asarray((hits.shape >= 0) & (cosine < FLATTEST))
 
 
+def _thinnest(sizes: ShapeSizes, hits: Intersections) -> FloatArray:
+    """(n,): the unit of the shape's equation, for an ellipsoid its smallest axis; infinite on
+    planes."""
+    bent = np.isfinite(sizes.bend_of(hits))
+    return np.asarray(np.where(bent, sizes.feature_of(hits), np.inf))
+
+
 def _tolerance(sizes: ShapeSizes, rays: Rays, hits: Intersections) -> FloatArray:
     """Tolerance of t (n,), 0 for a miss.  The terms of a quadratic equation are as large as the
     square of the distance in units of the shape: their rounding moves a hit by u distance² /
     feature.  raysect's coordinates are counted from the middle of all solids, and rounded there."""
     scale = np.maximum(np.abs(rays.o).max(axis=1), sizes.reach_of(hits.shape))
-    scale = np.maximum(scale, scale * scale / sizes.bend_of(hits))
+    scale = np.maximum(scale, scale * scale / _thinnest(sizes, hits))
     scale = np.maximum(scale, 2.0**-10 * (sizes.upper - sizes.lower).max())
     cosine = np.abs(np.einsum("ni,ni->n", rays.d, hits.n))
     tolerance = TOGETHER * scale / np.maximum(cosine, FLATTEST)
@@ -255,7 +262,7 @@ def _compared(
     same = (ours.shape == theirs.shape) & (ours.instance == theirs.instance)
     with np.errstate(invalid="ignore"):  # inf - inf of misses
         near = (ours.shape < 0) | (np.abs(ours.t - theirs.t) <= tolerance)
-    turned, feature = np.linalg.norm(ours.n - theirs.n, axis=1), sizes.bend_of(ours)
+    turned, feature = np.linalg.norm(ours.n - theirs.n, axis=1), _thinnest(sizes, ours)
     # The curvature of an ellipsoid is up to a / b²; b is its feature, and a below its reach.
     bend = np.maximum(1.0, sizes.reach_of(ours.shape) / feature) / feature
     return np.asarray(same & near), np.asarray(turned <= TOGETHER + tolerance * bend)

@@ -138,15 +138,17 @@ def _lengths(table: Any, of_normals: bool) -> Features:
     """In the group's coordinates;  of_normals: without uv.
 
     Where f's gradient g turns, g / |g| moves by H / |g| times a step, H the Hessian, less what is
-    along g: on a flat ellipsoid that is over its width, not its height.  uv change over |g| / |H|
-    at least, and over the heights of the clip box, in which caps have theirs.
+    along g: on a flat ellipsoid that is over its width, not its height.  Where it turns next to
+    nowhere, rounding still does: over the largest height of the clip box at most.  uv change over
+    |g| / |H| at least, and over the smallest of these heights, in which caps have theirs.
     """
     m = table.to_local[0].reshape(3, 3)
     k = table.coefficients[0]
     own = np.array([[2 * k[0], k[3], k[5]], [k[3], 2 * k[1], k[4]], [k[5], k[4], 2 * k[2]]])
     hessian = m.T @ own @ m
     steepest = np.linalg.norm(hessian, 2)
-    least = ((table.upper - table.lower)[0] / np.linalg.norm(m, axis=1)).min()
+    heights = (table.upper - table.lower)[0] / np.linalg.norm(m, axis=1)
+    least, most = heights.min(), heights.max()
 
     def lengths(p: FloatArray, faces: IntArray) -> FloatArray:
         gradient = ((p - table.center[0]) @ m.T @ own + k[6:9]) @ m
@@ -155,10 +157,10 @@ def _lengths(table: Any, of_normals: bool) -> Features:
             if of_normals:
                 n = np.nan_to_num(gradient / size[:, None])
                 across = hessian - n[:, :, None] * (n @ hessian)[:, None, :]
-                found = size / np.linalg.norm(across, axis=(1, 2))
+                found = np.minimum(size / np.linalg.norm(across, axis=(1, 2)), most)
             else:
                 found = np.minimum(size / steepest, least)
-        return np.asarray(np.where(faces > 0, least, np.nan_to_num(found, posinf=np.inf)))
+        return np.asarray(np.where(faces > 0, least, np.nan_to_num(found, nan=0.0)))
 
     return lengths
 

@@ -64,6 +64,13 @@ def scene_of(*shapes: Any, **more: Any) -> Scene:
     return Scene(shapes=shapes, **more)
 
 
+def test_ellipsoids_a_million_times_as_wide_as_high() -> None:
+    """Their normals turn over their width, but their equation is solved to rounding over their
+    height."""
+    found = solids(Scene.load(SCENES / "needle.yaml"), FEW)
+    assert found.status == "agree", found.reason
+
+
 @pytest.mark.parametrize("make", CLOSED)
 def test_each_primitive(make: Callable[[np.random.Generator], Any]) -> None:
     rng = np.random.default_rng(5)

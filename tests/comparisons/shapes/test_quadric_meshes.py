@@ -65,3 +65,25 @@ def test_some_triangles_have_the_error_of_all(seed: int) -> None:
         some = measured_error(mesh, surface, IDENTITY)
         every = measured_error(mesh, surface, IDENTITY, len(mesh.faces) * 3)
     assert all(b * (1.0 - SHORT) <= a <= b for a, b in zip(some, every, strict=True))
+
+
+@pytest.mark.parametrize("capped", [False, True])
+def test_a_quadric_that_is_a_plane(capped: bool) -> None:
+    """Its normal turns nowhere, but for rounding; one that is turned by a hundredth differs."""
+    flat, turned = (
+        Scene(
+            shapes=(
+                Quadric(
+                    coefficients=(0, 0, 0, 0, 0, 0, x, 1, 1, 0),
+                    lower=(-0.8, -0.8, -0.8),
+                    upper=(0.8, 0.8, 0.8),
+                    capped=capped,
+                ),
+            )
+        )
+        for x in (1.0, 1.01)
+    )
+    with scalar():
+        found = geometry(flat, flat.tables, load(flat), 300)
+        assert found.status == "agree", found.reason
+        assert geometry(flat, flat.tables, load(turned), 300).status == "differ"
