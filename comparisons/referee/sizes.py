@@ -8,7 +8,7 @@ from comparisons import shapes
 from comparisons.geometry import affine
 from comparisons.geometry.flatten import Copy, copies_of, place_of
 from comparisons.geometry.frame import OURS, Frame
-from comparisons.shapes.shape import Features, per_face
+from comparisons.shapes.shape import Features
 from reference_rt.core.arrays import Bounds, FloatArray, IdArray, IntArray
 from reference_rt.rendering.query import Intersections
 from reference_rt.rendering.scene import Scene
@@ -34,11 +34,8 @@ class LeafSizes:
         self.is_finite = bool(np.isfinite(self.bounds).all())
         self.known = shapes.TABLES[self.field]
         self.feature_at = self.known.features(table)
-        self.bend_at = self.feature_at
-        if self.known.bends is not None:
-            self.bend_at = self.known.bends(table)
-        elif not self.is_finite:
-            self.bend_at = per_face(np.array([np.inf]))
+        bends = self.known.bends
+        self.bend_at = self.feature_at if bends is None else bends(table)
 
     def row_of(self, primitive: IntArray | IdArray) -> IntArray | IdArray:
         """The rows (n,) of the table for the faces `primitive`: faces of a mesh are numbered as in

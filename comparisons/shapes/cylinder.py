@@ -35,9 +35,10 @@ from comparisons.shapes.tubes import (
 from reference_rt.core.arrays import FloatArray
 from reference_rt.shapes import Cylinder, Shape
 
-OFF = 3.0 * ROUNDINGS
-"""Points on cylinders are off by one over the radius times u D in Mitsuba's scalar variants
-(`findings/mitsuba-thin-cylinders.sh`); those on meshes at most by this (`frame.delta`)."""
+MESH_IS_NEARER = 1.0 / (3.0 * ROUNDINGS)
+"""The radius below which, in Mitsuba's scalar variants, hit points on a mesh are nearer to the
+cylinder than on its own plugin: at the distance D they are up to 3 ROUNDINGS u D off a mesh
+(`frame.delta`), and some u D / radius off the plugin (`findings/mitsuba-thin-cylinders.sh`)."""
 
 
 def _tube(shape: Cylinder) -> Tube:
@@ -50,8 +51,9 @@ def _to_mitsuba(shape: Cylinder, site: Site) -> list[Plugin]:
     unit = followed(m, np.array([r, r, height]), shape.z_min)
     least = np.linalg.svd(m[:, :2], compute_uv=False)[-1] * r
     is_circular = is_round(unit[:, :3])
-    off = is_thin(least, site) and (in_float32(least) > 0.0 or least < 1.0 / OFF)
-    if off or ("emitter" in site.parts and not is_circular):  # Mitsuba's instances do not emit
+    solved_in_float32 = in_float32(least) > 0.0
+    by_mesh = is_thin(least, site) and (solved_in_float32 or least < MESH_IS_NEARER)
+    if by_mesh or ("emitter" in site.parts and not is_circular):  # Mitsuba's instances do not emit
         surface = tube_surface(_tube(shape), site.textured)
         side = stand_in(shape, surface, site, of_cone(r, 0.0, shape.z_min, height))
     elif is_circular:

@@ -74,6 +74,7 @@ PLANE = ShapeType(
         field="planes",
         crossings=_crossings,
         features=lambda table: per_face(np.array([min(unit_lengths(table))])),
+        bends=lambda table: per_face(np.array([np.inf])),
     ),
     surface=surface_of,
     to_mitsuba=_to_mitsuba,

@@ -125,9 +125,9 @@ def curved_instance(name: str, m: affine.Affine, site: Site) -> Plugin:
 THIN = 64.0
 """Cylinders and ellipsoids this many times smaller than the scene are meshes.  Llvm variants solve
 their quadratics in float32, with an error of some u D² / r (see `hits.CURVED`): with D / r = 1000
-every other ray misses a cylinder; with 500 light at the rim of a flat ellipsoid is 8 % off.  In
-scalar variants, too, a point on an ellipsoid 5,000 times as wide as high is off by a fifth of it,
-since its error across becomes one along."""
+every other ray misses a cylinder; with 500 light at the rim of a flat ellipsoid is 8 % off.  All
+variants project the hit onto the unit sphere, which turns its error across a flat ellipsoid into
+one along it: a fifth of the radius, where it is 5,000 times as wide as high."""
 
 
 def is_thin(least: float, site: Site) -> bool:
